@@ -252,7 +252,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
 def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     """A process killed while it writes a run into the store, at one of the statements that do so."""
     from tractexp import tracking
-    from tractexp.tracking.run import Run
+    from tractexp.tracking.run import TrackedRun
     from tractexp.tracking.runfile import save
 
     empty = made(work / "empty")
@@ -262,10 +262,10 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
         def act() -> None:
             uri = tracking.default_uri(folder)
             (folder / "result.json").write_text("{}")
-            child = Run("e", "child", metrics={"x": 1.0})
+            child = TrackedRun("e", "child", metrics={"x": 1.0})
             steps = list(range(1, 400))
-            run = Run("e", "job", {"a": 1}, {"x": 1.0}, {"c": (steps, steps)}, artifacts=[folder / "result.json"],
-                      children=[child])  # fmt: skip
+            run = TrackedRun("e", "job", {"a": 1}, {"x": 1.0}, {"c": (steps, steps)},
+                      artifacts=[folder / "result.json"], children=[child])  # fmt: skip
             kept = save(folder / "job", run, uri)
             tracking.prepare(uri)
             count = counting_statements(n)

@@ -20,7 +20,7 @@ from joblib import Parallel, delayed
 from tractexp.discrepancy.injection import Injection
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.errors import UserError
-from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation, Waveforms
+from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model, compose
 from tractexp.parameter import Parameter
 from tractexp.plugin import discover, get
@@ -95,14 +95,14 @@ def phasors(depth: float, step: float, samples: int, U0: float, speed: float) ->
     )  # fmt: skip
 
 
-def waves(depth: float, negative: float, U0: float, length: float) -> Waveforms:
+def waves(depth: float, negative: float, U0: float, length: float) -> WaveformDrive:
     t = np.arange(round(length * 1200)) / 1200 - 0.02
     shape = np.clip(t / 0.004, 0, 1) - np.clip((t - 0.05) / 0.004, 0, 1)
     v = U0 * (1 - depth * shape) * np.exp(0.1j * shape) + negative * shape * np.exp(-2j * OMEGA * t)
     turn = np.exp(1j * OMEGA * t)
     currents = np.stack([turn.real * (1 - 0.3 * shape), turn.imag, 0.02 * shape])
     currents[0, 8:12] = np.nan
-    return Waveforms(
+    return WaveformDrive(
         step=1 / 1200, v=v, v_zero=0.03 * shape * np.sin(OMEGA * t), turn=turn, currents=currents, U=np.abs(v),
         U2=negative * shape, U0=U0, P0=1.0, Q0=0.6, omega_s0=0.0, omega_n=OMEGA,
     )  # fmt: skip

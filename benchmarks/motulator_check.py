@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tractexp.model.drive import Drive, Waveforms
+from tractexp.model.drive import Drive, WaveformDrive
 from tractexp.model.model import compose
 from tractexp.plugin import get
 
@@ -64,7 +64,7 @@ def check(rate: float = 10_000.0, substeps: int = 4) -> dict[str, float]:
     found = theirs(rate)
     turn = np.exp(2j * np.pi * FREQUENCY * found["t"])
     v, i, n = found["u"] / PEAK / turn, found["i"] / RATED, len(turn)
-    made = Waveforms(
+    made = WaveformDrive(
         1 / rate, v, np.zeros(n), turn, np.zeros((3, n)), np.abs(v), np.zeros(n), 1.0, 1.0, 0.5, omega_s0=0.0,
         omega_n=2 * np.pi * FREQUENCY,
     )  # fmt: skip

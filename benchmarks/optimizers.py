@@ -36,7 +36,7 @@ from tractexp.identification.search import Limits, SearchResult, search
 from tractexp.plugin import build
 from tractexp.studies.bbob import runs as bbob
 from tractexp.studies.comparison import floor
-from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.runs import SearchRun
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED = ROOT / "benchmarks" / "optimizers.json"
@@ -154,9 +154,9 @@ def on_record(series: Series, name: str) -> dict[str, Any]:
     }
 
 
-def _run(problem: Problem, key: tuple[str, int], seed: int, ended: Ended) -> Run:
+def _run(problem: Problem, key: tuple[str, int], seed: int, ended: Ended) -> SearchRun:
     values = dict(zip(problem.space.names, map(float, ended.values), strict=True))
-    return Run(f"{key[0]} {key[1]}", "", seed, {}, "", ended.objective, parameters=values)
+    return SearchRun(f"{key[0]} {key[1]}", "", seed, {}, "", ended.objective, parameters=values)
 
 
 def on_function(series: Series, name: str) -> dict[str, Any]:

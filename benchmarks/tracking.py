@@ -44,7 +44,7 @@ else:
 steps, fitness = np.arange(300), np.geomspace(1, 1e-5, 300)
 result = folder / "result.json"
 result.write_text("{}")
-run = tracking.Run(
+run = tracking.TrackedRun(
     "benchmark", "run",
     parameters={f"key.{i}": i for i in range(60)},
     metrics={"objective": 1e-5, "epsilon_p": 0.01, "epsilon_q": 0.01},

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.model.drive import Waveforms
+from tractexp.model.drive import WaveformDrive
 
 OMEGA = 2 * np.pi * 50.0
 
@@ -17,7 +17,7 @@ def event(u, u_zero=None, rate=5000.0, length=0.5, f0=50.0, angle=0.0, U0=1.0, P
     v = np.where(t < 0, U0 * turn, u(t)) / turn
     turn = turn * np.exp(1j * angle)
     zero = np.zeros(len(t)) if u_zero is None else np.where(t < 0, 0.0, u_zero(t))
-    return Waveforms(
+    return WaveformDrive(
         step=1 / rate, v=v, v_zero=zero, turn=turn, currents=np.zeros((3, len(t))), U=_slow(v, rate, f0),
         U2=_slow(np.conj(v * turn) / turn, rate, f0), U0=U0, P0=P0, Q0=Q0, omega_s0=2 * np.pi * f0 - omega_n,
         omega_n=omega_n,

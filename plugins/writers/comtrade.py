@@ -6,7 +6,7 @@ from ._comtrade import _COMTRADE
 
 
 @plugin
-class COMTRADE(_COMTRADE):
+class COMTRADEWriter(_COMTRADE):
     """COMTRADE, .cfg and .dat: the raw values of the source where they are integers, else numbers in full as text.
 
     Source: IEEE C37.111-2013.

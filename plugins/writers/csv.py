@@ -6,7 +6,7 @@ from ._table import _Table
 
 
 @plugin
-class CSV(_Table):
+class CSVWriter(_Table):
     """A tidy CSV table, every number with the digits that give it back, and a sidecar in JSON: units, base, channels.
 
     Source: RFC 4180.

@@ -36,7 +36,7 @@ def log(uri, run, parent=None, variant=None):
     ended |= {"seconds": run.seconds[-1], "simulations": run.simulations[-1]}
     metrics = {key: 0.5 * value for key, value in ended.items()} | {f"search_{k}": v for k, v in ended.items()}
     variant = variant or run.optimizer
-    logged = tracking.Run(
+    logged = tracking.TrackedRun(
         EXPERIMENT,
         f"{run.optimizer} seed {run.seed}",
         parameters=tracking.flatten(run.config),
@@ -64,7 +64,7 @@ def filled(tmp_path_factory, empty_store):
     (folder / "outputs").mkdir()
     shutil.copy(empty_store, folder / "outputs")
     uri = tracking.default_uri(folder)
-    parent = tracking.start_parent(tracking.Run(EXPERIMENT, "sweep", tags={"task": "identify"}), uri)
+    parent = tracking.start_parent(tracking.TrackedRun(EXPERIMENT, "sweep", tags={"task": "identify"}), uri)
     runs = samples({"issa": 1.0, "ssa": 3.0}, seeds=range(8))
     for run in runs:
         log(uri, run, parent)
@@ -214,7 +214,7 @@ def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
     tags = {"task": "identify", "optimizer": "issa", "data": "tibet_50pct", "seed": "0"}
     metrics = {"objective": 1.0, "search_objective": 2.0, "epsilon_p": 0.1, "epsilon_q": 0.1, "seconds": 9.0}
     curves = {"fitness_by_simulations": tracking.at_common_steps(run.simulations, run.history)}
-    made = tracking.Run(
+    made = tracking.TrackedRun(
         EXPERIMENT, "r", {}, metrics, curves, tags, [tmp_path / "result.json", tmp_path / "history.csv"]
     )
     tracking.log(made, uri)

@@ -19,7 +19,7 @@ import pytest
 
 from tractexp import tracking
 from tractexp.errors import UserError
-from tractexp.tracking import Run, owner
+from tractexp.tracking import TrackedRun, owner
 from tractexp.tracking.runfile import FILE, read, save
 from tractexp.tracking.store import open_store
 from tractexp.tracking.sync import BROUGHT, DELETED, NOT, THERE, sync
@@ -33,9 +33,9 @@ def tractexp(*arguments, cwd, **more):
     return subprocess.run(command, cwd=cwd, capture_output=True, text=True, **more)
 
 
-def run(name="one", **more) -> Run:
+def run(name="one", **more) -> TrackedRun:
     curve = (np.arange(1, 4), np.array([3.0, 2.0, 1.0]))
-    return Run("e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more)
+    return TrackedRun("e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more)
 
 
 def runs(uri: str, **more):
@@ -53,7 +53,7 @@ def stops(*_, **__):
     print("in the middle", flush=True)
     os.kill(os.getpid(), 9)
 run._write = stops
-tracking.log(tracking.Run("e", "killed"), sys.argv[1])"""
+tracking.log(tracking.TrackedRun("e", "killed"), sys.argv[1])"""
 
 
 def test_a_run_whose_writer_was_killed_is_closed_when_the_store_is_opened_next(uri):
@@ -68,8 +68,8 @@ def test_a_run_whose_writer_was_killed_is_closed_when_the_store_is_opened_next(u
 
 def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
     client = open_store(uri)
-    parent = tracking.start_parent(Run("e", "a sweep that runs"), uri)
-    far = tracking.start_parent(Run("e", "on another computer"), uri)
+    parent = tracking.start_parent(TrackedRun("e", "a sweep that runs"), uri)
+    far = tracking.start_parent(TrackedRun("e", "on another computer"), uri)
     client.set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     assert owner.close_stale(client) == []
     client.set_tag(parent, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")  # this number, an earlier process
@@ -96,7 +96,7 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
     folder = tmp_path / "before"
     folder.mkdir()
     (folder / "result.json").write_text("{}")
-    child = Run("e", "child", metrics={"y": float("inf")})
+    child = TrackedRun("e", "child", metrics={"y": float("inf")})
     told = run(artifacts=[folder / "result.json", tmp_path], model=folder / "result.json", children=[child])
     kept = save(folder, told, "sqlite:////x.db")
     after = folder.rename(tmp_path / "after")
@@ -114,7 +114,7 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
 def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_path, uri):
     sweep = tmp_path / "sweep"
     ended = time.time() - 86_400
-    save(sweep, Run("e", "the sweep", ended=ended), uri, sweep=True)
+    save(sweep, TrackedRun("e", "the sweep", ended=ended), uri, sweep=True)
     (sweep / "sweep.json").write_text('{"run": null}')
     for k in range(2):
         save(sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri)
@@ -134,8 +134,8 @@ def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_pat
 
 def test_what_an_attempt_left_half_done_goes_when_the_run_is_brought_in(tmp_path, uri):
     one = save(tmp_path / "job", run(), uri)
-    half = tracking.start_parent(Run("e", "half", key=one.run.key), uri)
-    tracking.log(Run("e", "its child", parent=half), uri)
+    half = tracking.start_parent(TrackedRun("e", "half", key=one.run.key), uri)
+    tracking.log(TrackedRun("e", "its child", parent=half), uri)
     assert sync(tmp_path) == {BROUGHT: 1}
     assert [r.info.run_name for r in runs(uri)] == ["one"]
     whole = read(tmp_path / "job")
@@ -241,7 +241,7 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
     save(tmp_path / "outputs" / "job", run(), uri)
     sync(tmp_path)
     database = Path(uri.removeprefix("sqlite:///"))
-    stale = tracking.start_parent(Run("e", "stale"), uri)
+    stale = tracking.start_parent(TrackedRun("e", "stale"), uri)
     open_store(uri).set_tag(stale, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")
     code, told = doctor(tmp_path, "--uri", uri, capsys=capsys)
     assert code == 0, told
@@ -263,7 +263,7 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
 
     monkeypatch.setattr(module, "cores", lambda: iter(()))
     monkeypatch.setattr(module, "BUSY", 0.1)
-    far = tracking.start_parent(Run("e", "far"), uri)
+    far = tracking.start_parent(TrackedRun("e", "far"), uri)
     open_store(uri).set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     code, told = doctor(tmp_path / "none", "--uri", uri, capsys=capsys)
     assert code == 2

@@ -19,7 +19,7 @@ from command_line import run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
-from tractexp.tracking import Run, process
+from tractexp.tracking import TrackedRun, process
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
 from tractexp.tracking.store import sentences
@@ -46,7 +46,7 @@ def test_importing_tracking_does_not_import_mlflow():
 
 def test_a_run_comes_back_as_it_was_logged(tmp_path, uri):
     (tmp_path / "result.json").write_text("{}")
-    run = Run(
+    run = TrackedRun(
         "identify tibet_50pct",
         "issa-s0",
         parameters={"optimizer.population": 50, "T_prime": 0.25, "optimizer.levy": True},
@@ -72,14 +72,14 @@ def test_a_run_comes_back_as_it_was_logged(tmp_path, uri):
 
 
 def test_curves_keep_their_steps_and_every_point(uri):
-    run_id = tracking.log(Run("e", "r", curves={"fitness_by_simulations": (50 * STEPS, FITNESS)}), uri)
+    run_id = tracking.log(TrackedRun("e", "r", curves={"fitness_by_simulations": (50 * STEPS, FITNESS)}), uri)
     points = client(uri).get_metric_history(run_id, "fitness_by_simulations")
     assert sorted((p.step, p.value) for p in points) == list(zip((50 * STEPS).tolist(), FITNESS.tolist(), strict=True))
 
 
 def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
     n = 15_000
-    run_id = tracking.log(Run("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri)
+    run_id = tracking.log(TrackedRun("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri)
     steps = sorted(p.step for p in client(uri).get_metric_history(run_id, "fitness"))
     assert len(steps) == CURVE_POINTS
     assert (steps[0], steps[-1]) == (0, n - 1)
@@ -88,7 +88,7 @@ def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
 def test_more_than_one_batch_of_everything_arrives(uri):
     parameters = {f"p{i}": i for i in range(250)}
     curves = {f"c{i}": (STEPS, FITNESS) for i in range(7)}
-    found = client(uri).get_run(tracking.log(Run("e", "r", parameters=parameters, curves=curves), uri))
+    found = client(uri).get_run(tracking.log(TrackedRun("e", "r", parameters=parameters, curves=curves), uri))
     assert found.data.params == {name: str(i) for name, i in parameters.items()}
     for name in curves:
         assert len(client(uri).get_metric_history(found.info.run_id, name)) == 300
@@ -96,9 +96,9 @@ def test_more_than_one_batch_of_everything_arrives(uri):
 
 def test_children_point_to_their_sweep_which_closes_with_its_status(tmp_path, uri):
     (tmp_path / "table.html").write_text("<p>")
-    parent = tracking.start_parent(Run("e", "issa,pso x 30", parameters={"seeds": 30}), uri)
+    parent = tracking.start_parent(TrackedRun("e", "issa,pso x 30", parameters={"seeds": 30}), uri)
     assert client(uri).get_run(parent).info.status == "RUNNING"
-    child = tracking.log(Run("e", "issa-s0", parent=parent), uri)
+    child = tracking.log(TrackedRun("e", "issa-s0", parent=parent), uri)
     tracking.finish_parent(parent, uri, "FAILED", {"jobs_failed": 1}, [tmp_path / "table.html"])
     assert client(uri).get_run(child).data.tags["mlflow.parentRunId"] == parent
     closed = client(uri).get_run(parent)
@@ -108,8 +108,8 @@ def test_children_point_to_their_sweep_which_closes_with_its_status(tmp_path, ur
 
 
 def test_children_are_logged_below_their_run(uri):
-    child = tracking.Run("experiment", "candidate", metrics={"deviance_lowered_by": 12.5})
-    run_id = tracking.log(tracking.Run("experiment", "investigation", children=[child, child]), uri)
+    child = tracking.TrackedRun("experiment", "candidate", metrics={"deviance_lowered_by": 12.5})
+    run_id = tracking.log(tracking.TrackedRun("experiment", "investigation", children=[child, child]), uri)
     experiment = client(uri).get_run(run_id).info.experiment_id
     found = client(uri).search_runs([experiment], f"tags.`mlflow.parentRunId` = '{run_id}'")
     assert [r.data.metrics["deviance_lowered_by"] for r in found] == [12.5, 12.5]
@@ -118,7 +118,7 @@ def test_children_are_logged_below_their_run(uri):
 
 def test_a_run_that_cannot_be_written_whole_is_marked_failed(uri):
     with pytest.raises(UserError, match="Names may only contain"):
-        tracking.log(Run("e", "r", metrics={"a*b": 1.0}), uri)
+        tracking.log(TrackedRun("e", "r", metrics={"a*b": 1.0}), uri)
     (found,) = client(uri).search_runs([client(uri).get_experiment_by_name("e").experiment_id])
     assert found.info.status == "FAILED"
 
@@ -136,7 +136,7 @@ def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, e
     (elsewhere / "note.txt").write_text("hello")
     script = """
 import sys; from pathlib import Path; from tractexp import provenance, tracking
-run = tracking.Run("identify: tibet/50", "r", artifacts=[Path("note.txt")])
+run = tracking.TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
 print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
     run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
     kept = home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
@@ -148,7 +148,7 @@ def test_processes_that_meet_on_a_fresh_store_all_log_their_run(tmp_path):
     """MLflow's own migrations break when two processes start them together."""
     script = """
 import sys; from pathlib import Path; from tractexp import provenance, tracking
-run = tracking.Run("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
+run = tracking.TrackedRun("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
 tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     jobs = [
         subprocess.Popen([sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True)
@@ -199,7 +199,7 @@ def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
 def test_a_name_of_a_metric_is_one_that_mlflow_takes(uri):
     names = [tracking.metric_name(f"median {name}") for name in ("issa levy=false", "a*b (c)", "issa bounds.C=[0.5]")]
     assert names == ["median issa levy:false", "median a_b _c_", "median issa bounds.C:_0.5_"]
-    run_id = tracking.log(Run("e", "r", metrics=dict.fromkeys(names, 1.0)), uri)
+    run_id = tracking.log(TrackedRun("e", "r", metrics=dict.fromkeys(names, 1.0)), uri)
     assert set(client(uri).get_run(run_id).data.metrics) == set(names)
 
 
@@ -243,7 +243,7 @@ def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_p
 
 def test_what_a_run_has_read_is_listed_by_its_digest(uri):
     record = {"name": "dip1", "role": "train", "sha256": "ab" * 32}
-    run_id = tracking.log(tracking.Run("inputs", "one", records=[record]), uri)
+    run_id = tracking.log(tracking.TrackedRun("inputs", "one", records=[record]), uri)
     (given,) = client(uri).get_run(run_id).inputs.dataset_inputs
     assert given.dataset.name == "dip1"
     assert given.dataset.digest == record["sha256"][:36]
@@ -254,11 +254,11 @@ def test_what_a_run_has_read_is_listed_by_its_digest(uri):
 @pytest.mark.parametrize(
     ("run", "message"),
     [
-        (Run("", "r"), "needs experiment"),
-        (Run("e", " "), "needs name"),
-        (Run("e", "r", status="DONE"), "status=DONE is not one of FINISHED, FAILED, KILLED"),
-        (Run("e", "r", artifacts=[Path("gone.json")]), "gone.json of run 'r' does not exist"),
-        (Run("e", "r", curves={"c": ([1, 2], [1.0])}), "'c' has 2 steps and 1 values"),
+        (TrackedRun("", "r"), "needs experiment"),
+        (TrackedRun("e", " "), "needs name"),
+        (TrackedRun("e", "r", status="DONE"), "status=DONE is not one of FINISHED, FAILED, KILLED"),
+        (TrackedRun("e", "r", artifacts=[Path("gone.json")]), "gone.json of run 'r' does not exist"),
+        (TrackedRun("e", "r", curves={"c": ([1, 2], [1.0])}), "'c' has 2 steps and 1 values"),
     ],
 )
 def test_a_run_that_is_not_right_is_refused_before_a_store_is_made(tmp_path, run, message):
@@ -349,7 +349,7 @@ def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):
     number = client(uri).create_experiment("gone")
     client(uri).delete_experiment(number)
     with pytest.raises(UserError, match=f"'gone' .*restore --experiment-id {number}'"):
-        tracking.log(Run("gone", "r"), uri)
+        tracking.log(TrackedRun("gone", "r"), uri)
 
 
 STAND_IN = '''
@@ -377,7 +377,7 @@ for address in sys.argv[2:]:
 
 def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
     (tmp_path / "result.json").write_text('{"share": 0.8}')
-    run_id = tracking.log(Run("e", "r", model=tmp_path / "result.json"), uri)
+    run_id = tracking.log(TrackedRun("e", "r", model=tmp_path / "result.json"), uri)
     (logged,) = client(uri).search_logged_models([client(uri).get_run(run_id).info.experiment_id])
     assert logged.status.value == "READY"
     assert logged.source_run_id == run_id
@@ -427,7 +427,7 @@ FOREIGN = [
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
 def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     (tmp_path / "note.txt").write_text("hello")
-    run_id = tracking.log(Run("e", "r", artifacts=[tmp_path / "note.txt"]), uri)
+    run_id = tracking.log(TrackedRun("e", "r", artifacts=[tmp_path / "note.txt"]), uri)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     port = free_port()
@@ -476,7 +476,7 @@ def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
 
 def test_a_second_process_logs_as_this_one_would(tmp_path, uri):
     (tmp_path / "result.json").write_text("{}")
-    run = Run("e", "r", curves={"fitness": (STEPS, FITNESS)}, artifacts=[tmp_path / "result.json"])
+    run = TrackedRun("e", "r", curves={"fitness": (STEPS, FITNESS)}, artifacts=[tmp_path / "result.json"])
     with Logger(uri) as logger:
         found = client(uri).get_run(logger.log(run))
     assert (found.info.status, found.data.metrics) == ("FINISHED", {"fitness": FITNESS[-1]})
@@ -504,7 +504,7 @@ def test_the_process_that_was_started_ahead_is_the_one_that_logs(uri):
     (ahead,) = process._ahead
     with process.logger(uri) as taken, process.logger(uri) as another:
         assert taken is ahead is not another
-        assert client(uri).get_run(taken.log(Run("e", "r"))).info.status == "FINISHED"
+        assert client(uri).get_run(taken.log(TrackedRun("e", "r"))).info.status == "FINISHED"
 
 
 @pytest.mark.skipif(os.name == "nt", reason="asks for a process by a signal")
@@ -553,4 +553,4 @@ def test_a_second_process_passes_its_sentence_on(tmp_path):
         Logger(tracking.default_uri(tmp_path / "file")) as logger,
         pytest.raises(UserError, match=r"outputs/mlflow\.db cannot be used"),
     ):
-        logger.log(Run("e", "r"))
+        logger.log(TrackedRun("e", "r"))

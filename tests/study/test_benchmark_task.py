@@ -16,10 +16,10 @@ from tractexp.plugin import build
 from tractexp.studies.api.benchmark import BenchmarkResult
 from tractexp.studies.bbob import page as report
 from tractexp.studies.bbob import runs as bbob
-from tractexp.studies.bbob.runs import GROUPS, Bbob, BbobRuns, Plan, Run, perform, run, seed_of
+from tractexp.studies.bbob.runs import GROUPS, Bbob, BbobPlan, BbobRun, BbobRuns, perform, run, seed_of
 
 TARGETS = tuple(10.0**k for k in range(2, -9, -1))
-SMALL = Plan((1,), (2,), (1,), 500, TARGETS, 0)
+SMALL = BbobPlan((1,), (2,), (1,), 500, TARGETS, 0)
 
 
 @pytest.fixture(scope="module")
@@ -94,14 +94,14 @@ def test_a_search_that_ends_is_started_anew_until_the_budget_is_spent(ioh):
 
 
 def test_runs_are_the_same_on_any_number_of_processes_and_differ_by_seed(ioh):
-    plan = Plan((1, 15), (2,), (1, 2), 100, TARGETS, 3)
+    plan = BbobPlan((1, 15), (2,), (1, 2), 100, TARGETS, 3)
     tried = {name: optimizer(name) for name in ("pso", "random_search")}
     one, two = perform(tried, plan, 1), perform(tried, plan, 2)
     assert one.runs == two.runs
     assert [(r.optimizer, r.function, r.instance) for r in one.runs] == [
         (name, f, i) for name in tried for f in (1, 15) for i in (1, 2)
     ]
-    other = perform(tried, Plan((1, 15), (2,), (1, 2), 100, TARGETS, 4), 1)
+    other = perform(tried, BbobPlan((1, 15), (2,), (1, 2), 100, TARGETS, 4), 1)
     assert all(a.distance != b.distance for a, b in zip(one.runs, other.runs, strict=True))
 
 
@@ -109,14 +109,14 @@ def test_runs_are_the_same_on_any_number_of_processes_and_differ_by_seed(ioh):
 def by_hand():
     """Two optimizers on two functions and two instances, budget 100; `a` solves f1 always and f16 once."""
     inf = float("inf")
-    plan = Plan((1, 16), (2,), (1, 2), 50, (1.0, 1e-8), 0)
+    plan = BbobPlan((1, 16), (2,), (1, 2), 50, (1.0, 1e-8), 0)
     rows = [
         ("a", 1, 1, 30, (10.0, 30.0)), ("a", 1, 2, 50, (20.0, 50.0)),
         ("a", 16, 1, 80, (40.0, 80.0)), ("a", 16, 2, 100, (90.0, inf)),
         ("b", 1, 1, 100, (60.0, inf)), ("b", 1, 2, 100, (inf, inf)),
         ("b", 16, 1, 100, (inf, inf)), ("b", 16, 2, 100, (inf, inf)),
     ]  # fmt: skip
-    runs = [Run(name, f, 2, i, spent, 1, 0.5, hits) for name, f, i, spent, hits in rows]
+    runs = [BbobRun(name, f, 2, i, spent, 1, 0.5, hits) for name, f, i, spent, hits in rows]
     return BbobRuns(plan, ("a", "b"), {1: "Sphere", 16: "Weierstrass"}, runs)
 
 
@@ -151,8 +151,8 @@ def test_page_and_json_hold_the_numbers_and_load_nothing_from_elsewhere(by_hand,
 
 
 def test_curves_are_drawn_where_no_target_was_met_at_all(tmp_path):
-    plan = Plan((1,), (2,), (1,), 50, (1e-8,), 0)
-    nothing = BbobRuns(plan, ("a",), {1: "Sphere"}, [Run("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))])
+    plan = BbobPlan((1,), (2,), (1,), 50, (1e-8,), 0)
+    nothing = BbobRuns(plan, ("a",), {1: "Sphere"}, [BbobRun("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))])
     ((whole, each),) = report.charts(nothing, 2).values()
     (curve,) = whole.plain()["data"]
     assert (np.frombuffer(base64.b64decode(curve["y"]["bdata"]), "<f4") == 0).all()

@@ -17,7 +17,7 @@ from tractexp.errors import UserError
 from tractexp.studies.comparison import claims, floor, load
 from tractexp.studies.comparison.comparison import compare
 from tractexp.studies.comparison.floor import Floor, floor_of, polish
-from tractexp.studies.comparison.runs import PROBLEM, REST, SETTINGS, Run, gather
+from tractexp.studies.comparison.runs import PROBLEM, REST, SETTINGS, SearchRun, gather
 from tractexp.studies.comparison.runs import on as on_data
 from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, running_time, runtimes, summarize
 
@@ -33,7 +33,7 @@ def a_run(optimizer, seed, objective, settings=None, *, rate=0.05, iterations=10
     steps = np.arange(iterations + 1)
     config = {"optimizer.name": name or optimizer, "seed": seed, "budget": None} | (data or DATA)
     config |= {f"optimizer.{key}": value for key, value in (settings or {}).items()}
-    return Run(
+    return SearchRun(
         optimizer, "tibet_50pct", seed, config, f"{optimizer}-{seed}", objective, objective**0.5, 1.3 * objective**0.5,
         50.0 * (1 + steps), 0.01 * (1 + steps), np.maximum(0.1 * np.exp(-rate * 2 * steps), objective), **more,
     )  # fmt: skip
@@ -41,7 +41,7 @@ def a_run(optimizer, seed, objective, settings=None, *, rate=0.05, iterations=10
 
 def a_failure(optimizer, seed, why="it burst"):
     whole = a_run(optimizer, seed, FLOOR)
-    return Run(whole.optimizer, whole.data, seed, whole.config, whole.where, failure=why)
+    return SearchRun(whole.optimizer, whole.data, seed, whole.config, whole.where, failure=why)
 
 
 def samples(factors, spread=0.3, seeds=SEEDS):

@@ -10,9 +10,9 @@ import pytest
 from test_compare import SEEDS, SWITCHES, TARGETS, ablation_runs, compare_command, samples, subsets, write_sweep
 
 from tractexp.errors import UserError
-from tractexp.studies.bbob.runs import BbobRuns, Plan, Run
+from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
 from tractexp.studies.comparison import judging, overall_claims
-from tractexp.studies.comparison.ablation import Family
+from tractexp.studies.comparison.ablation import VariantFamily
 from tractexp.studies.comparison.comparison import _median
 from tractexp.studies.comparison.load import _readable
 from tractexp.studies.comparison.overall import on_functions
@@ -118,15 +118,15 @@ def test_a_job_that_cannot_be_read_says_why_in_the_first_line_of_the_reason():
 
 def test_on_bbob_a_function_is_a_block():
     """Levy divides every distance by ten, on three instances; what has been met counts as met and no closer."""
-    family = Family(("levy",), {frozenset(): "ssa", frozenset({"levy"}): "flying"})
-    plan = Plan(tuple(range(1, 25)), (5,), (1, 2, 3), 3000, (1.0, 1e-8), 0)
+    family = VariantFamily(("levy",), {frozenset(): "ssa", frozenset({"levy"}): "flying"})
+    plan = BbobPlan(tuple(range(1, 25)), (5,), (1, 2, 3), 3000, (1.0, 1e-8), 0)
     rng = np.random.default_rng(4)
     runs = []
     for f in plan.functions:
         for i in plan.instances:
             near = 10 ** rng.uniform(-4, 0) if f > 1 else 1e-13
             for name, distance in (("ssa", near), ("flying", near / 10)):
-                runs.append(Run(name, f, 5, i, 15000, 1, distance, (3.0, np.inf)))
+                runs.append(BbobRun(name, f, 5, i, 15000, 1, distance, (3.0, np.inf)))
     benchmark = BbobRuns(plan, ("ssa", "flying"), {f: str(f) for f in plan.functions}, runs)
     made = on_functions(benchmark, family)
     (levy,) = made.ablation.effects

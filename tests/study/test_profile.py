@@ -10,9 +10,9 @@ import uncertainty as study
 from pages import read, unpacked
 
 from tractexp.errors import UserError
-from tractexp.identification.posterior import Posterior
+from tractexp.identification.posterior import PosteriorSample
 from tractexp.identification.problem import Problem
-from tractexp.identification.profile import End, Profile, checked, profiles, revised
+from tractexp.identification.profile import End, LikelihoodProfile, checked, profiles, revised
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
 from tractexp.report import posterior
@@ -98,7 +98,9 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
 
 def test_two_minima_and_open_sides_change_the_verdict():
     good = ParameterVerdict(IDENTIFIED, "± 3 %")
-    base = Profile("C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ())
+    base = LikelihoodProfile(
+        "C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ()
+    )
     assert revised(good, base, 0, 1).word == IDENTIFIED
     twice = revised(good, replace(base, minima=(0.58,)), 0, 1)
     assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
@@ -175,7 +177,9 @@ def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path)
     draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
     draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
     draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]  # as C does, so does q_v
-    path = posterior.report(quiet, Posterior(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(tmp_path / "posterior.html")
+    path = posterior.report(quiet, PosteriorSample(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(
+        tmp_path / "posterior.html"
+    )
     told, charts = read(path).words, drawn(path)
     assert "but those of X_prime: take the posterior's." in told
     assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told

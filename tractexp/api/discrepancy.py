@@ -414,7 +414,7 @@ class Discrepancy(Task, call=investigate):
             if gap.closed is not None:
                 metrics[f"{role}_gap_closed"] = gap.closed
         children = [
-            tracking.Run(
+            tracking.TrackedRun(
                 experiment=job.experiment,
                 name=" and ".join(row["effects"]),
                 metrics={"deviance_lowered_by": row["likelihood_ratio"] or 0.0}

@@ -20,7 +20,7 @@ from tractexp.outcome import Written
 from tractexp.plugin import plugin
 
 if TYPE_CHECKING:
-    from tractexp.identification.posterior import Posterior as Draws
+    from tractexp.identification.posterior import PosteriorSample
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,10 +33,10 @@ class Sampled(Written):
     fit: Identification
     settings: Mapping[str, int]  # walkers, steps, seed
     content: Mapping[str, Any]
-    behind: "Draws | None" = None  # None where it was loaded
+    behind: "PosteriorSample | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def drawn(self) -> "Draws":
+    def drawn(self) -> "PosteriorSample":
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 

@@ -129,7 +129,7 @@ class Task(Plugin):
         job.log(**content | self.logged(job, result))
 
     def logged(self, job: "Job", result: Any) -> dict[str, Any]:
-        """What is logged of a result: fields of `tractexp.tracking.Run`, and `values` of parameters."""
+        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` of parameters."""
         return {}
 
 
@@ -272,7 +272,7 @@ class Job:
     def log(self, name: str, values: Mapping[str, float], **content: Any) -> None:
         """Log this job in MLflow with its configuration and tags, and say how to look at it.
 
-        `values` are identified parameters; `content` are further fields of `tractexp.tracking.Run`.
+        `values` are identified parameters; `content` are further fields of `tractexp.tracking.TrackedRun`.
         """
         node = self.config["tracking"]
         if not node["enabled"]:
@@ -281,7 +281,7 @@ class Job:
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
         parts |= {"variant": self.variant, "seed": str(self.seed)}
-        run = tracking.Run(
+        run = tracking.TrackedRun(
             experiment=self.experiment,
             name=name,
             parameters={**tracking.flatten(self.config), **values},
@@ -298,7 +298,7 @@ class Job:
         return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
 
     def send(self, run: Any) -> None:
-        """Log a run (`tracking.Run`), and say how to look at it.
+        """Log a run (`tracking.TrackedRun`), and say how to look at it.
 
         It is kept in the folder first. Where the store cannot be used, that is a sentence: the results are there.
         """

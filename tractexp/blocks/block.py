@@ -11,7 +11,7 @@ from tractexp import files
 from tractexp.errors import UserError, check_choice
 
 if TYPE_CHECKING:
-    from tractexp.blocks.chart import Chart as Drawing
+    from tractexp.blocks.chart import Chart
 
 KINDS = ("plain", "good", "bad")
 
@@ -32,7 +32,7 @@ class Paragraphs:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class VerdictBlock:
     """What the reader should take away: "plain", "good" or "bad"."""
 
     texts: Sequence[str]
@@ -47,7 +47,7 @@ class Items:
 
 
 @dataclass(frozen=True)
-class Code:
+class CodeBlock:
     """A line to be copied."""
 
     text: str
@@ -113,10 +113,10 @@ def cell_text(cell: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Chart:
+class ChartBlock:
     """A chart to look into, and what it shows."""
 
-    chart: "Drawing"
+    chart: "Chart"
     caption: str = ""
 
 
@@ -124,7 +124,7 @@ class Chart:
 class Charts:
     """Small charts side by side."""
 
-    charts: Sequence[Chart]
+    charts: Sequence[ChartBlock]
 
 
 @dataclass(frozen=True)
@@ -150,7 +150,20 @@ class Fold:
     blocks: Sequence["Block"]
 
 
-Block = Heading | Paragraphs | Verdict | Items | Code | Equation | Table | Chart | Charts | Figure | Markup | Fold
+Block = (
+    Heading
+    | Paragraphs
+    | VerdictBlock
+    | Items
+    | CodeBlock
+    | Equation
+    | Table
+    | ChartBlock
+    | Charts
+    | Figure
+    | Markup
+    | Fold
+)
 
 
 class Report:
@@ -175,13 +188,13 @@ class Report:
 
     def verdict(self, *paragraphs: str, kind: str = "plain") -> "Report":
         check_choice("kind", kind, KINDS)
-        return self.add(Verdict(paragraphs, kind))
+        return self.add(VerdictBlock(paragraphs, kind))
 
     def items(self, texts: Sequence[str]) -> "Report":
         return self.add(Items(texts)) if texts else self
 
     def code(self, text: str) -> "Report":
-        return self.add(Code(text))
+        return self.add(CodeBlock(text))
 
     def equation(self, latex: str) -> "Report":
         return self.add(Equation(latex))
@@ -192,11 +205,11 @@ class Report:
     ) -> "Report":  # fmt: skip
         return self.add(Table(columns, rows, title, caption, words, detail))
 
-    def chart(self, chart: "Drawing", caption: str = "") -> "Report":
-        return self.add(Chart(chart, caption))
+    def chart(self, chart: "Chart", caption: str = "") -> "Report":
+        return self.add(ChartBlock(chart, caption))
 
-    def charts(self, charts: Sequence["Drawing"], caption: str = "") -> "Report":
-        self.add(Charts([Chart(chart) for chart in charts]))
+    def charts(self, charts: Sequence["Chart"], caption: str = "") -> "Report":
+        self.add(Charts([ChartBlock(chart) for chart in charts]))
         return self.text(*[caption] * bool(caption))
 
     def figure(self, path: Path, caption: str = "") -> "Report":

@@ -14,9 +14,9 @@ from typing import Any
 
 from tractexp.blocks.block import (
     Block,
-    Chart,
+    ChartBlock,
     Charts,
-    Code,
+    CodeBlock,
     Equation,
     Figure,
     Fold,
@@ -26,7 +26,7 @@ from tractexp.blocks.block import (
     Paragraphs,
     Report,
     Table,
-    Verdict,
+    VerdictBlock,
 )  # fmt: skip
 from tractexp.blocks.chart import script
 
@@ -96,14 +96,14 @@ def fragment(report: Report) -> str:
             parts.append(_table(block.brief))
         elif isinstance(block, Equation):
             parts.append(f"<p>$${html.escape(block.latex)}$$</p>")
-        elif not isinstance(block, Chart | Charts | Figure | Markup | Fold):
+        elif not isinstance(block, ChartBlock | Charts | Figure | Markup | Fold):
             parts.append(_element(block, itertools.count(1)))
     return "\n".join(parts)
 
 
 def _draws(block: Block) -> bool:
     """Whether a block holds a chart."""
-    return isinstance(block, Chart | Charts) or (isinstance(block, Fold) and any(map(_draws, block.blocks)))
+    return isinstance(block, ChartBlock | Charts) or (isinstance(block, Fold) and any(map(_draws, block.blocks)))
 
 
 def _element(block: Block, figures: "itertools.count[int]") -> str:
@@ -113,11 +113,11 @@ def _element(block: Block, figures: "itertools.count[int]") -> str:
             return f"<h{level}>{html.escape(text)}</h{level}>"
         case Paragraphs(texts):
             return "\n".join(f"<p>{html.escape(text)}</p>" for text in texts)
-        case Verdict(texts, kind):
+        case VerdictBlock(texts, kind):
             return f'<div class="verdict {kind}">\n{_element(Paragraphs(texts), figures)}\n</div>'
         case Items(texts):
             return "\n".join(["<ul>", *(f"<li>{html.escape(text)}</li>" for text in texts), "</ul>"])
-        case Code(text):
+        case CodeBlock(text):
             return f"<pre>{html.escape(text)}</pre>"  # a click selects it whole
         case Equation(latex):
             drawing = _typeset(latex)
@@ -125,7 +125,7 @@ def _element(block: Block, figures: "itertools.count[int]") -> str:
             return f'<div class="equation">{inside}</div>'
         case Table():
             return _table(block)
-        case Chart(chart, caption):
+        case ChartBlock(chart, caption):
             return f"<figure>{chart.element(caption)}{_below(caption)}</figure>"
         case Charts(charts):
             return "\n".join(['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"])

@@ -4,9 +4,9 @@ from collections.abc import Iterator
 
 from tractexp.blocks.block import (
     Block,
-    Chart,
+    ChartBlock,
     Charts,
-    Code,
+    CodeBlock,
     Equation,
     Figure,
     Fold,
@@ -16,7 +16,7 @@ from tractexp.blocks.block import (
     Paragraphs,
     Report,
     Table,
-    Verdict,
+    VerdictBlock,
 )  # fmt: skip
 
 
@@ -32,11 +32,11 @@ def _parts(block: Block) -> Iterator[str]:
             yield f"{'#' * level} {text}"
         case Paragraphs(texts):
             yield from map(_escaped, texts)
-        case Verdict(texts):
+        case VerdictBlock(texts):
             yield "\n>\n".join(f"> {_escaped(text)}" for text in texts)
         case Items(texts):
             yield "\n".join(f"- {_escaped(text)}" for text in texts)
-        case Code(text):
+        case CodeBlock(text):
             yield f"```\n{text}\n```"
         case Equation(latex):
             yield f"$$ {latex} $$"
@@ -44,7 +44,7 @@ def _parts(block: Block) -> Iterator[str]:
             yield _table(block)
             if block.caption:
                 yield _escaped(block.caption)
-        case Chart(_, caption) | Figure(_, caption):
+        case ChartBlock(_, caption) | Figure(_, caption):
             yield f"*Chart of the page: {_escaped(caption)}*"
         case Markup():
             return

@@ -4,7 +4,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from tractexp.blocks.block import Code, Heading, Items, Paragraphs, Report, Table, Verdict
+from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
 from tractexp.wording import one_line, shown
 
 WIDTH = 200  # characters of a line of text that is no terminal's
@@ -25,12 +25,12 @@ def show(report: Report, console: Any) -> None:
 
 def _lines(block: Any) -> Sequence[str]:
     """The lines of a block; none of what only a page can show."""
-    if isinstance(block, Paragraphs | Verdict):
+    if isinstance(block, Paragraphs | VerdictBlock):
         return block.texts
     if isinstance(block, Items):
         return [f"  {text}" for text in block.texts]
-    if isinstance(block, Heading | Code):
-        return [f"  {block.text}" if isinstance(block, Code) else block.text]
+    if isinstance(block, Heading | CodeBlock):
+        return [f"  {block.text}" if isinstance(block, CodeBlock) else block.text]
     return ()
 
 

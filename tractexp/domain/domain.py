@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.domain.playback import Playback
 from tractexp.errors import UserError
-from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, Waveforms
+from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import RandomWalk
@@ -79,7 +79,7 @@ class Domain(ABC):
     @abstractmethod
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
-    ) -> Excitation | Waveforms:
+    ) -> Excitation | WaveformDrive:
         """What drives a model through an event of this domain; `weights` are those of an objective, of P and Q."""
 
     @abstractmethod
@@ -136,7 +136,7 @@ class Domain(ABC):
     @abstractmethod
     def dip(
         self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
-    ) -> Excitation | Waveforms:
+    ) -> Excitation | WaveformDrive:
         """The voltage of a dip at the power before a recorded event, `course` (N,) of it there: 0 to 1.
 
         The phase turns by `jump` [degrees]; the negative sequence is `unbalance` times the depth.

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.model.drive import Excitation, Waveforms
+from tractexp.model.drive import Excitation, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.record import Event, WaveEvent
 from tractexp.record.window import sharpened
@@ -41,10 +41,10 @@ def phasors(event: Event, model: Model | None = None, weights: tuple[float, floa
     )
 
 
-def waveforms(event: WaveEvent) -> Waveforms:
+def waveforms(event: WaveEvent) -> WaveformDrive:
     """The voltage's space vector of an event, and its currents."""
     assert event.record.U2 is not None
-    return Waveforms(
+    return WaveformDrive(
         step=event.record.step, v=event.v, v_zero=event.v_zero, turn=event.turn, currents=event.currents,
         U=event.record.U, U2=event.record.U2, U0=event.U0, P0=event.P0, Q0=event.Q0,
         U20=float(event.record.U2[event.steady].mean()), omega_s0=event.omega_s0,

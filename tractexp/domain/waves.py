@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.domain import excitation, wave_errors
 from tractexp.domain.domain import DipGrid, Domain, simulated
 from tractexp.domain.playback import Playback
-from tractexp.model.drive import WAVES, Drive, Waveforms
+from tractexp.model.drive import WAVES, Drive, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import RandomWalk
@@ -47,7 +47,7 @@ class WaveDomain(Domain):
 
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
-    ) -> Waveforms:
+    ) -> WaveformDrive:
         return excitation.waveforms(cast(WaveEvent, event))
 
     def smoothed(self, event: Event) -> SmoothedEvent:
@@ -102,7 +102,7 @@ class WaveDomain(Domain):
 
     def dip(
         self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
-    ) -> Waveforms:
+    ) -> WaveformDrive:
         """Without zero sequence, sampled as an event is."""
         like, n = cast(WaveEvent, like), len(course)
         omega_n = 2 * np.pi * like.record.base.frequency
@@ -110,7 +110,7 @@ class WaveDomain(Domain):
         U, U2 = like.U0 * (1 - depth * course), like.U0 * unbalance * depth * course
         v = U * np.exp(1j * np.radians(jump) * course) + U2 * np.conj(turn) ** 2
         compared = np.where(np.array(like.compared)[:, None], 0.0, np.nan) * np.ones(n)
-        return Waveforms(
+        return WaveformDrive(
             step, v, np.zeros(n), turn, compared, U, U2, like.U0, like.P0, like.Q0, omega_s0=like.omega_s0,
             omega_n=omega_n, weights=excitation.WEIGHTS[like.phases],
         )  # fmt: skip

@@ -18,7 +18,7 @@ from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
 
-class Playback(Protocol):
+class PlayedEvent(Protocol):
     """An event, and P and Q (N,) [pu] that a model calculates of it."""
 
     @property
@@ -61,7 +61,7 @@ def in_percent(share: float) -> str:
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
-def model_error(played: Sequence[Playback]) -> ModelError:
+def model_error(played: Sequence[PlayedEvent]) -> ModelError:
     """The error of a model over some events together."""
     sums = np.concatenate([block_sums(one) for one in played])  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
@@ -76,7 +76,7 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)), ratio)
 
 
-def block_sums(played: Playback) -> np.ndarray:
+def block_sums(played: PlayedEvent) -> np.ndarray:
     """Squares of what is left, of the response, both less those of the noise, and of the power; by block (b, 3)."""
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0

@@ -12,7 +12,7 @@ ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own adv
 
 
 @dataclass(frozen=True, eq=False)
-class Posterior:
+class PosteriorSample:
     """Draws (n, d) of the free parameters under a flat prior within their bounds."""
 
     names: tuple[str, ...]
@@ -33,7 +33,7 @@ class Posterior:
         return self.steps >= ENOUGH * self.autocorrelation
 
 
-def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> Posterior:
+def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> PosteriorSample:
     """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
 
     P0 and Q0 of each event are sampled along. Raises `UserError` where emcee is not installed.
@@ -62,7 +62,7 @@ def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> Pos
     chain = np.asarray(sampler.get_chain(discard=int(BURN * steps), flat=True))
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     draws = likelihood.values(chain)
-    return Posterior(
+    return PosteriorSample(
         uncertainty.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2)
     )
 

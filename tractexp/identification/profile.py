@@ -41,7 +41,7 @@ class End(StrEnum):
 
 
 @dataclass(frozen=True, eq=False)
-class Profile:
+class LikelihoodProfile:
     """One parameter: `deviance` (n,) above the optimum's at `values` (n,), in increasing order of value."""
 
     name: str
@@ -68,7 +68,7 @@ class Profiles:
     """All profiles, the judgement they are drawn around, and what turned up on the way."""
 
     uncertainty: Uncertainty
-    profiles: tuple[Profile, ...]
+    profiles: tuple[LikelihoodProfile, ...]
     threshold: float
     simulations: int
     restarts: int
@@ -93,7 +93,7 @@ class Profiles:
 
 
 def revised(
-    verdict: ParameterVerdict, profile: Profile, low: float, high: float, elsewhere: bool = False
+    verdict: ParameterVerdict, profile: LikelihoodProfile, low: float, high: float, elsewhere: bool = False
 ) -> ParameterVerdict:
     """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness.
 
@@ -173,7 +173,9 @@ class _Places:
     rise: np.ndarray
 
 
-def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Profile]) -> tuple[_Places, int]:
+def _elsewhere(
+    uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
+) -> tuple[_Places, int]:
     """The best place of each range beyond the profile's interval that fits as well, and the simulations spent."""
     begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
     width = uncertainty.upper - uncertainty.lower
@@ -197,7 +199,7 @@ def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Pr
     return _Places(columns[best], descent.unit[best], rise[best]), descent.simulations
 
 
-def _joined(profile: Profile, others: Sequence[Profile]) -> Profile:
+def _joined(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
     """A profile with what was found beyond a crest: its interval reaches over both."""
     for other in others:
         every = sorted((profile, other), key=lambda p: p.interval)
@@ -290,7 +292,7 @@ class _Lanes:
         factor = np.clip(np.where(np.isfinite(gained), AIM / gained, 1 / 3), 1 / 3, 3.0)
         self.step[lanes] = np.clip(np.abs(moved) * factor, SMALLEST_STEP, LARGEST_STEP)
 
-    def profile(self, k: int) -> Profile:
+    def profile(self, k: int) -> LikelihoodProfile:
         """The profile of the k-th parameter, from its two lanes."""
         sides, ends, limits = [], [], []
         j = int(self.column[2 * k])
@@ -304,7 +306,7 @@ class _Lanes:
         joined = np.concatenate((sides[0][:0:-1], sides[1]))
         low = self.uncertainty.lower[j]
         scale = self.uncertainty.upper[j] - low
-        return Profile(
+        return LikelihoodProfile(
             name=self.uncertainty.names[j],
             values=low + scale * joined[:, 0],
             deviance=joined[:, 1],

@@ -16,7 +16,7 @@ _numbers = itertools.count()
 _one_at_a_time = threading.Lock()
 
 
-class Code:
+class MachineCode:
     """A function of machine code, which stays in memory as long as this object."""
 
     def __init__(self, library: Any, name: str):
@@ -25,7 +25,7 @@ class Code:
 
 
 @functools.lru_cache(maxsize=512)
-def load(text: str) -> Code:
+def load(text: str) -> MachineCode:
     """The function that this IR defines, compiled where the store does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
     from llvmlite import binding as llvm
@@ -33,7 +33,7 @@ def load(text: str) -> Code:
     code = object_code(text)
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
-        return Code(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
+        return MachineCode(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
 
 
 def available(text: str) -> bool:

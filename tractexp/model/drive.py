@@ -64,7 +64,7 @@ class Excitation:
 
 
 @dataclass(frozen=True, eq=False)
-class Waveforms:
+class WaveformDrive:
     """One event of sampled waveforms: space vectors in a frame that turns with the voltage before the event.
 
     v (N,) complex is the voltage [pu of its peak], real and U0 before the event; v_zero (N,) its zero sequence. `turn`
@@ -148,7 +148,7 @@ class Drive:
     windows: tuple[np.ndarray | None, ...] = ()  # of each event, where any has one
 
     @classmethod
-    def of(cls, events: Sequence[Excitation | Waveforms]) -> "Drive":
+    def of(cls, events: Sequence[Excitation | WaveformDrive]) -> "Drive":
         """Lay events end to end, all phasors or all waves."""
         measured = np.concatenate([e.measured for e in events], axis=1)
         lengths = [e.measured.shape[1] for e in events]

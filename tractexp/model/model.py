@@ -25,7 +25,7 @@ CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of o
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class ModelResponse:
     """What a load draws: P and Q, or waveforms' currents. Valid where `miss` is 0: a steady state exists there."""
 
     outputs: np.ndarray  # (C, n, N) pu
@@ -195,7 +195,7 @@ class Model:
         values: np.ndarray,
         substeps: Sequence[int] | np.ndarray | int = 1,
         before: np.ndarray | None = None,
-    ) -> Response:
+    ) -> ModelResponse:
         """P and Q of every candidate over every event, (n, N).
 
         `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the drive's own.
@@ -212,7 +212,7 @@ class Model:
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = effect.observe(outputs, drive, columns)
-        return Response(outputs, miss)
+        return ModelResponse(outputs, miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
@@ -222,7 +222,7 @@ class Model:
         return Errors(sums, miss.sum(axis=0))
 
     @staticmethod
-    def _errors_of(response: Response, drive: Drive) -> Errors:
+    def _errors_of(response: ModelResponse, drive: Drive) -> Errors:
         """Squared errors of stored responses: where the measurement stands between kernel and sums."""
         square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
         sums = np.add.reduceat(square, drive.first[:-1], axis=2)

@@ -19,7 +19,7 @@ CAPTION = (
 )
 
 
-class Curve(NamedTuple):
+class CalculatedCurve(NamedTuple):
     """Calculated power (2, N) [pu]: P, Q."""
 
     name: str
@@ -30,7 +30,7 @@ class Curve(NamedTuple):
 
 def event_chart(
     event: Event,
-    curves: Sequence[Curve],
+    curves: Sequence[CalculatedCurve],
     *,
     deviation: np.ndarray | None = None,
     around: np.ndarray | None = None,

@@ -18,7 +18,7 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.provenance import command
 from tractexp.provenance import in_words as identity_in_words
-from tractexp.report.events import CAPTION, Curve, event_chart
+from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, epsilon, in_words
@@ -146,7 +146,9 @@ def _event(page: Report, fit: Any, noise: np.ndarray | None) -> None:
         )
         page.chart(*spectrum_chart(fit.waves, fit.currents))
         noise, notes = None, ["Measured and calculated are phasors of the currents above, by the same estimator."]
-    chart = event_chart(fit.event, [Curve("estimate", power, style.PALETTE[0])], deviation=noise, around=power)
+    chart = event_chart(
+        fit.event, [CalculatedCurve("estimate", power, style.PALETTE[0])], deviation=noise, around=power
+    )
     errors = f"epsilon_p {epsilon(fit.epsilon_p)}, epsilon_q {epsilon(fit.epsilon_q)}"
     page.chart(chart, " ".join([f"{about}: {errors}.", *notes]))
 

@@ -9,7 +9,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.overlay import Overlay
 from tractexp.domain.playback import as_phasors
 from tractexp.record import WaveEvent, describe
-from tractexp.report.events import CAPTION, Curve, event_chart
+from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import Drawn, wave_chart
 
@@ -48,7 +48,7 @@ def _shown(page: Report, overlay: Overlay, role: str) -> None:
 
 def chart(overlay: Overlay) -> Chart:
     """One event with the curves of the models; the noise band is that of the best of them."""
-    curves = [Curve(*model) for model in _models(overlay)]
+    curves = [CalculatedCurve(*model) for model in _models(overlay)]
     return event_chart(
         overlay.event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places,
         driving=overlay.driving,
@@ -66,7 +66,9 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
     seen = [(name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)]
-    return event_chart(seen[0][1][0], [Curve(name, np.stack(power), *look) for name, (_, *power), *look in seen])
+    return event_chart(
+        seen[0][1][0], [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in seen]
+    )
 
 
 def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:

@@ -5,7 +5,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
-from tractexp.identification.posterior import ENOUGH, Posterior
+from tractexp.identification.posterior import ENOUGH, PosteriorSample
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.report.profile import ALIKE, SCATTER, axis, declared, span
 from tractexp.wording import as_sentence
@@ -18,7 +18,7 @@ CAPTION = (
 )
 
 
-def report(uncertainty: Uncertainty, drawn: Posterior, grade: str = "") -> Report:
+def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") -> Report:
     """The page. `grade` as on the page of the profiles."""
     names = ", ".join(e.record.name for e in uncertainty.likelihood.problem.events)
     page = Report(
@@ -58,7 +58,7 @@ def report(uncertainty: Uncertainty, drawn: Posterior, grade: str = "") -> Repor
     return page
 
 
-def _agreement(uncertainty: Uncertainty, drawn: Posterior) -> str:
+def _agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
     """Whose intervals the posterior confirms."""
     off = np.abs(drawn.intervals - uncertainty.intervals).max(axis=1) / np.maximum(
         np.ptp(uncertainty.intervals, axis=1) / 2, 1e-300
@@ -69,13 +69,13 @@ def _agreement(uncertainty: Uncertainty, drawn: Posterior) -> str:
     return f"The posterior confirms the intervals of the fit but those of {', '.join(moved)}: take the posterior's."
 
 
-def _settled(drawn: Posterior) -> str:
+def _settled(drawn: PosteriorSample) -> str:
     """Whether the chain is long enough, in a sentence."""
     lasts = f"The chain lasts {drawn.steps / drawn.autocorrelation:.0f} autocorrelation times"
     return f"{lasts}." if drawn.converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
 
 
-def _chart(uncertainty: Uncertainty, drawn: Posterior, j: int) -> Chart:
+def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
     """The density of one parameter's draws."""
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
@@ -90,7 +90,7 @@ def _chart(uncertainty: Uncertainty, drawn: Posterior, j: int) -> Chart:
     return chart.edge(float(value), ACTIVE).limits(None, edges[0], edges[-1])
 
 
-def _closest(drawn: Posterior) -> tuple[int, int]:
+def _closest(drawn: PosteriorSample) -> tuple[int, int]:
     """The two parameters whose draws correlate most."""
     r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
     np.fill_diagonal(r, -1.0)
@@ -98,7 +98,7 @@ def _closest(drawn: Posterior) -> tuple[int, int]:
     return int(min(a, b)), int(max(a, b))
 
 
-def _pair(uncertainty: Uncertainty, drawn: Posterior, a: int, b: int) -> Chart:
+def _pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
     """Draws of two parameters against each other."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
     chart = Chart(axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420)

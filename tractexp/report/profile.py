@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
-from tractexp.identification.profile import End, Profile, Profiles
+from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, shown
 from tractexp.wording import as_sentence
@@ -67,7 +67,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
     return page
 
 
-def _row(scan: Profiles, profile: Profile, says: str) -> list[str]:
+def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
     """A line of the table of intervals."""
     value, half = _curvature(scan, profile.name)
     about = declared(scan.uncertainty, profile.name)
@@ -75,7 +75,7 @@ def _row(scan: Profiles, profile: Profile, says: str) -> list[str]:
     return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
 
 
-def meaning(scan: Profiles, profile: Profile) -> str:
+def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
     """What a profile says beside the interval of the curvature, in a sentence."""
     names = ("downwards", "upwards")
     open_sides = [side for end, side in zip(profile.ends, names, strict=True) if end is End.BOUND]
@@ -96,7 +96,7 @@ def meaning(scan: Profiles, profile: Profile) -> str:
     return as_sentence("; ".join(said))
 
 
-def _compared(scan: Profiles, profile: Profile) -> str:
+def _compared(scan: Profiles, profile: LikelihoodProfile) -> str:
     """Both sides closed, one minimum: whether ± half is enough."""
     (low, high), (value, half) = profile.interval, _curvature(scan, profile.name)
     if not np.isfinite(half):
@@ -142,7 +142,7 @@ def _curvature(scan: Profiles, name: str) -> tuple[float, float]:
     return float(scan.uncertainty.values[j]), float(scan.uncertainty.half[j])
 
 
-def _chart(scan: Profiles, profile: Profile, title: str) -> Chart:
+def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
     """One profile, with the parabola, the threshold, the interval and the estimate."""
     value, half = _curvature(scan, profile.name)
     top = ABOVE * scan.threshold
@@ -165,7 +165,7 @@ def _marks(threshold: float) -> list[str]:
     return [f"{times * threshold:.2f}".rstrip("0").rstrip(".") for times in range(3)]
 
 
-def _smooth(profile: Profile) -> tuple[np.ndarray, np.ndarray]:
+def _smooth(profile: LikelihoodProfile) -> tuple[np.ndarray, np.ndarray]:
     """The curve between the points fitted: straight on the signed root, as the interval is found."""
     x = np.linspace(profile.values.min(), profile.values.max(), 201)
     best = profile.values[profile.deviance.argmin()]

@@ -91,7 +91,7 @@ def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
     first = Job(jobs[0].config, jobs[0].choices, folder)
     shared = {key: value for key, value in tracking.flatten(jobs[0].config).items()
               if all(tracking.flatten(job.config).get(key) == value for job in jobs[1:])}  # fmt: skip
-    return tracking.Run(
+    return tracking.TrackedRun(
         experiment=first.experiment,
         name=f"sweep {folder.name}",
         parameters=shared,

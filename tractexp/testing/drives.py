@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.model.drive import WAVES, Drive, Excitation, Waveforms
+from tractexp.model.drive import WAVES, Drive, Excitation, WaveformDrive
 
 P0, Q0 = 1.0, 0.6  # pu, drawn before every event
 
@@ -22,7 +22,7 @@ def flat(voltage: float = 0.97, speed: float = -1.5, samples: int = 300) -> Exci
     return _event(np.full(samples, voltage), 1e-3, np.full(samples, speed), np.full(samples, 0.03))
 
 
-def wave_dip(depth: float = 0.5, rate: float = 3200.0, length: float = 0.28, edge: float = 0.002) -> Waveforms:
+def wave_dip(depth: float = 0.5, rate: float = 3200.0, length: float = 0.28, edge: float = 0.002) -> WaveformDrive:
     """Space vectors of a dip to 1 - `depth` pu for 50 ms, unbalanced, with a jump of the angle and a zero sequence."""
     t = np.arange(round(length * rate)) / rate
     rise = lambda begin: 0.5 - 0.5 * np.cos(np.pi * np.clip((t - begin) / edge, 0, 1))  # noqa: E731
@@ -32,7 +32,7 @@ def wave_dip(depth: float = 0.5, rate: float = 3200.0, length: float = 0.28, edg
     return _waves(v, 0.1 * shape * np.cos(theta + 1.0), theta, rate)
 
 
-def wave_flat(voltage: float = 0.97, rate: float = 3200.0, samples: int = 640) -> Waveforms:
+def wave_flat(voltage: float = 0.97, rate: float = 3200.0, samples: int = 640) -> WaveformDrive:
     """A space vector that turns at one size and speed."""
     t = np.arange(samples) / rate
     return _waves(np.full(samples, voltage + 0j), np.zeros(samples), (100 * np.pi - 1.5) * t, rate)
@@ -44,11 +44,11 @@ def drive(*depths: float, domain: str = "", power: float = 1.0) -> Drive:
     return Drive.of([replace(one, P0=power * P0, Q0=power * Q0) for one in map(shape, depths)])
 
 
-def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> Waveforms:
+def _waves(v: np.ndarray, v_zero: np.ndarray, theta: np.ndarray, rate: float) -> WaveformDrive:
     turn, n = np.exp(1j * theta), round(rate / 100)
     slow = np.convolve(np.concatenate([np.full(n - 1, v[0]), v]), np.full(n, 1 / n), "valid")
     U0, still = abs(v[0]), np.zeros((3, len(v)))
-    return Waveforms(1 / rate, v, v_zero, turn, still, abs(slow), abs(v) - U0, U0, P0, Q0, -1.5, 100 * np.pi)
+    return WaveformDrive(1 / rate, v, v_zero, turn, still, abs(slow), abs(v) - U0, U0, P0, Q0, -1.5, 100 * np.pi)
 
 
 def _event(U: np.ndarray, step: float, speed: np.ndarray, U2: np.ndarray) -> Excitation:

@@ -1,6 +1,6 @@
 """The one package that knows MLflow. Plain data goes in; MLflow is imported when something is logged, not before."""
 
-from tractexp.tracking.run import Run as Run
+from tractexp.tracking.run import TrackedRun as TrackedRun
 from tractexp.tracking.run import at_common_steps as at_common_steps
 from tractexp.tracking.run import finish_parent as finish_parent
 from tractexp.tracking.run import flatten as flatten

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.tracking.run import Run, log
+from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, prepare
 
 _ahead: "list[Logger]" = []
@@ -77,7 +77,7 @@ class Logger:
         except BrokenPipeError:
             pass  # it has ended, which `log` reports
 
-    def log(self, run: Run) -> str:
+    def log(self, run: TrackedRun) -> str:
         """As `tracking.log`, once. Paths in `run` are taken from where the process was started."""
         run.check()
         self._tell(run)

@@ -33,7 +33,7 @@ Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a c
 
 
 @dataclass(frozen=True)
-class Run:
+class TrackedRun:
     """What one job leaves in MLflow.
 
     `parameters` is the flattened configuration with the identified values, `metrics` the figures of the result.
@@ -56,7 +56,7 @@ class Run:
     seconds: float = 0.0
     model: Path | None = None
     records: "Sequence[Mapping[str, str]]" = ()  # name, role, sha256: MLflow's inputs
-    children: "Sequence[Run]" = ()
+    children: "Sequence[TrackedRun]" = ()
     key: str = ""  # identifies a run that is sent again
     ended: float | None = None  # s since 1970; None: now
 
@@ -120,7 +120,7 @@ def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndar
     return common, values[np.searchsorted(steps, common, side="right") - 1]
 
 
-def log(run: Run, uri: str, *, again: bool = False) -> str:
+def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
     """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`.
 
     A run that is sent `again` is written once: the rest of an earlier attempt is deleted, a whole run stays.
@@ -143,7 +143,7 @@ def log(run: Run, uri: str, *, again: bool = False) -> str:
     return run_id
 
 
-def _whole_run(client: Any, run: Run) -> str:
+def _whole_run(client: Any, run: TrackedRun) -> str:
     """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is deleted."""
     experiments = [one.experiment_id for one in client.search_experiments()]
     for one in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
@@ -182,7 +182,7 @@ def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
     return True
 
 
-def start_parent(run: Run, uri: str) -> str:
+def start_parent(run: TrackedRun, uri: str) -> str:
     """Open the run of a sweep and return its id, for `Run.parent` of the jobs. Close it in a `finally`."""
     run.check()
     client = open_store(uri)
@@ -211,7 +211,7 @@ def finish_parent(
     run_id: str, uri: str, status: str, metrics: Mapping[str, float] | None = None, artifacts: Sequence[Path] = ()
 ) -> None:
     """Close the run of a sweep with its status, adding the figures and files of the sweep as a whole."""
-    run = Run("sweep", run_id, metrics=metrics or {}, artifacts=artifacts, status=status)
+    run = TrackedRun("sweep", run_id, metrics=metrics or {}, artifacts=artifacts, status=status)
     run.check()
     client = open_store(uri)
     with sentences(uri):
@@ -229,7 +229,7 @@ def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
     return experiment_id
 
 
-def _create(client: Any, run: Run, uri: str) -> str:
+def _create(client: Any, run: TrackedRun, uri: str) -> str:
     tags = {
         "mlflow.user": _user(),
         "mlflow.source.name": "tractexp",
@@ -245,7 +245,7 @@ def _create(client: Any, run: Run, uri: str) -> str:
     return client.create_run(_experiment(client, run.experiment, uri), started, tags, run.name).info.run_id
 
 
-def _write(client: Any, run_id: str, run: Run) -> None:
+def _write(client: Any, run_id: str, run: TrackedRun) -> None:
     from mlflow.entities import Metric, Param
 
     now = _milliseconds(run.ended)

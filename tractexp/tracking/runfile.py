@@ -14,7 +14,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.tracking.run import Line, Run, flatten, thinned
+from tractexp.tracking.run import Line, TrackedRun, flatten, thinned
 
 FILE = "mlflow.json"
 
@@ -27,7 +27,7 @@ class RunFile:
     """
 
     folder: Path
-    run: Run
+    run: TrackedRun
     uri: str
     run_id: str = ""
     sweep: bool = False
@@ -43,7 +43,7 @@ class RunFile:
         return replace(self, run_id=run_id, uri=uri or self.uri).write()
 
 
-def save(folder: Path, run: Run, uri: str, sweep: bool = False) -> RunFile:
+def save(folder: Path, run: TrackedRun, uri: str, sweep: bool = False) -> RunFile:
     """Write down what is to be logged, with a key that identifies it, and the time at which the run ended."""
     key, ended = run.key or uuid.uuid4().hex, run.ended or time.time()
     return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write()
@@ -68,9 +68,9 @@ def below(root: Path) -> list[Path]:
     return sorted((path.parent for path in root.rglob(FILE)), key=lambda folder: (len(folder.parts), folder))
 
 
-def _plain(run: Run, folder: Path) -> dict[str, Any]:
+def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
     """A run as JSON knows it; paths within the folder are relative, so that it may be moved."""
-    content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(Run)}
+    content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(TrackedRun)}
     content["parameters"] = flatten(run.parameters)
     content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
     content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
@@ -92,11 +92,11 @@ def _relative(path: Path, folder: Path) -> str:
     return path.relative_to(folder.absolute()).as_posix() if path.is_relative_to(folder.absolute()) else str(path)
 
 
-def _run(content: Mapping[str, Any], folder: Path) -> Run:
+def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
     there = {
         "artifacts": [folder / path for path in content["artifacts"]],
         "model": None if content["model"] is None else folder / content["model"],
         "curves": {name: (steps, values) for name, (steps, values) in content["curves"].items()},
         "children": [_run(child, folder) for child in content["children"]],
     }
-    return Run(**{**content, **there})
+    return TrackedRun(**{**content, **there})

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.domain import PHASORS, Domain
-from tractexp.model.drive import Drive, Excitation, Waveforms
+from tractexp.model.drive import Drive, Excitation, WaveformDrive
 from tractexp.noise import Autoregression, Noise
 from tractexp.noise.random_walk import Load
 from tractexp.record import Event, Record
@@ -93,7 +93,7 @@ def imagined(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     return dips
 
 
-def driven(context: Context, event: ImaginedDip) -> Excitation | Waveforms:
+def driven(context: Context, event: ImaginedDip) -> Excitation | WaveformDrive:
     """The voltage of an imagined event, at the power before the first recorded one."""
     like, dips = context.events[0], context.domain.dips
     step = like.record.step / event.rate

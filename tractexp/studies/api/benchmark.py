@@ -77,12 +77,12 @@ class BenchmarkResult(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        from tractexp.studies.bbob.runs import BbobRuns, Plan, Run
+        from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
 
-        def run(row: Mapping[str, Any]) -> Run:
-            return Run(**{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])})
+        def run(row: Mapping[str, Any]) -> BbobRun:
+            return BbobRun(**{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])})
 
-        plan = Plan(*(_tuple(content[item.name]) for item in dataclasses.fields(Plan)))
+        plan = BbobPlan(*(_tuple(content[item.name]) for item in dataclasses.fields(BbobPlan)))
         titles = {int(function): title for function, title in content["titles"].items()}
         bbob = BbobRuns(plan, tuple(content["optimizers"]), titles, [run(row) for row in content["runs"]])
         return cls(bbob, content["optimizers"])
@@ -109,7 +109,7 @@ def benchmark(
 
     Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the extra [benchmark].
     """
-    from tractexp.studies.bbob.runs import Plan, package, perform
+    from tractexp.studies.bbob.runs import BbobPlan, package, perform
 
     check(functions, instances, dimensions, multiplier, targets, cores)
     check_range("seed", seed, 0)
@@ -123,7 +123,7 @@ def benchmark(
             )
     package()
     ordered = tuple(sorted(targets, reverse=True))
-    plan = Plan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
+    plan = BbobPlan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
     with counting("runs", len(plan.cases) * len(built), progress) as count:
         bbob = perform(built, plan, cores, count)
     return BenchmarkResult(bbob, {one.name: one.node for one in chosen})
@@ -202,7 +202,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             for name in result.bbob.optimizers for d in result.bbob.plan.dimensions
         }  # fmt: skip
         optimizer, seed = job.choices["optimizer"], str(job.seed)
-        run = tracking.Run(
+        run = tracking.TrackedRun(
             experiment=node["experiment"] or "benchmark bbob",
             name=f"{optimizer} on BBOB",
             parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),

@@ -18,7 +18,7 @@ from tractexp.progress import say
 if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison
     from tractexp.studies.comparison.overall import Several
-    from tractexp.studies.comparison.runs import Run
+    from tractexp.studies.comparison.runs import SearchRun
 
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
@@ -208,7 +208,7 @@ def _compared(
 
 def _runs(
     sweep: str | None, filter: str | None, uri: str | None, experiment: str | None
-) -> "tuple[list[Run], str]":  # fmt: skip
+) -> "tuple[list[SearchRun], str]":  # fmt: skip
     """The runs, and where they are from in words."""
     from tractexp.studies.comparison import load
 
@@ -274,7 +274,7 @@ def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
     except UserError as error:
         say(f"not logged: {error}")
         return
-    run = tracking.Run(
+    run = tracking.TrackedRun(
         experiment=job.config["tracking"]["experiment"] or f"compare {data}",
         name=f"comparison of {len(next(iter(comparisons.values())).summaries)} variants",
         parameters=tracking.flatten({"task": job.config["task"]}),

@@ -87,7 +87,7 @@ class Bbob:
 
 
 @dataclass(frozen=True)
-class Plan:
+class BbobPlan:
     """What is run: every optimizer on each function, dimension and instance."""
 
     functions: tuple[int, ...]
@@ -105,7 +105,7 @@ class Plan:
 
 
 @dataclass(frozen=True)
-class Run:
+class BbobRun:
     """One optimizer on one instance of one function, with independent restarts until the budget was spent."""
 
     optimizer: str
@@ -123,7 +123,7 @@ def seed_of(seed: int, *counts: int) -> int:
     return int(np.random.SeedSequence((seed, *counts)).generate_state(1, np.uint64)[0])
 
 
-def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: Plan) -> Run:
+def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobPlan) -> BbobRun:
     """Search, and search again from new random numbers, until the last target is met or the budget spent."""
     function, dimension, instance = case
     problem = Bbob(function, dimension, instance, plan.targets)
@@ -135,16 +135,16 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: Plan)
         if not found.simulations:
             raise UserError(f"optimizer {name} ended without a single evaluation; this is a fault of its plugin")
     distance = problem.best - problem.optimum
-    return Run(name, *case, problem.evaluations, searches, distance, tuple(problem.hits.tolist()))
+    return BbobRun(name, *case, problem.evaluations, searches, distance, tuple(problem.hits.tolist()))
 
 
-def _run(job: tuple[str, Optimizer, tuple[int, int, int], Plan]) -> Run:
+def _run(job: tuple[str, Optimizer, tuple[int, int, int], BbobPlan]) -> BbobRun:
     return run(*job)
 
 
 def perform(
     optimizers: Mapping[str, Optimizer],
-    plan: Plan,
+    plan: BbobPlan,
     cores: int | None = None,
     count: Callable[[], None] = lambda: None,
 ) -> "BbobRuns":
@@ -169,12 +169,12 @@ def perform(
 class BbobRuns:
     """All runs, and what they come to."""
 
-    plan: Plan
+    plan: BbobPlan
     optimizers: tuple[str, ...]
     titles: Mapping[int, str]  # of the functions
-    runs: Sequence[Run]
+    runs: Sequence[BbobRun]
 
-    def of(self, optimizer: str, dimension: int, functions: Iterable[int]) -> list[Run]:
+    def of(self, optimizer: str, dimension: int, functions: Iterable[int]) -> list[BbobRun]:
         """The runs of an optimizer in one dimension on some functions."""
         among = set(functions)
         return [r for r in self.runs if (r.optimizer, r.dimension) == (optimizer, dimension) and r.function in among]

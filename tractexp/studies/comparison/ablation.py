@@ -19,7 +19,7 @@ On = frozenset[str]  # the switches that are on
 
 
 @dataclass(frozen=True)
-class Effect:
+class SwitchEffect:
     """By what factor switching on multiplies the objective; below 1 it helps. With a 95 % bootstrap interval.
 
     For an interaction, the factor by which one switch's factor changes when the other is on.
@@ -45,14 +45,14 @@ class Ablation:
 
     switches: tuple[str, ...]
     variants: tuple[str, ...]
-    effects: tuple[Effect, ...]
-    company: tuple[Effect, ...]  # of each switch with most others on, against with fewest
-    interactions: tuple[Effect, ...]
+    effects: tuple[SwitchEffect, ...]
+    company: tuple[SwitchEffect, ...]  # of each switch with most others on, against with fewest
+    interactions: tuple[SwitchEffect, ...]
     unknown: tuple[tuple[str, ...], ...]  # switches, or pairs, that these variants cannot tell
 
 
 @dataclass(frozen=True)
-class Family:
+class VariantFamily:
     """Variants of one optimizer that share all settings but switches, by the switches that are on."""
 
     switches: tuple[str, ...]
@@ -75,7 +75,7 @@ class Family:
         }  # fmt: skip
 
 
-def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> Family | None:
+def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFamily | None:
     """The largest family among the variants; None where there is none.
 
     `plain` says which optimizer another one is with all its switches off.
@@ -85,7 +85,7 @@ def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> Family | No
     if len(largest) < 2:
         return None
     switches = tuple(sorted({switch for on in largest for switch in on}))
-    return Family(switches, {on: v.name for on, v in largest.items()})
+    return VariantFamily(switches, {on: v.name for on, v in largest.items()})
 
 
 def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) -> Ablation | None:
@@ -145,7 +145,7 @@ class _Contrasts:
         unknown = tuple(key for key, rows in (single | double).items() if not rows)
         return Ablation(self.switches, tuple(self.names.values()), effects, changes, interactions, unknown)
 
-    def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> Effect:
+    def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> SwitchEffect:
         """Signs alternate as in a factorial design: with - without, or both - first - second + neither."""
         simple = len(contrasts[0]) == 2
         signs = np.array((1.0, -1.0) if simple else (1.0, -1.0, -1.0, 1.0))
@@ -153,7 +153,7 @@ class _Contrasts:
         logs = shifts.mean(axis=0)
         low, high = bootstrap(logs)
         names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
-        effect = Effect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
+        effect = SwitchEffect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
         if not simple:
             return effect
         wins = np.mean((shifts < 0) + 0.5 * (shifts == 0), axis=0)

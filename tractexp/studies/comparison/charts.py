@@ -8,7 +8,7 @@ from tractexp.blocks import style
 from tractexp.blocks.chart import DECADE, Chart
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.floor import Floor, Polished
-from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.comparison.statistics import Ranks
 from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 
@@ -137,7 +137,7 @@ def round_numbers(low: float, high: float) -> list[float]:
     return few if len(few) > 2 else more
 
 
-def _scattered(variant: Variant) -> list[tuple[Run, float]]:
+def _scattered(variant: Variant) -> list[tuple[SearchRun, float]]:
     """The finished runs with a share of a row by which each is moved, so that equal ones are seen."""
     done = variant.finished
     return list(zip(done, JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))

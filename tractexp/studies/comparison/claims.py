@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from tractexp.studies.comparison.ablation import Ablation, Effect
-from tractexp.studies.comparison.comparison import Comparison, Pair, seeds_needed
+from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
+from tractexp.studies.comparison.comparison import Comparison, VariantPair, seeds_needed
 from tractexp.studies.comparison.floor import AT_FLOOR
 from tractexp.studies.comparison.statistics import ALPHA
 from tractexp.studies.comparison.summary import Spread
@@ -97,7 +97,7 @@ def headline(comparison: Comparison) -> str:
     return f"{said} {' and '.join(verdicts) or 'was not tested'}."
 
 
-def near_and_far(comparison: Comparison) -> tuple[list[Pair], list[Pair]]:
+def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[VariantPair]]:
     """The pairs with the reference, or with the best variant tested where there is none; and the others."""
     chosen = comparison.reference or _best_tested(comparison)
     near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
@@ -111,7 +111,7 @@ def _listed(names: list[str]) -> str:
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
-def of_pair(comparison: Comparison, pair: Pair) -> str:
+def of_pair(comparison: Comparison, pair: VariantPair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
     spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
@@ -187,7 +187,7 @@ def _ranked(rows: list[tuple[float, int, str]]) -> str:
     return ", ".join(f"{name} {round(share * n)} of {n}" for share, n, name in rows[:6]) + more
 
 
-def of_effect(effect: Effect) -> str:
+def of_effect(effect: SwitchEffect) -> str:
     """A switch's own effect."""
     (switch,) = effect.switches
     verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
@@ -198,7 +198,7 @@ def of_effect(effect: Effect) -> str:
     )
 
 
-def _listed_contrasts(effect: Effect) -> str:
+def _listed_contrasts(effect: SwitchEffect) -> str:
     pairs = [f"{with_} against {without}" for with_, without in effect.contrasts]
     return " and ".join(pairs) if len(pairs) < 3 else f"{len(pairs)} pairs of variants that differ in it alone"
 

@@ -22,7 +22,7 @@ from tractexp.studies.comparison.summary import Summary, summarize
 
 
 @dataclass(frozen=True)
-class Pair:
+class VariantPair:
     """Two variants over the seeds both have, the one that ends lower first."""
 
     first: str
@@ -48,7 +48,7 @@ class Comparison:
     targets: tuple[float, ...]  # multiples of the floor
     ties: float  # objectives within this share of the floor are equal
     summaries: tuple[Summary, ...]
-    pairs: tuple[Pair, ...]
+    pairs: tuple[VariantPair, ...]
     ranks: Ranks | None
     ablation: Ablation | None
     reference: str | None
@@ -111,7 +111,9 @@ def _standing(median: float, least: float) -> tuple[bool, float]:
     return bool(np.isnan(median)), max(median, least)
 
 
-def _pairs(variants: Sequence[Variant], least: float, reference: str | None) -> tuple[tuple[Pair, ...], list[str]]:
+def _pairs(
+    variants: Sequence[Variant], least: float, reference: str | None
+) -> tuple[tuple[VariantPair, ...], list[str]]:
     """Every pair with enough seeds in common, and a sentence on what the tests cannot do."""
     if len(variants) < 2:
         return (), [f"There is one variant only, {variants[0].name}: nothing to test it against."]
@@ -129,7 +131,7 @@ def _pairs(variants: Sequence[Variant], least: float, reference: str | None) -> 
         )
     tested = [_pair(*row, least) for row in enough]
     corrected = holm([pair.p for pair in tested])
-    pairs = [Pair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(tested, corrected, strict=True)]
+    pairs = [VariantPair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(tested, corrected, strict=True)]
     needed = seeds_needed(len(tested))
     if tested and max(pair.seeds for pair in tested) < needed:
         notes.append(
@@ -139,13 +141,13 @@ def _pairs(variants: Sequence[Variant], least: float, reference: str | None) -> 
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes
 
 
-def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> Pair:
+def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> VariantPair:
     x, y = (np.maximum([v.objectives[seed] for seed in seeds], least) for v in (a, b))
     p, lower = wilcoxon(x, y)
     effect = vargha_delaney(x, y)
     if (lower, effect) < (0.0, 0.5):
         a, b, x, y, effect = b, a, y, x, 1 - effect
-    return Pair(a.name, b.name, len(seeds), (_median(a, seeds), _median(b, seeds)), p, p, effect)
+    return VariantPair(a.name, b.name, len(seeds), (_median(a, seeds), _median(b, seeds)), p, p, effect)
 
 
 def _median(variant: Variant, seeds: Sequence[int]) -> float:

@@ -12,7 +12,7 @@ from tractexp.identification.descent import descend
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED
 from tractexp.parameter import best_distinct, even
-from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.runs import SearchRun
 
 AT_FLOOR = 0.01  # what ends within this share of the floor has reached it
 SCATTER, STARTS, APART = 400, 60, 0.3  # starts: the best of a scatter that differ by so much of a range somewhere
@@ -40,14 +40,16 @@ class Polished:
     bounds: dict[str, tuple[float, float]]
     units: dict[str, str]
     starts: int  # spread over the box
-    reached: dict[Run, float]  # pu²
+    reached: dict[SearchRun, float]  # pu²
 
-    def in_valley(self, run: Run) -> bool | None:
+    def in_valley(self, run: SearchRun) -> bool | None:
         """Whether the run ended in the valley of the lowest point; None where that is not known."""
         return self.reached[run] <= (1 + AT_FLOOR) * self.objective if run in self.reached else None
 
 
-def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Callable[[], None]]) -> Polished | None:
+def polish(
+    problem: Problem, runs: Sequence[SearchRun], counting: Callable[[int], Callable[[], None]]
+) -> Polished | None:
     """Descend on the objective of Eq. (8) from the end of every run, and from starts that fill the box evenly.
 
     `counting(n)` is told how many groups of descents there are, and returns what is called at the end of each. None
@@ -80,7 +82,7 @@ def polish(problem: Problem, runs: Sequence[Run], counting: Callable[[int], Call
     )  # fmt: skip
 
 
-def floor_of(runs: Sequence[Run], value: float | None, polished: Polished | None, why_not: str = "") -> Floor:
+def floor_of(runs: Sequence[SearchRun], value: float | None, polished: Polished | None, why_not: str = "") -> Floor:
     """The floor as `value`, or what polishing found, or the best of all runs where there was no polishing, and why."""
     if value is not None:
         return Floor(value, "as given by task.floor")
@@ -94,7 +96,7 @@ def floor_of(runs: Sequence[Run], value: float | None, polished: Polished | None
     return Floor(best.objective, f"the best of all runs compared, by {best.optimizer}{because}")
 
 
-def _same(problem: Problem, ends: np.ndarray, runs: Sequence[Run]) -> bool:
+def _same(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRun]) -> bool:
     recorded = np.array([run.objective for run in runs])
     return bool(np.allclose(problem.objective(ends), recorded, rtol=SAME, atol=0)) if len(runs) else True
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison
     from tractexp.studies.comparison.floor import Polished
     from tractexp.studies.comparison.overall import Overall, Several
-    from tractexp.studies.comparison.runs import Gathered, Run
+    from tractexp.studies.comparison.runs import Gathered, SearchRun
 
 DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
 BBOB = "bbob.json"
@@ -33,8 +33,8 @@ def compared(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) ->
 
 
 def several(
-    groups: Mapping[tuple[str, ...], "Sequence[Run]"], source: str, judging: Mapping[str, Any], folder: Path | None,
-    bbob: int, cores: int | None, progress: Any,
+    groups: Mapping[tuple[str, ...], "Sequence[SearchRun]"], source: str, judging: Mapping[str, Any],
+    folder: Path | None, bbob: int, cores: int | None, progress: Any,
 ) -> "Several":  # fmt: skip
     """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
     from tractexp.studies.comparison.overall import Several, on_records, terms_of
@@ -119,7 +119,7 @@ def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, st
     return polished, "" if polished else why
 
 
-def _problem(run: "Run") -> "Problem":
+def _problem(run: "SearchRun") -> "Problem":
     """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
     from tractexp.api.setup import Setup
     from tractexp.plugin import build

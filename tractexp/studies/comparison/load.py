@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.result import by_event
-from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.runs import SearchRun
 
 TASK = "identify"  # the task whose runs are compared
 FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
@@ -30,7 +30,7 @@ def newest_sweep(folder: Path) -> Path:
     return max(sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name))
 
 
-def from_sweep(folder: Path) -> list[Run]:
+def from_sweep(folder: Path) -> list[SearchRun]:
     """The runs of a sweep's job folders. Raises `UserError` where there is none."""
     if not folder.is_dir():
         raise UserError(f"task.sweep={folder} is not a folder; a sweep writes one under outputs/sweeps")
@@ -49,7 +49,7 @@ def _jobs(folder: Path) -> list[Path]:
     return sorted(jobs, key=lambda job: (int(job.name) if job.name.isdigit() else np.inf, job.name))
 
 
-def _job(folder: Path) -> Run | None:
+def _job(folder: Path) -> SearchRun | None:
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != TASK:
         return None
@@ -64,14 +64,14 @@ def _job(folder: Path) -> Run | None:
         "config": flat(config), "where": folder.name, "folder": runtime.get("cwd", ""),
     }  # fmt: skip
     if unfinished:
-        return Run(**fields, **unfinished)
+        return SearchRun(**fields, **unfinished)
     with _readable(folder / "result.json") as path:
         result = json.loads(path.read_text(encoding="utf-8"))
         ended = ended_search(result)
         fields |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
         fields["code"] = code_of(result)
     with _readable(folder / "history.csv") as path:
-        return Run(**fields, **_history(path.read_text(encoding="utf-8")))
+        return SearchRun(**fields, **_history(path.read_text(encoding="utf-8")))
 
 
 def _history(text: str) -> dict[str, Any]:
@@ -159,7 +159,7 @@ def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
     return config
 
 
-def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
+def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
 
     Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
@@ -174,26 +174,26 @@ def from_logged(logged: Iterable[Any], source: str) -> list[Run]:
     return runs
 
 
-def _logged(one: Any) -> Run:
+def _logged(one: Any) -> SearchRun:
     fields: dict[str, Any] = {
         "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
         "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
     }  # fmt: skip
     curve, ended = one.curves.get("fitness_by_simulations"), {}
     if one.status in UNDER_WAY:
-        return Run(**fields, interruption=f"its status in MLflow is {one.status}")
+        return SearchRun(**fields, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
-        return Run(**fields, failure=f"its status in MLflow is {one.status}")
+        return SearchRun(**fields, failure=f"its status in MLflow is {one.status}")
     for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
     result = json.loads(one.files.get("result.json", "{}"))
     details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
     total, seconds = ended.pop("simulations"), ended.pop("seconds")
     if "history.csv" in one.files:
-        return Run(**fields, **ended, **_history(one.files["history.csv"]), **details)
+        return SearchRun(**fields, **ended, **_history(one.files["history.csv"]), **details)
     simulations = np.fmin(curve[0], total)
     spent = seconds * simulations / simulations[-1]
-    return Run(**fields, **ended, simulations=simulations, seconds=spent, history=curve[1], **details)
+    return SearchRun(**fields, **ended, simulations=simulations, seconds=spent, history=curve[1], **details)
 
 
 def _value(text: str) -> Any:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.studies.comparison.ablation import Ablation, Family, family
+from tractexp.studies.comparison.ablation import Ablation, VariantFamily, family
 from tractexp.studies.comparison.comparison import Comparison
-from tractexp.studies.comparison.runs import Run
+from tractexp.studies.comparison.runs import SearchRun
 from tractexp.studies.comparison.statistics import LEAST_SEEDS, Ranks, friedman
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Several:
     notes: tuple[str, ...]
 
 
-def terms_of(runs: Sequence[Run]) -> str:
+def terms_of(runs: Sequence[SearchRun]) -> str:
     """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end in common."""
     budgets = {run.config.get("budget") for run in runs}
     if len(budgets) == 1 and (budget := budgets.pop()) is not None:
@@ -82,7 +82,7 @@ def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping
     )  # fmt: skip
 
 
-def on_functions(benchmark: "BbobRuns", chosen: Family | None) -> Overall:
+def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall:
     """The variants on BBOB: distances to the optimum, a function being one block; the family's effects on them."""
     (dimension,), plan = benchmark.plan.dimensions, benchmark.plan
     names = list(benchmark.optimizers)
@@ -127,7 +127,7 @@ def _ordered(names: Sequence[str], ranks: Ranks | None) -> list[str]:
     return sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__) if ranks else list(names)
 
 
-def _cost(chosen: Family | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
+def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
     """What each switch adds to the simulations of an iteration."""
     if chosen is None:
         return {}

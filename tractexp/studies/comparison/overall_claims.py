@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.studies.comparison.ablation import Effect
+from tractexp.studies.comparison.ablation import SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import ALPHA
@@ -39,7 +39,7 @@ def of_switches(overall: Overall) -> str:
     return ", ".join(where) + ": " * bool(where) + "; ".join(effects) + "."
 
 
-def of_effect(effect: Effect) -> str:
+def of_effect(effect: SwitchEffect) -> str:
     """ "levy helps (x 0.81, 0.76 to 0.87; in 64 % of the pairs)"."""
     verdict = "has no effect that is shown" if not effect.shown else "helps" if effect.factor < 1 else "harms"
     pairs = f"; better in {percent(effect.better[0])} of the pairs" if effect.better else ""

@@ -10,7 +10,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one
-from tractexp.studies.comparison.ablation import Ablation, Effect
+from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import ALPHA
@@ -119,7 +119,7 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
             page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
 
 
-def _factor(effect: Effect) -> list[str]:
+def _factor(effect: SwitchEffect) -> list[str]:
     return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
 
 

@@ -10,9 +10,9 @@ from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts, claims
 from tractexp.studies.comparison.ablation import Ablation
 from tractexp.studies.comparison.claims import number, p_value
-from tractexp.studies.comparison.comparison import Comparison, Pair
+from tractexp.studies.comparison.comparison import Comparison, VariantPair
 from tractexp.studies.comparison.floor import AT_FLOOR
-from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.comparison.statistics import ALPHA, size_of
 from tractexp.studies.comparison.summary import Spread
 
@@ -157,7 +157,7 @@ def _differences(page: Report, comparison: Comparison) -> None:
             page.items(sentences[QUOTED:])
 
 
-def _pairs(page: Report, pairs: list[Pair], caption: str) -> None:
+def _pairs(page: Report, pairs: list[VariantPair], caption: str) -> None:
     columns = ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"]
     rows = [
         [
@@ -262,7 +262,7 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
     return files.plain(as_dicts(whole))
 
 
-def _of_run(variant: Variant, run: Run, comparison: Comparison) -> dict[str, Any]:
+def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
     """One run, as `comparison.json` holds it."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
     fields = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}

@@ -19,7 +19,7 @@ REST = ("seed", "tracking")  # what differs in these does not
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class SearchRun:
     """The search of one identification, as it ended. The history has one entry per iteration.
 
     A failed run has none and the objective inf. An interrupted one neither failed nor finished.
@@ -59,10 +59,10 @@ class Variant:
     name: str
     optimizer: str
     settings: Mapping[str, Any]  # of the optimizer, and the limits
-    runs: tuple[Run, ...]
+    runs: tuple[SearchRun, ...]
 
     @property
-    def finished(self) -> list[Run]:
+    def finished(self) -> list[SearchRun]:
         return [run for run in self.runs if run.finished]
 
     @property
@@ -78,7 +78,7 @@ class Gathered:
     variants: tuple[Variant, ...]
     problem: str
     notes: tuple[str, ...]
-    interrupted: tuple[tuple[str, Run], ...] = ()  # (variant, run), which are not judged
+    interrupted: tuple[tuple[str, SearchRun], ...] = ()  # (variant, run), which are not judged
 
     def __getitem__(self, name: str) -> Variant:
         variants = [variant for variant in self.variants if variant.name == name]
@@ -89,7 +89,7 @@ class Gathered:
         return variants[0]
 
 
-def on(runs: Sequence[Run], source: str, data: str) -> list[Run]:
+def on(runs: Sequence[SearchRun], source: str, data: str) -> list[SearchRun]:
     """The runs on one choice of data. Raises `UserError` where there is none."""
     chosen = [run for run in runs if run.data == data]
     if not chosen:
@@ -98,15 +98,15 @@ def on(runs: Sequence[Run], source: str, data: str) -> list[Run]:
     return chosen
 
 
-def parted(runs: Sequence[Run], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[Run]]:
+def parted(runs: Sequence[SearchRun], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[SearchRun]]:
     """Runs by their data and by the limits named in `apart`, which make comparisons of their own, as they come."""
-    groups: dict[tuple[str, ...], list[Run]] = defaultdict(list)
+    groups: dict[tuple[str, ...], list[SearchRun]] = defaultdict(list)
     for run in runs:
         groups[(run.data, *(repr(run.config.get(key)) for key in apart))].append(run)
     return groups
 
 
-def gather(runs: Sequence[Run], source: str) -> Gathered:
+def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
     """Group runs into variants. Later repeats replace earlier ones.
 
     Interrupted runs are told apart from those that are judged. Raises `UserError` where none finished, or the runs do
@@ -132,7 +132,7 @@ def gather(runs: Sequence[Run], source: str) -> Gathered:
     return Gathered(_variants(list(unique.values()), names), _problem_name(runs[0]), tuple(notes), unjudged)
 
 
-def _check_any_finished(runs: Sequence[Run], source: str) -> None:
+def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
     if any(run.finished for run in runs):
         return
     failures = [run.failure for run in runs if run.failure]
@@ -143,16 +143,16 @@ def _check_any_finished(runs: Sequence[Run], source: str) -> None:
 Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, and what is set
 
 
-def _settings(run: Run) -> Settings:
+def _settings(run: SearchRun) -> Settings:
     settings = {key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS}
     return run.optimizer, tuple(sorted((key, repr(value)) for key, value in settings.items()))
 
 
-def _identity(run: Run) -> tuple[Settings, int]:
+def _identity(run: SearchRun) -> tuple[Settings, int]:
     return _settings(run), run.seed
 
 
-def _names(runs: Sequence[Run]) -> dict[Settings, str]:
+def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
     """What each variant is called: its optimizer, and the settings in which runs of that optimizer differ."""
     groups: dict[str, list[Settings]] = defaultdict(list)
     for settings in dict.fromkeys(map(_settings, runs)):
@@ -167,8 +167,8 @@ def _names(runs: Sequence[Run]) -> dict[Settings, str]:
     return names
 
 
-def _variants(runs: list[Run], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
-    groups: dict[Settings, list[Run]] = defaultdict(list)
+def _variants(runs: list[SearchRun], names: Mapping[Settings, str]) -> tuple[Variant, ...]:
+    groups: dict[Settings, list[SearchRun]] = defaultdict(list)
     for run in runs:
         groups[_settings(run)].append(run)
     variants = []
@@ -183,13 +183,13 @@ def _plain(value: str) -> str:
     return {"None": "null", "True": "true", "False": "false"}.get(value, value.strip("'"))
 
 
-def _problem_name(run: Run) -> str:
+def _problem_name(run: SearchRun) -> str:
     return (
         f"{run.data}, model {run.config.get('model.motor.name', '?')} with {run.config.get('model.static.name', '?')}"
     )
 
 
-def _check_same_problem(runs: Sequence[Run], source: str) -> None:
+def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
     """Objectives compare only on the same data, with the same model, by the same measure."""
     chosen = sorted({run.data for run in runs})
     if len(chosen) > 1:

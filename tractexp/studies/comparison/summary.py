@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.studies.comparison.floor import AT_FLOOR, Floor, Polished
-from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.comparison.statistics import expected_running_time
 
 COSTS = ("simulations", "seconds")
@@ -69,7 +69,7 @@ def running_time(variant: Variant, target: float, cost: str) -> float:
     return expected_running_time(np.where(reached, spent, whole), reached)
 
 
-def _whole(variant: Variant, run: Run, cost: str) -> float:
+def _whole(variant: Variant, run: SearchRun, cost: str) -> float:
     """All that a run spent; a run that failed spent its budget, or what the others of its variant did."""
     if run.finished:
         return float(getattr(run, cost)[-1])

@@ -7,10 +7,10 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.style import PALETTE
-from tractexp.report.events import CAPTION, Curve, event_chart
+from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison.floor import Floor
-from tractexp.studies.comparison.runs import Run, Variant
+from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.paper import conclusion, equations, figures, maps, printed, why
 from tractexp.studies.paper.claims import BOTH, PAIRS, Claim, counted, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN
@@ -279,7 +279,7 @@ def figure6(sheet: Report, study: Study) -> None:
 def _fit(sheet: Report, fit: Any, role: str) -> None:
     record = fit.event.record
     caption = f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q {fit.epsilon_q:.2%}."
-    curve = Curve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
+    curve = CalculatedCurve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
     sheet.chart(event_chart(fit.event, [curve]), " ".join([caption, CAPTION, *map(as_sentence, record.notes)]))
 
 
@@ -315,7 +315,7 @@ def figure9(sheet: Report, study: Study) -> None:
 def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
     data = study.train[0].record.name
     return Variant(_label(name), name, {}, tuple(
-        Run(name, data, seed, {}, "", f.objective, simulations=f.history.simulations, seconds=f.history.seconds,
+        SearchRun(name, data, seed, {}, "", f.objective, simulations=f.history.simulations, seconds=f.history.seconds,
             history=f.history.objective) for seed, f in enumerate(study.searched(name, by)[:seeds])))  # fmt: skip
 
 

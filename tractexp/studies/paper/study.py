@@ -41,7 +41,7 @@ SHOWN: Mapping[str, Mapping[str, Sequence[str]]] = {
 
 
 @dataclass(frozen=True)
-class Pair:
+class OptimizerPair:
     """One optimizer against another over paired seeds: two-sided p of Wilcoxon's test, and the Vargha-Delaney A."""
 
     first: str
@@ -158,9 +158,9 @@ class Study:
         """(seeds,) where the searches end."""
         return np.array([search.objective for search in self.searched(name, by)])
 
-    def pair(self, first: str, second: str, by: str) -> Pair:
+    def pair(self, first: str, second: str, by: str) -> OptimizerPair:
         a, b = self.objectives(first, by), self.objectives(second, by)
-        return Pair(first, second, wilcoxon(a, b)[0], vargha_delaney(a, b))
+        return OptimizerPair(first, second, wilcoxon(a, b)[0], vargha_delaney(a, b))
 
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
         """What each search spent until `target` times the floor or in all (seeds,), and whether it got there."""

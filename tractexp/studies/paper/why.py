@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from tractexp.studies.comparison.statistics import ALPHA, holm, vargha_delaney, wilcoxon
-from tractexp.studies.paper.study import Pair, Shares, Study
+from tractexp.studies.paper.study import OptimizerPair, Shares, Study
 
 SPARROWS, RIVAL = ("issa", "ssa"), "pso"
 
@@ -17,7 +17,7 @@ def fisher(a: Shares, b: Shares, of: str) -> float:
     return float(fisher_exact(rows)[1])  # type: ignore[arg-type]
 
 
-def significant(pairs: Sequence[Pair], k: int) -> bool:
+def significant(pairs: Sequence[OptimizerPair], k: int) -> bool:
     """Whether the first of pair k ends lower, corrected for all pairs."""
     return bool(holm([pair.p for pair in pairs])[k] < ALPHA and pairs[k].A > 0.5)
 
