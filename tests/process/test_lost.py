@@ -318,9 +318,9 @@ def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_p
 @pytest.mark.skipif(os.name == "nt", reason="ends a process by a signal")
 def test_the_process_that_logs_finishes_its_run_when_the_job_is_ended(uri):
     script = """
-import sys, time; from tractexp.tracking import Run; from tractexp.tracking.process import Logger
+import sys, time; from tractexp.tracking import TrackedRun; from tractexp.tracking.process import Logger
 logger = Logger(sys.argv[1])
-logger._tell(Run("e", "r", key="k"))
+logger._tell(TrackedRun("e", "r", key="k"))
 print(logger._process.pid, flush=True)
 time.sleep(60)"""
     job = subprocess.Popen([sys.executable, "-c", script, uri], stdout=-1, stderr=-1, text=True)
