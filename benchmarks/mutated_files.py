@@ -90,7 +90,7 @@ def tables(made):
     t = np.arange(400) / 400
     U = np.where((t >= 0.3) & (t < 0.45), 0.7, 1.0)
     columns = {"t": t, "U": U, "P": 0.9 * U**1.5, "Q": 0.3 * U**2}
-    waves = {"t": made.segments[0].t} | {c.name.lower(): c.values() for c in made.channels}
+    waves = {"t": made.segments[0].t} | {c.name.lower(): 1e3 * c.values() for c in made.channels}  # V, A
 
     def text(given, mark):
         rows = zip(*(v.tolist() for v in given.values()), strict=True)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
+from tractexp import credentials  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
 from tractexp.output import outlet  # noqa: E402
 from tractexp.wording import one_line  # noqa: E402
@@ -75,15 +76,35 @@ def _refused(sentence: str, code: int = 2) -> int:
 
 
 def _asked(arguments: list[str]) -> int:
+    for argument in arguments:
+        key, equals, _ = argument.partition("://")[0].rpartition("=")
+        credentials.check(key if equals else "what is given", argument)
     if arguments[:1] and (place := COMMANDS.get(arguments[0])):
-        module, _, function = place.partition(":")
-        return getattr(importlib.import_module(module), function)(arguments[1:])
+        return _command(place, arguments[1:])
+    if arguments[:1] and _is_file(arguments[0]):
+        return _command(COMMANDS["look"], arguments)
     if {"--help", "-h"} & {*arguments}:
         from tractexp.usage import usage
 
         print(usage())
         return 0
     return _run(arguments)
+
+
+def _command(place: str, arguments: list[str]) -> int:
+    module, _, function = place.partition(":")
+    return getattr(importlib.import_module(module), function)(arguments)
+
+
+def _is_file(argument: str) -> bool:
+    """Whether an argument names a file to look at, one that may be missing, and is no setting."""
+    if "=" in argument or argument.startswith("-"):
+        return False
+    if os.path.isfile(argument):
+        return True
+    from tractexp.record.reader import endings
+
+    return os.path.splitext(argument)[1].lower() in endings()
 
 
 def terminated(*_: object) -> None:

@@ -10,6 +10,7 @@ import io
 import json
 import math
 import os
+import re
 import stat
 import tempfile
 import time
@@ -20,7 +21,8 @@ from typing import IO, Any
 from tractexp.errors import UserError
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
-PART = ".part"  # ends the name of a file that is being written
+PART = ".tractexp.part"  # ends the name of a file that is being written
+OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)  # that name: nobody else gives a file such a one
 LARGEST = 2 << 30  # bytes of a file that is read at once
 ODD = {stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
@@ -91,17 +93,20 @@ def read_json(path: Path | str) -> Any:
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
 
 
-def write(path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None) -> Path:
+def write(
+    path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None,
+    private: bool = False,
+) -> Path:  # fmt: skip
     """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
 
     What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache or a log need not
-    wait for that. `modified` [s since 1970] is a time stamp to give it.
+    wait for that. `modified` [s since 1970] is a time stamp to give it. What is `private` nobody else can read.
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
     data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
-        _fill(temporary, data, lasting)
+        _fill(temporary, data, lasting, private)
         if modified is not None:
             os.utime(temporary, (modified, modified))
         os.replace(temporary, path)
@@ -208,13 +213,24 @@ def _locked(file: IO[bytes]) -> bool:
     return True
 
 
+def inside(path: Path, folder: Path) -> bool:
+    """Whether a file or folder, with everything below it, lies below `folder`, wherever links lead; no pipes."""
+    whole = folder.resolve()
+    try:
+        every = [path, *path.rglob("*")] if path.is_dir() else [path]
+        return all(one.resolve().is_relative_to(whole) and (one.is_file() or one.is_dir()) for one in every)
+    except (OSError, RuntimeError, ValueError):  # a link to itself; a name that is none
+        return False
+
+
 def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
-    """Partial files of killed processes in `folder` and below, at least `older` seconds old."""
+    """Partial files of killed processes of ours in `folder` and below, at least `older` seconds old."""
     now = time.time()
     halves = []
     for path in folder.rglob(f"*{PART}"):
         with contextlib.suppress(OSError):
-            if path.is_file() and now - path.stat().st_mtime > older:
+            ours = OWN.fullmatch(path.name) and path.is_file() and not path.is_symlink()
+            if ours and now - path.stat().st_mtime > older:
                 halves.append(path)
     return halves
 
@@ -240,13 +256,14 @@ def _beside(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _fill(temporary: Path, data: bytes, lasting: bool) -> None:
+def _fill(temporary: Path, data: bytes, lasting: bool, private: bool = False) -> None:
     with temporary.open("wb") as file:
         file.write(data)
         file.flush()
         if lasting:
             os.fsync(file.fileno())
-    os.chmod(temporary, 0o666 & ~_umask())
+    if not private:  # as a temporary file is
+        os.chmod(temporary, 0o666 & ~_umask())
 
 
 def _settle(folder: Path) -> None:
@@ -263,9 +280,10 @@ def _settle(folder: Path) -> None:
         os.close(handle)
 
 
-def write_json(path: Path | str, content: Any) -> Path:
+def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path:
     """Write JSON that any reader takes: numbers that do not exist (nan, infinity) become null."""
-    return write(path, json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+    text = json.dumps(plain(content), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return write(path, text, private=private)
 
 
 def plain(content: Any) -> Any:

@@ -3,10 +3,10 @@
 import functools
 import itertools
 import re
-import shlex
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from tractexp import quoting
 from tractexp.errors import UserError
 
 # settings that take names of their own
@@ -96,21 +96,32 @@ def typed(data: Mapping[str, object], *more: str) -> str:
     """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
     settings = dict(data)
     words = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
-    return shlex.join(["tractexp", *more, *words])
+    return quoting.shell("tractexp", *more, *words)
+
+
+def survey_of(folder: str) -> str:
+    """The command, as a shell takes it, that makes a table of the recordings in a folder."""
+    return quoting.shell("tractexp", "task=survey", assigned("data.path", folder))
 
 
 def assigned(key: str, value: object) -> str:
     """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of them."""
     if isinstance(value, list | tuple):
         return f"{key}=[{','.join(map(_plain, value))}]"
-    return f"{key}={value if isinstance(value, str) else _plain(value)}"
+    return f"{key}={value if isinstance(value, str) and _bare(value) else _plain(value)}"
+
+
+def _bare(value: str) -> bool:
+    """Whether `override` quotes a value by itself: brackets behind a space are no function."""
+    return _plain(re.sub(r"\B[()]|[()]\B", "", value))[:1] != "'"
 
 
 def _plain(value: object) -> str:
     if isinstance(value, Mapping):
         return f"{{{','.join(f'{key}:{_plain(inner)}' for key, inner in value.items())}}}"
     if isinstance(value, str):
-        return _quoted(value) if set(value) & MARKS or not WORD.search(value) else value
+        plain = WORD.search(value) and value == value.strip() and not NO_NAME.fullmatch(value)
+        return value if plain and not set(value) & MARKS else quoting.hydra(value)
     return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
 
 
@@ -141,7 +152,7 @@ def _quoted(value: str) -> str:
     """A value in quotes; of a list, each of its elements that Hydra would not read."""
     if value.startswith("[") and value.endswith("]") and not _names_a_file(value):
         return f"[{','.join(_element(part.strip()) for part in _parts(value[1:-1]))}]"
-    return "'" + value.replace("\\", "\\\\").replace("'", "\\'") + "'"
+    return quoting.hydra(value, literal=_names_a_file(value))
 
 
 def _element(text: str) -> str:

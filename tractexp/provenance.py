@@ -2,11 +2,12 @@
 
 import functools
 import hashlib
-import shlex
 import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+
+from tractexp import quoting
 
 PACKAGE = Path(__file__).parent
 
@@ -112,4 +113,4 @@ def started(arguments: list[str]) -> None:
 
 def command() -> str:
     """The command line of this run, to be typed again; "" where there was none, as from Python."""
-    return shlex.join(_started)
+    return quoting.shell(*_started)

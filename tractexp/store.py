@@ -16,6 +16,7 @@ import importlib.metadata
 import io
 import os
 import platform
+import re
 import shutil
 import stat
 import sys
@@ -33,6 +34,7 @@ from tractexp.errors import UserError
 CHOICE = "TRACTEXP_CACHE_DIR"
 SUM = hashlib.sha256().digest_size  # bytes a file begins with
 ENDING, EARLIER = ".entry", ".kept"  # of its name, now and in versions before 0.2
+NAME = re.compile(rf"[0-9a-f]+{re.escape(ENDING)}|[a-z]+_[0-9a-f]+{re.escape(EARLIER)}")  # nobody else's
 LIBRARIES = ("numpy", "scipy", "llvmlite")  # whose versions may change the last digits
 DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)  # raised where arrays are unpacked
 
@@ -114,7 +116,8 @@ SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), St
 
 def damaged(folder: Path) -> list[Path]:
     """The files of a cache folder that are damaged, or of an earlier version."""
-    return [*(path for path in folder.rglob(f"*{ENDING}") if _sound(path) is None), *folder.rglob(f"*{EARLIER}")]
+    ours = [path for path in folder.rglob("*") if NAME.fullmatch(path.name)]
+    return [path for path in ours if path.suffix == EARLIER or _sound(path) is None]
 
 
 def _sound(path: Path) -> bytes | None:

@@ -36,7 +36,7 @@ TEXT = """\
 tractexp: identify the parameters of a traction load from recorded voltage dips
 
 The commonest
-  tractexp look station.cfg
+  tractexp look station.cfg       (or tractexp station.cfg)
       what a file holds: its loads, what happened, what is worth fitting, and the command for it
   tractexp data=csv 'data.train=[dip1.csv]'
       identify a load from a dip (columns t,U,P,Q): how well it fits, how sure each parameter is

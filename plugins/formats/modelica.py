@@ -3,7 +3,7 @@
 import re
 
 from tractexp.extend import UserError, plugin
-from tractexp.extend.formats import Format
+from tractexp.extend.formats import Format, quoting
 
 
 @plugin
@@ -32,18 +32,20 @@ class Modelica(Format):
             )
         rows = _equations(eq)
         base = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV"
-        lines = [f"model TractionLoad {_quoted(f'{load.model.title}, {base}')}"]
+        lines = [f"model TractionLoad {quoting.modelica(f'{load.model.title}, {base}')}"]
         for p in load.model.parameters:
             about = f"{p.about.replace(RECORD, 'this base')} [{p.unit}]"
-            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {_quoted(about)};")
+            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {quoting.modelica(about)};")
         for name, about in BEFORE.items():
             if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
-                lines.append(f"  parameter Real {name} = {known[name]!r} {_quoted(about)};")
-        lines += [f"  input Real U(start = U0) {_quoted('voltage [pu]')};"]
-        lines += [f"  input Real omega_s(start = omega_s0) {_quoted('synchronous speed less nominal [rad/s]')};"]
+                lines.append(f"  parameter Real {name} = {known[name]!r} {quoting.modelica(about)};")
+        lines += [f"  input Real U(start = U0) {quoting.modelica('voltage [pu]')};"]
+        lines += [
+            f"  input Real omega_s(start = omega_s0) {quoting.modelica('synchronous speed less nominal [rad/s]')};"
+        ]
         if any(_reads(right, "U2") for _, right in rows):
-            lines.append(f"  input Real U2 {_quoted('negative-sequence voltage [pu]')};")
-        lines += [f"  output Real {power} {_quoted('consumed [pu]')};" for power in "PQ"]
+            lines.append(f"  input Real U2 {quoting.modelica('negative-sequence voltage [pu]')};")
+        lines += [f"  output Real {power} {quoting.modelica('consumed [pu]')};" for power in "PQ"]
         for symbol, start in _starts(eq):
             lines.append(f"  Real {symbol}(start = {known[start]!r}, fixed = true);")
         lines += [f"  Real {symbol};" for symbol in eq.steps]
@@ -113,7 +115,3 @@ def _modelica(expression):
 
 def _reads(text, name):
     return re.search(rf"\b{name}\b", text) is not None
-
-
-def _quoted(text):
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'

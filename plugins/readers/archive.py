@@ -4,7 +4,7 @@ from dataclasses import field
 from pathlib import Path
 
 from tractexp.extend import Events, Reader, UserError, check_distinct, plugin
-from tractexp.extend.files import records
+from tractexp.extend.files import records, survey_of
 
 
 @plugin
@@ -33,7 +33,7 @@ class Archive(Reader):
         if not self.train:
             raise UserError(
                 f"data.train is empty: name events of {self.path} as FILE#LOAD.DIP; a survey lists them:"
-                f" tractexp task=survey data.path={self.path}"
+                f" {survey_of(self.path)}"
             )
         check_distinct("data.train and data.validate", [*self.train, *self.validate])
         folder = Path(self.path)

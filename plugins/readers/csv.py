@@ -15,6 +15,7 @@ from tractexp.extend.files import (
     Sidecar,
     Tabular,
     beside,
+    check_load,
     check_numbers,
     chosen,
     counted,
@@ -23,6 +24,7 @@ from tractexp.extend.files import (
     level,
     numbered,
     powers,
+    signs,
 )
 
 PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
@@ -117,8 +119,9 @@ class CSV(Tabular, Reader):
         told = beside(path)
         table, found = self.table_of(path, told)
         given = self.base_voltage or (told.base and told.base.voltage)
-        made = powers(table, found, self.frequency, self.reverse_current, kilovolts=given is not None)
-        window = told.window or (self.estimator and estimator_of(self.estimator).window(self.frequency))
+        declared = told.base.frequency if told.base else self.frequency
+        made = powers(table, found, declared, self.reverse_current, kilovolts=given is not None)
+        window = told.window or (self.estimator and estimator_of(self.estimator).window(made.frequency))
         arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": window or None}
         raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
         even = raw if told.uniform else raw.uniform(table.place)
@@ -130,7 +133,8 @@ class CSV(Tabular, Reader):
         by = Base(voltage, power)
         arrays = by.per_unit(even.channels)
         record = replace(even, base=base, notes=(*even.notes, *note), **arrays)
-        return record.check(table.place if record.samples == raw.samples else None)
+        record.check(table.place if record.samples == raw.samples else None)
+        return replace(record, notes=(*record.notes, *signs(record)))
 
     def _name(self, path: str, told: Sidecar) -> str:
         stem = Path(path.removeprefix(PACKAGE)).stem
@@ -139,7 +143,6 @@ class CSV(Tabular, Reader):
 
     def _base(self, record: Record, made: Powers, told: Sidecar, same: Base | None) -> tuple[Base, list[str]]:
         """What one per unit is: given, that of the record before, or the steady state of values in kV and MW."""
-        frequency = told.base.frequency if told.base else self.frequency
         voltage = self.base_voltage or (told.base and told.base.voltage) or (same and same.voltage)
         power = self.base_power or (told.base and told.base.power) or (same and same.power)
         if voltage is None and power is None and made.absolute["U"] and made.absolute["P"] is None:
@@ -157,6 +160,8 @@ class CSV(Tabular, Reader):
                     f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
                     "data.base_power (MVA)"
                 )
+            if made.absolute["U"]:
+                check_load(record.where, U, S if made.absolute["P"] else 0.0)
             if voltage is None and made.absolute["U"]:
                 voltage = U
                 told_by.append(f"{U:.4g} kV line to line")
@@ -164,4 +169,4 @@ class CSV(Tabular, Reader):
                 power, origin = S, LOAD
                 told_by.append(f"{S:.4g} MVA")
         note = [f"base: {' and '.join(told_by)}, the steady state before the first dip"] if told_by else []
-        return Base(voltage or 1.0, power or 1.0, frequency, origin), note
+        return Base(voltage or 1.0, power or 1.0, made.frequency, origin), note

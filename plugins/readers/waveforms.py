@@ -1,7 +1,7 @@
 """Records from tables of waveforms: the dips of one file, numbered in order of time."""
 
 from tractexp.extend import Recording, WaveformReader, check_range, plugin
-from tractexp.extend.files import SIZES, Tabular, beside, kind_of, recording, restored
+from tractexp.extend.files import QUANTITIES, SIZES, Tabular, beside, kind_of, recording, restored
 
 
 @plugin
@@ -17,6 +17,7 @@ class Waveforms(Tabular, WaveformReader):
     Departures: any delimiter, title lines, unit rows.
     """
 
+    quantities = QUANTITIES
     endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods")
 
     frequency: float = 50.0  # Hz, nominal

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import uncertainty as study
 
+import tractexp
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
@@ -133,3 +134,9 @@ def test_what_cannot_be_fitted_is_refused_in_a_sentence(event):
         Problem(study.model(), [event], per_event=["T_n"])
     with pytest.raises(UserError, match=r"model\.per_event names M, which model\.fixed fixes"):
         Problem(study.model(), [event], fixed={"M": 0.006}, per_event=["M"])
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_a_fixed_value_that_is_no_number_is_refused_by_its_name(value):
+    with pytest.raises(UserError, match=r"fixed.C=(nan|inf) is out of range: it must be finite"):
+        tractexp.identify("tibet_50pct", fixed={"C": value}, optimizer="multistart_least_squares", budget=20)

@@ -116,6 +116,8 @@ def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
     assert store.damaged(folder) == []
     earlier = folder / "code_0.kept"  # of a version before 0.2
     earlier.write_bytes(b"")
+    for name in ("best.kept", "mine.entry", "descents/mine.entry"):  # of the user, whose folder it may be
+        (folder / name).write_bytes(b"mine")
     assert store.damaged(folder) == [earlier]
 
 

@@ -91,8 +91,9 @@ def waveforms(folder):
         (folder / "recordings" / name).parent.mkdir(parents=True)
         write(recording(np.concatenate([dips, I / 2]), TWO), folder / "recordings" / name, "BINARY", 1999)
     t = np.arange(dips.shape[1]) / 3200
-    for name, of in (("rec.csv", dict(zip(("ua", "ub", "uc", "ia", "ib", "ic"), dips, strict=True))),
-                     ("feeder.csv", {"u": dips[0], "i": dips[3]})):  # fmt: skip
+    V, A = 1e3 * dips[:3], 1e3 * dips[3:]
+    for name, of in (("rec.csv", dict(zip(("ua", "ub", "uc", "ia", "ib", "ic"), (*V, *A), strict=True))),
+                     ("feeder.csv", {"u": V[0], "i": A[0]})):  # fmt: skip
         pandas.DataFrame({"t": t, **of}).to_csv(folder / name, index=False)
 
 

@@ -111,6 +111,9 @@ files.write(sys.argv[1], 'new')"""
     (half,) = [p for p in tmp_path.iterdir() if p != path]
     assert files.leftovers(tmp_path) == []  # it may be one that is being written
     os.utime(half, (0, 0))
+    for name in ("movie.mkv.part", ".part", ".a.txt.part", "a.tractexp.part", ".a.txt.12345678.part"):
+        os.utime(files.write(tmp_path / name, "somebody's"), (0, 0))
+    (tmp_path / ".a.txt.12345678.tractexp.part").symlink_to(path)
     assert files.leftovers(tmp_path) == [half]
 
 

@@ -59,6 +59,16 @@ def test_file_channels_loads_and_events_are_told_as_tables_and_frames(looked):
     assert "dip" in str(looked)
 
 
+def test_a_file_as_the_only_argument_is_looked_at(station, tmp_path):
+    done = run_command(str(station), cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "to fit it:" in done.stdout
+    assert list(tmp_path.glob("outputs/looks/*/*.html"))
+    done = run_command("missing.cfg", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "there is no such file" in done.stderr
+
+
 def test_a_load_may_be_named_and_is_then_the_only_one(station):
     made = tractexp.look(station, voltages=[0, 1, 2], currents=["Q1 IA", "Q1 IB", "Q1 IC"])
     assert [f["currents"] for f in made.feeders] == [[3, 4, 5]]

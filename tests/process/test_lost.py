@@ -1,6 +1,7 @@
 """Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another version."""
 
 import contextlib
+import importlib
 import json
 import os
 import shutil
@@ -16,6 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import run_command
 
 from tractexp import tracking
 from tractexp.errors import UserError
@@ -188,6 +190,111 @@ def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(
         tracking.prepare(uri)
 
 
+# Folders of others
+
+
+def hostile(folder: Path, run: TrackedRun, uri: str) -> Path:
+    """A folder that somebody else gave us: its file was written by hand."""
+    save(folder, run, uri)
+    return folder / FILE
+
+
+def names(uri: str, name: str) -> list[str]:
+    """The artifacts of a run, those within folders, too."""
+    client, (found,) = open_store(uri), [r for r in runs(uri) if r.info.run_name == name]
+    listed = client.list_artifacts(found.info.run_id)
+    listed += [
+        one for folder in listed if folder.is_dir for one in client.list_artifacts(found.info.run_id, folder.path)
+    ]
+    return [one.path for one in listed if not one.is_dir]
+
+
+@pytest.mark.parametrize("command", ["sync", "doctor"])
+def test_of_a_received_folder_only_its_own_files_are_sent(command, tmp_path, uri, capsys, monkeypatch):
+    from tractexp.cli import doctor
+
+    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    key, folder = tmp_path / "home" / "id_rsa", tmp_path / "given" / "run"
+    (folder / "figures").mkdir(parents=True)
+    key.parent.mkdir()
+    for path in (key, folder / "own.txt", folder / "figures" / "own.svg"):
+        path.write_text(path.name)
+    (folder / "link.txt").symlink_to(key)
+    (folder / "home").symlink_to(key.parent)
+    (folder / "figures" / "deep").symlink_to(key)
+    (folder / "again.txt").symlink_to(folder / "own.txt")
+    os.mkfifo(folder / "pipe")
+    ways = [str(key), "../../home/id_rsa", "link.txt", "home", "home/id_rsa", "figures", "pipe", "../run/../../home"]
+    given = json.loads(hostile(folder, run(children=[run("below")]), uri).read_text())
+    given["run"] |= {"artifacts": [*ways, "own.txt", "again.txt", "figures/own.svg"], "model": str(key)}
+    given["run"]["children"][0] |= {"artifacts": [*ways, "own.txt"], "model": "link.txt"}
+    (folder / FILE).write_text(json.dumps(given))
+    getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given"), "--uri", uri])
+    assert sorted(names(uri, "one")) == ["again.txt", "own.svg", "own.txt"]
+    assert names(uri, "below") == ["own.txt"]
+    said = capsys.readouterr().out
+    assert f"{key} is not sent: it does not lie in the folder {folder} of its run" in " ".join(said.split())
+    store = Path(uri.removeprefix("sqlite:///")).parent
+    assert [p for p in store.rglob("*") if p.is_file() and p.name == key.name] == []
+
+
+def test_the_page_of_a_received_sweep_may_be_a_link_to_anything(tmp_path, uri):
+    (tmp_path / "key").write_text("secret")
+    hostile(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri)
+    save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)
+    (tmp_path / "sweep" / "comparison.html").symlink_to(tmp_path / "key")
+    assert sync(tmp_path) == {BROUGHT: 1}
+    assert names(uri, "a sweep") == []
+
+
+@pytest.mark.parametrize("command", ["sync", "doctor"])
+def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, monkeypatch):
+    from tractexp.cli import doctor
+
+    monkeypatch.setattr(doctor, "cores", lambda: iter(()))
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    foreign = f"sqlite:///{tmp_path / 'foreign' / 'mlflow.db'}"
+    hostile(tmp_path / "given" / "run", run(), foreign)
+    assert getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given")]) == 2
+    said = " ".join(capsys.readouterr().out.split())
+    assert f"where it is yours, tractexp sync --uri {foreign} sends it there" in said
+    assert "1 not logged" in said
+    assert not (tmp_path / "foreign").exists()
+
+
+def test_a_received_file_changes_no_run_that_is_not_its_own(tmp_path, uri):
+    mine = save(tmp_path / "mine", run("mine"), uri)
+    sweep = save(tmp_path / "sweep", TrackedRun("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True)
+    assert sync(tmp_path) == {BROUGHT: 2}
+    ids = {name: read(tmp_path / name).run_id for name in ("mine", "sweep")}
+    before = {r.info.run_id: r.to_dictionary() for r in runs(uri)}
+    given = tmp_path / "given"
+    for k, (name, run_id) in enumerate(ids.items()):
+        hostile(given / str(k), run("other", status="KILLED"), uri)
+        content = json.loads((given / str(k) / FILE).read_text()) | {"run_id": run_id, "sweep": name == "sweep"}
+        (given / str(k) / FILE).write_text(json.dumps(content))
+    hostile(given / "2", run("other", status="KILLED", key=mine.run.key), uri)
+    (given / "sweep.json").write_text(json.dumps({"run": ids["sweep"]}))
+    sync(given)
+    assert {r.info.run_id: r.to_dictionary() for r in runs(uri) if r.info.run_id in before} == before
+    assert sweep.run.name == "my sweep"
+
+
+@pytest.mark.parametrize(
+    ("place", "value"),
+    [("uri", 5), ("run_id", ["x"]), ("key", "x' or 1=1"), ("key", None), ("name", 3), ("artifacts", 7), ("model", 7),
+     ("status", {}), ("children", [1]), ("curves", [1])],
+)  # fmt: skip
+def test_a_file_that_no_run_wrote_is_a_sentence(place, value, tmp_path, uri):
+    given = json.loads(hostile(tmp_path / "run", run(), uri).read_text())
+    (given if place in given else given["run"])[place] = value
+    (tmp_path / "run" / FILE).write_text(json.dumps(given))
+    told = []
+    assert sync(tmp_path, uri, tell=told.append) == {NOT: 1}
+    assert "is damaged" in told[0]
+
+
 # Commands
 
 
@@ -256,6 +363,27 @@ def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_an
     assert len(list(database.parent.glob("mlflow.db.damaged-*"))) == 1
     with sqlite3.connect(database) as store:
         assert store.execute("select name, status from runs").fetchall() == [("one", "FINISHED")]
+
+
+@pytest.mark.parametrize("content", [b"notes of mine\n", "another program's database"])
+def test_the_doctor_touches_nothing_that_is_not_ours(content, tmp_path, capsys, monkeypatch):
+    from tractexp.cli import doctor as module
+
+    monkeypatch.setattr(module, "cores", lambda: iter(()))
+    mine, database = tmp_path / "runs" / "film.part", tmp_path / "runs" / "mine.db"
+    mine.parent.mkdir()
+    mine.write_text("half a download")
+    os.utime(mine, (0, 0))
+    if isinstance(content, bytes):
+        database.write_bytes(content)
+    else:
+        with contextlib.closing(sqlite3.connect(database)) as other:
+            other.execute("CREATE TABLE mine (a)")
+    before = {path: path.read_bytes() for path in (mine, database)}
+    code, told = doctor(tmp_path / "runs", "--uri", f"sqlite:///{database}", capsys=capsys)
+    assert code == 2
+    assert f"WRONG {database} is no MLflow store" in told
+    assert {path: path.read_bytes() for path in (tmp_path / "runs").iterdir()} == before
 
 
 def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch):
@@ -418,3 +546,144 @@ def test_a_run_reaches_a_server_on_postgresql_also_one_made_while_that_was_away(
         assert len(client.get_metric_history(run_id, "fitness")) == 3
     with pytest.raises(UserError, match=f"{address} cannot be used"):
         tracking.log(run("too late"), address)  # in seconds, not MLflow's minutes
+
+
+# A folder that holds an earlier run
+
+SEARCH = ("optimizer=multistart_least_squares", "budget=200", "tracking.enabled=false", "hydra.run.dir=run")
+
+
+def state(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+@pytest.fixture(scope="module")
+def earlier(tmp_path_factory):
+    """A folder with a finished run, and what an engineer put beside it."""
+    folder = tmp_path_factory.mktemp("earlier")
+    done = run_command(*SEARCH, "seed=1", cwd=folder)
+    assert done.returncode == 0, done.stderr
+    (folder / "run" / "notes.txt").write_text("mine")
+    return folder
+
+
+def seed_of(folder: Path) -> str:
+    return next(line for line in (folder / ".hydra" / "overrides.yaml").read_text().split() if "seed" in line)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="ends a run by a signal")
+@pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGTERM])
+def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configuration(earlier, way, tmp_path):
+    shutil.copytree(earlier / "run", tmp_path / "run")
+    command = [sys.executable, "-m", "tractexp", *SEARCH, "seed=2", "optimizer=pso", "optimizer.iterations=10000000"]
+    command = [word for word in command if word not in ("budget=200", "optimizer=multistart_least_squares")]
+    job = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    while "optimizer: pso" not in (line := job.stdout.readline()):
+        assert line, job.stderr.read()
+    time.sleep(1.0)
+    job.send_signal(way)
+    job.communicate(timeout=60)
+    left = state(tmp_path / "run")
+    if way == signal.SIGKILL:
+        assert {k: v for k, v in left.items() if ".next" not in k} == state(earlier / "run")
+    else:  # what was found so far is the result then
+        assert seed_of(tmp_path / "run") == "seed=2"
+        assert "result.json" not in left
+        assert {"interrupted.json", "notes.txt"} <= left.keys()
+    assert (run_command(*SEARCH, "seed=3", cwd=tmp_path)).returncode == 0
+    assert seed_of(tmp_path / "run") == "seed=3"
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {p.name for p in (earlier / "run").iterdir()}
+
+
+def test_a_run_that_is_refused_in_an_old_folder_leaves_it_as_it_was(earlier):
+    before = state(earlier / "run")
+    for wrong in (("data=csv", "data.train=[absent.csv]"), ("budget=0",), ("model.bounds.C=[2,1]",)):
+        assert run_command(*SEARCH, "seed=2", *wrong, cwd=earlier).returncode == 2
+        assert state(earlier / "run") == before
+
+
+def test_the_results_of_another_task_go_and_those_that_a_task_reads_stay(earlier, tmp_path):
+    shutil.copytree(earlier / "run", tmp_path / "run")
+    result = (tmp_path / "run" / "result.json").read_bytes()
+    export = ("task=export", "task.parameters=run/result.json", "task.format=modelica", "hydra.run.dir=run")
+    assert run_command(*export, cwd=tmp_path).returncode == 0
+    assert state(tmp_path / "run").keys() == {*state(earlier / "run"), "load.mo"}
+    assert seed_of(tmp_path / "run") == "seed=1"  # of the result that is there
+    simulate = (*SIMULATE, "tracking.enabled=false")
+    of_result = ["task.parameters=run/result.json" if "values" in word else word for word in simulate]
+    assert run_command(*of_result, cwd=tmp_path).returncode == 0
+    assert (tmp_path / "run" / "result.json").read_bytes() == result
+    assert not (tmp_path / "run" / "history.csv").exists()
+    assert run_command(*simulate, cwd=tmp_path).returncode == 0
+    names = {p.name for p in (tmp_path / "run").iterdir()}
+    assert not {"result.json", "history.csv", "report.html", ".hydra.next"} & names
+    assert {"response.csv", "load.mo", "notes.txt", ".hydra"} <= names
+
+
+# Passwords
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (*SIMULATE, "tracking.uri=http://me:hunter2@127.0.0.1:9"), (*SIMULATE, "tracking.url=http://me:hunter2@h"),
+        ("-m", "seed=1,2", "hydra.sweep.dir=run", "tracking.uri=postgresql://me:hunter2@127.0.0.1:9/db"),
+        ("ui", "--uri", "http://me:hunter2@127.0.0.1:9"), ("sync", ".", "--uri=http://me:hunter2@127.0.0.1:9"),
+        ("doctor", "--uri", "http://hunter2@127.0.0.1:9"), ("sync", "http://me:hunter2@127.0.0.1:9"),
+        ("--config-dir=own", "+mine=store", *SIMULATE),
+        ("--config-dir=own", "+mine=store", *SIMULATE[:-1], "hydra.run.dir=old"),
+        ("-m", "--config-dir=own", "+mine=store", "seed=1,2", "hydra.sweep.dir=run"),
+        (*SIMULATE, "tracking.uri=${oc.env:STORE}"),
+    ],
+)  # fmt: skip
+def test_a_password_is_neither_printed_nor_written(arguments, tmp_path):
+    own = tmp_path / "own" / "mine" / "store.yaml"
+    own.parent.mkdir(parents=True)
+    own.write_text("# @package _global_\ntracking:\n  uri: http://me:hunter2@127.0.0.1:9\n")
+    (tmp_path / "old" / ".hydra").mkdir(parents=True)
+    done = run_command(*arguments, cwd=tmp_path, STORE="http://me:hunter2@127.0.0.1:9")
+    assert done.returncode == 2
+    assert "MLFLOW_TRACKING_PASSWORD" in done.stderr
+    assert "hunter2" not in done.stdout + done.stderr
+    assert [p for p in tmp_path.rglob("*") if p.is_file() and p != own and b"hunter2" in p.read_bytes()] == []
+
+
+def test_a_store_that_an_earlier_version_wrote_down_with_its_password_is_not_repeated(tmp_path, capsys):
+    from tractexp.cli.sync import sync as command
+
+    save(tmp_path / "run", run(), "http://me:hunter2@127.0.0.1:9")
+    assert command([str(tmp_path)]) == 2
+    assert "hunter2" not in capsys.readouterr().out
+
+
+@pytest.mark.skipif(os.name == "nt", reason="looks at permissions")
+def test_what_names_the_store_is_for_the_user_alone(tmp_path, uri):
+    save(tmp_path / "sweep", TrackedRun("e", "a sweep"), uri, sweep=True)
+    sync(tmp_path)
+    assert {p.stat().st_mode & 0o777 for p in (tmp_path / "sweep").glob("*.json")} == {0o600}
+
+
+def test_a_server_is_given_the_password_of_the_environment_or_of_a_netrc(tmp_path):
+    """What the refusal recommends: MLflow sends either."""
+    script = """
+import sys, threading; from http.server import BaseHTTPRequestHandler, HTTPServer
+asked = []
+class Server(BaseHTTPRequestHandler):
+    def do_GET(self):
+        asked.append(self.headers.get("Authorization"))
+        self.send_response(200); self.send_header("Content-Type", "application/json"); self.end_headers()
+        self.wfile.write(b"{}")
+    do_POST = do_GET
+    def log_message(self, *_): pass
+server = HTTPServer(("127.0.0.1", 0), Server)
+threading.Thread(target=server.serve_forever, daemon=True).start()
+from tractexp.tracking.store import open_store
+open_store(f"http://127.0.0.1:{server.server_port}").search_experiments()
+print(*sorted({str(each) for each in asked[1:]}))"""
+    netrc = tmp_path / ".netrc"
+    netrc.write_text("machine 127.0.0.1 login me password hunter2\n")
+    netrc.chmod(0o600)
+    names = {"MLFLOW_TRACKING_USERNAME": "me", "MLFLOW_TRACKING_PASSWORD": "hunter2"}
+    for more in (names, {"NETRC": str(netrc)}):
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ | more)
+        assert done.stdout.strip() == "Basic bWU6aHVudGVyMg==", done.stderr

@@ -1,7 +1,11 @@
 """A page is one file that needs nothing else, whatever is written into it."""
 
+import warnings
+from xml.etree import ElementTree
+
 import numpy as np
 import pytest
+from nasty import NASTY
 from pages import read
 
 from tractexp.blocks import Report
@@ -27,6 +31,19 @@ def test_whatever_is_written_is_escaped(tmp_path, drawing):
     reader = read(page.save(tmp_path / "page.html"))
     assert reader.words.count(HOSTILE) >= 10
     assert "inside" in reader.words
+
+
+@pytest.mark.parametrize("name", [name for name in NASTY if name.isprintable() and name.strip()])
+def test_a_nasty_name_is_a_word_of_the_page_and_of_a_figure(name, tmp_path):
+    t = np.arange(5.0)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph")  # which the reader's font has, if not ours
+        drawing = figures.response(tmp_path / "a.svg", t, t, (t, t), title=name, notes=(name,))
+    assert name in [text for node in ElementTree.parse(drawing).iter() if (text := node.text)]
+    page = Report(name, name).text(name).items([name]).code(name).figure(drawing, name)
+    page.table([name], [[name]], name).chart(Chart(name, [name]).line(name, t, t, "#000000"), name)
+    reader = read(page.save(tmp_path / "page.html"))
+    assert reader.words.count(name) >= 8
 
 
 def test_two_copies_of_a_figure_keep_apart(tmp_path, drawing):

@@ -1,5 +1,6 @@
 """An archive as a table: every file a row at least, whatever it holds; resumed; the events that tell most."""
 
+import csv
 import json
 import os
 import re
@@ -54,6 +55,21 @@ def field(tmp_path_factory):
 @pytest.fixture(scope="module")
 def surveyed(field):
     return tractexp.survey(field, cores=1)
+
+
+def test_no_name_of_a_file_is_a_formula_of_the_table_or_a_program_of_the_page(tmp_path):
+    harm = ["=1+1.cfg", "@SUM(A1).cfg", "</script><script>owned()<.cfg", "$(touch owned).cfg", "${oc.env:HOME}.cfg"]
+    harm = [name.replace("/", "\N{FRACTION SLASH}") for name in harm]
+    for name in harm:
+        write(recording(constant(depth=0.2)), tmp_path / "in" / name, "BINARY", 1999)
+    made = tractexp.survey(tmp_path / "in", cores=1)
+    made.write(tmp_path / "out")
+    with (tmp_path / "out" / "survey.csv").open(encoding="utf-8", newline="") as table:
+        cells = [row["file"] for row in csv.DictReader(table)]
+    assert sorted(cells) == sorted(f"'{name}" if name[0] in "=@" else name for name in harm)
+    assert sorted(made.to_frame()["file"]) == sorted(harm)
+    page = (tmp_path / "out" / "survey.html").read_text(encoding="utf-8")
+    assert page.count("<script") == 2
 
 
 def test_every_record_is_a_row_and_nothing_else_is(surveyed, field):

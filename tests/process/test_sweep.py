@@ -469,6 +469,18 @@ def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
     assert search_objective(tmp_path / "nowhere") is None
 
 
+def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
+    (tmp_path / "sweep").mkdir()
+    for name in ("comparison.html", "comparison.json", "multirun.yaml", "notes.txt"):
+        (tmp_path / "sweep" / name).write_text("of an earlier sweep")
+    budget = ("budget=200", "optimizer=multistart_least_squares", "tracking.enabled=false", "seed=1,2")
+    done = run_command("-m", *budget, "hydra.launcher.backend=threading", HERE, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    names = {p.name for p in (tmp_path / "sweep").iterdir()}
+    assert names == {"0", "1", "multirun.yaml", "notes.txt"}
+    assert (tmp_path / "sweep" / "multirun.yaml").read_text() != "of an earlier sweep"
+
+
 def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(tmp_path):
     from tractexp.sweep.job import SweepJob
     from tractexp.sweep.sweeper import place

@@ -326,6 +326,15 @@ def test_addresses_are_absolute_and_the_default_is_below_outputs(tmp_path, monke
         assert tracking.address(given) == given
 
 
+def test_the_store_of_mlflows_own_variable_is_used_unless_another_is_chosen(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", "sqlite:///team.db")
+    assert tracking.address(None) == f"sqlite:///{tmp_path.as_posix()}/team.db"
+    assert tracking.address("sqlite:///x.db") == f"sqlite:///{tmp_path.as_posix()}/x.db"
+    monkeypatch.setenv("MLFLOW_TRACKING_URI", " ")
+    assert tracking.address(None) == tracking.default_uri(tmp_path)
+
+
 def test_a_server_that_does_not_answer_is_reported_at_once():
     with socket.socket() as taken:  # bound but not listening: connections are refused
         taken.bind(("127.0.0.1", 0))
@@ -415,12 +424,33 @@ def refused(address: str, headers: dict) -> int:
         return error.code
 
 
+def reflected(address: str, headers: dict) -> str | None:
+    """The origin that an answer lets read it, whether the page asks for leave first or reads at once."""
+    for method in ("OPTIONS", "GET"):
+        more = {"Access-Control-Request-Method": "POST"} if method == "OPTIONS" else {}
+        request = urllib.request.Request(address, headers=headers | more, method=method)
+        try:
+            with urllib.request.urlopen(request, timeout=20) as answer:
+                origin = answer.headers.get("Access-Control-Allow-Origin")
+        except urllib.error.HTTPError as error:
+            origin = error.headers.get("Access-Control-Allow-Origin")
+        if origin:
+            return origin
+    return None
+
+
 FOREIGN = [
     ({}, 400),
     ({"Host": "evil.example"}, 403),  # a name that was made to lead here
     ({"Host": "192.168.1.7"}, 403),
     ({"Origin": "https://evil.example"}, 403),  # a page from elsewhere, in the same browser
     ({"Origin": "null"}, 403),
+    ({"Origin": "http://localhost:1"}, 403),  # a page of another server on this computer
+    ({"Origin": "http://127.0.0.1"}, 403),
+    ({"Origin": "http://[::1]:PORT"}, 403),
+    ({"Origin": "https://localhost:PORT"}, 403),
+    ({"Origin": "http://localhost:PORT"}, 400),  # its own
+    ({"Origin": "http://127.0.0.1:PORT"}, 400),
 ]
 
 
@@ -451,6 +481,9 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
         with urllib.request.urlopen(artifact, timeout=20) as answer:
             assert answer.read() == b"hello"
         for headers, status in FOREIGN:
+            headers = {name: value.replace("PORT", str(port)) for name, value in headers.items()}
+            if status == 403:
+                assert reflected(f"http://127.0.0.1:{port}/ajax-api/2.0/mlflow/experiments/search", headers) is None
             assert refused(f"http://127.0.0.1:{port}/api/2.0/mlflow/experiments/create", headers) == status, headers
         with pytest.raises(UserError, match=f"port {port} on 127.0.0.1 cannot be used"):
             serve(uri, port=port)

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from nasty import NASTY
 
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, make
@@ -277,10 +278,22 @@ def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(chosen, tm
     values = {s.name: 0.1 for s in chosen.balance.sizes}
     values |= {s.name: s.grid[0] for s in chosen.signal.shapes}
     path = tmp_path / "proposed_effect.py"
-    path.write_text(generate.source(chosen, values, "event1"))
+    path.write_text(generate.source(chosen, values, "event1"), encoding="utf-8")
     effect = _loaded(path, monkeypatch).ProposedEffect()
     assert base().acceptance(effect).refusal is None
     assert [p.name for p in effect.parameters] == list(generate.parameters_of(chosen))
+
+
+def test_a_name_of_a_record_is_text_in_the_plugin_that_is_to_be_installed(tmp_path, monkeypatch):
+    chosen = _every_balance_and_signal()[0]
+    values = {s.name: 0.1 for s in chosen.balance.sizes} | {s.name: s.grid[0] for s in chosen.signal.shapes}
+    monkeypatch.chdir(tmp_path)
+    for k, name in enumerate(NASTY):
+        path = tmp_path / f"{k}.py"
+        path.write_text(generate.source(chosen, values, name), encoding="utf-8")
+        name = name.encode(errors="backslashreplace").decode()
+        assert f"workflow from {name}; no textbook" in _loaded(path, monkeypatch).ProposedEffect.__doc__
+    assert not (tmp_path / "owned").exists()
 
 
 def test_the_library_has_a_name_for_each_term():

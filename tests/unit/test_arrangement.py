@@ -155,6 +155,15 @@ class TestOrder:
         given = Feeder(order, tuple(3 + k for k in order), "three_phase")
         assert arranged(record, given).voltages == order
 
+    @pytest.mark.parametrize("share", [0.05, 0.38])
+    @pytest.mark.parametrize("end", [0.5, 9.0])
+    def test_a_fault_behind_the_transformers_is_judged_by_the_calm(self, share, end):
+        volts, amps = phases(np.full(len(T), KV)), load(np.full(len(T), KV))
+        fault = (T > 0.1) & (end > T)
+        volts[1, fault] *= share
+        amps[1, fault] *= 60
+        assert arranged(made(volts, amps), GIVEN).voltages == (0, 1, 2)
+
     def test_a_dead_recording_says_that_nothing_can_be_checked(self):
         record = recording(np.zeros((6, 4800)), names=PLAIN, units=UNITS)
         assert "nothing is alive" in arranged(record, GIVEN).why[-1]

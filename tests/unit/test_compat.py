@@ -117,6 +117,36 @@ def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_functi
     assert np.array_equal(np.hstack(stepwise), np.hstack(points[: len(stepwise)]))
 
 
+def test_mlflow_lets_in_every_page_of_this_computer_but_for_the_door():
+    from tractexp.compat import mlflow_own_origin as door
+    from tractexp.tracking.store import light_import
+
+    with light_import():
+        from mlflow.server import security_utils
+
+    own, other = "http://localhost:5000", "http://localhost:8888"
+    blocked = security_utils.should_block_cors_request(other, "POST", [own])
+    assert not blocked, MENDED.format("MLflow", "mlflow_own_origin")
+    served, sent = [], []
+
+    async def app(scope, receive, send):
+        served.append(scope)
+
+    async def send(message):
+        sent.append(message)
+
+    guarded = door.OwnOrigin(app, frozenset([own]))
+    for headers in ([], [(b"origin", own.encode())]):
+        asyncio.run(guarded({"type": "http", "headers": headers}, None, send))
+    asyncio.run(guarded({"type": "lifespan"}, None, send))
+    assert (len(served), sent) == (3, [])
+    for kind in ("http", "websocket"):
+        both = [(b"origin", own.encode()), (b"origin", other.encode())]
+        asyncio.run(guarded({"type": kind, "headers": both}, None, send))
+    assert len(served) == 3
+    assert [message.get("status", message.get("code")) for message in sent] == [403, None, 1008]
+
+
 def test_joblib_never_hears_of_a_dask_worker_that_was_killed_but_through_the_door():
     class KilledWorker(Exception):
         status = "error"  # a future of Dask's as well as its error

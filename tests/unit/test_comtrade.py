@@ -187,6 +187,8 @@ MENDED = {
     "count of rates": ([("\n1\n4000,40", "\n2\n4000,40")], "line 12: 2 sampling rates announced, 1 present"),
     "no count of rates": ([("\n1\n4000,40", "\n4000,40")], "line 12: the number of sampling rates is missing"),
     "no frequency": ([("\n50\n", "\n0\n")], "line 11: the nominal frequency is missing: 50 Hz, unless"),
+    "blank frequency": ([("\n50\n", "\n\n")], "line 12: the nominal frequency is missing: 50 Hz, unless"),
+    "frequency left out": ([("\n50\n", "\n")], "line 11: the nominal frequency is missing: 50 Hz, unless"),
     "no such day": (
         [("01/02/2024,10:00:00.000000", "00/00/2024,10:00:00")],
         "line 14: .* is not a day of the calendar",

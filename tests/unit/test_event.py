@@ -1,5 +1,7 @@
 """Where a dip is found, how deep, and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -286,3 +288,30 @@ class TestDirection:
         assert "no more than noise, so this is no load" in describe(
             detect(Record(name="made", t=made.t, U=made.U, P=P, Q=P))
         )
+
+
+class TestFuse:
+    """A voltage that is lost while P + jQ over U, the current, stays."""
+
+    def record(self, left, U2=None, current=1.0):
+        t = np.arange(3000) / 1000
+        U = np.where(t < 1.0, 1.0, left)
+        I = np.where(t < 1.0, 1.0, current)
+        unbalance = None if U2 is None else np.where(t < 1.0, 1e-3, U2)
+        return Record("made", t, U, 0.8 * U * I, 0.4 * U * I, U2=unbalance, source="made.csv")
+
+    @pytest.mark.parametrize(("left", "U2"), [(2 / 3, 1 / 3), (1e-3, None)])
+    def test_it_is_refused_by_its_name(self, left, U2):
+        with pytest.raises(UserError, match="while the current stays as it was: a fuse of the voltage transformers"):
+            detect(self.record(left, U2))
+
+    def test_a_fault_that_lasts_to_the_end_is_none(self):
+        made = self.record(0.79, 0.21)
+        with pytest.raises(UserError, match="the record is shorter than the dip"):
+            detect(replace(made.part(slice(0, 1250)), name="short"))
+
+    @pytest.mark.parametrize(("left", "U2"), [(2 / 3, 1 / 3), (1e-3, None)])
+    def test_a_current_that_goes_with_the_voltage_is_none(self, left, U2):
+        with pytest.raises(UserError) as refusal:
+            detect(self.record(left, U2, current=0.5))
+        assert "fuse" not in str(refusal.value)

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 from field_waves import KA, dip, load, noise, phases, recording, wave
 
+import tractexp
+from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.recording import propose
 from tractexp.recording.label import groups, order
@@ -99,6 +101,86 @@ def test_where_names_do_not_tell_the_bus_the_currents_do():
     [feeder] = propose(recording([*V, *wave(T, phases(other)), *wave(T, load(other))], names=names))
     assert feeder.voltages == (3, 4, 5)
     assert "follow these voltages best" in feeder.why[1]
+
+
+class TestWhichVoltages:
+    NAMES = (*(f"{bus} U{p}" for bus in ("W1", "W2") for p in "abc"), "Ia", "Ib", "Ic")
+
+    def two(self, other, current=I, names=NAMES):
+        units = ["kV"] * 6 + ["kA"] * 3
+        return propose(recording([*V, *other, *current], names=names, units=units))
+
+    @pytest.mark.parametrize("dead", [noise((3, len(T)), 1e-4), 5e-4 * V, np.zeros_like(V)])
+    def test_a_load_has_no_dead_voltages_whatever_their_name(self, dead):
+        names = [*(f"bus U{p}" for p in "abc"), *(f"QF2 U{p}" for p in "abc"), *(f"QF1 I{p}" for p in "abc")]
+        (feeder,) = self.two(dead, names=names)
+        assert (feeder.voltages, feeder.loaded) == ((0, 1, 2), True)
+        assert "the only ones alive" in feeder.why[1]
+
+    @pytest.mark.parametrize("turn", [0.0, np.pi / 6])
+    def test_both_sides_of_a_transformer_are_asked_for_with_their_powers(self, turn):
+        found = self.two(wave(T, phases(0.25 * dip(T) * np.exp(1j * turn))))
+        assert [(f.voltages, f.currents, f.loaded) for f in found] == [
+            ((0, 1, 2), (6, 7, 8), True), ((3, 4, 5), (6, 7, 8), True),
+        ]  # fmt: skip
+        assert found[0].question == found[1].question
+        assert "110 kV, P = 33 MW, Q = 19.05 Mvar" in found[0].question
+        assert "27.5 kV, P = " in found[0].question
+        assert len({f.name for f in found}) == 2
+
+    def test_a_bus_that_the_currents_follow_is_taken_though_two_others_have_names_more_alike(self):
+        other = wave(T, phases(0.02 * dip(T, start=0.2, end=0.3)))
+        names = [f"{bus} U{p}" for bus in ("main", "QF2 out", "QF3 out") for p in "abc"] + [
+            f"QF1 out I{p}" for p in "abc"
+        ]
+        waves = [*V, *other, *(1.2 * other), *I]
+        (feeder,) = propose(recording(waves, names=names, units=["kV"] * 9 + ["kA"] * 3))
+        assert feeder.voltages == (0, 1, 2)
+
+    def test_where_names_say_nothing_every_bus_that_the_currents_may_follow_is_a_candidate(self):
+        volts = [f"{bus} U{p}" for bus in ("main", "QF2 out", "QF3 out") for p in "abc"]
+        names = [*volts, *(f"QF1 out I{p}" for p in "abc")]
+        waves = [*V, *(0.01 * V), *(0.008 * np.roll(V, 1, axis=0)), *I]
+        found = propose(recording(waves, names=names, units=["kV"] * 9 + ["kA"] * 3))
+        assert {f.voltages for f in found} == {(0, 1, 2), (3, 4, 5), (6, 7, 8)}
+        assert "110 kV, P = 33 MW" in found[0].question
+
+    def test_names_that_say_it_are_believed(self):
+        names = [*(f"{side} U{p}" for side in ("HV", "LV") for p in "abc"), *(f"LV I{p}" for p in "abc")]
+        (feeder,) = self.two(wave(T, phases(0.25 * dip(T))), names=names)
+        assert (feeder.voltages, feeder.question) == ((3, 4, 5), "")
+
+    def test_two_transformers_on_one_bus_are_no_question(self):
+        (feeder,) = self.two(1.001 * V)
+        assert (feeder.voltages, feeder.question) == ((0, 1, 2), "")
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("HCSA", "HCSB", "HCSC", "HCSA  -HVS1A", "HCSB  -HVS1B", "HCSC  -HVS1C"),
+        ("BUSA1", "BUSB1", "BUSC1", "LOADA1", "LOADB1", "LOADC1"),
+        ("UA1-UA2", "UB1-UB2", "UC1-UC2", "IA1-IA2", "IB1-IB2", "IC1-IC2"),
+        ("NodeR", "NodeS", "NodeT", "NodeR:LoadR", "NodeS:LoadS", "NodeT:LoadT"),
+    ],
+)
+def test_marks_may_stand_after_a_word_before_a_digit_and_twice(names):
+    uneven = I * np.array([1, 1.2, 0.7])[:, None]  # which equal sizes do not show
+    turn = [0, 2, 1, 3, 5, 4]
+    (feeder,) = propose(recording([*V, *uneven], names=names, units=["kV"] * 3 + ["kA"] * 3))
+    assert (feeder.voltages, feeder.currents) == ((0, 1, 2), (3, 4, 5))
+    (feeder,) = propose(
+        recording(np.array([*V, *uneven])[turn], names=[names[i] for i in turn], units=["kV"] * 3 + ["kA"] * 3)
+    )
+    assert (feeder.voltages, feeder.currents) == ((0, 2, 1), (3, 5, 4))
+    assert order([Channel(name, np.zeros(3)) for name in names[3:]]) == ((0, 1, 2), False)
+
+
+def test_two_control_signals_are_no_load():
+    signals = np.array([0.3 * I[1], 0.3 * I[2]])
+    names = ["Ua", "Ub", "Uc", "Ia", "Ib", "Ic", "ctrl V", "ctrl W"]
+    (feeder,) = propose(recording([*V, *I, *signals], names=names, units=["kV"] * 3 + ["kA"] * 5))
+    assert feeder.currents == (3, 4, 5)
 
 
 def test_line_voltages_and_two_of_them_and_two_transformers():
@@ -235,3 +317,13 @@ def test_the_feeders_of_the_110_kv_station(shared_data):
     assert found[15, 16, 17].voltages == (4, 5, 6)
     assert found[19, 20, 21].voltages == (0, 1, 2)
     assert not found[23, 24, 25].loaded
+
+
+def test_a_reader_asks_which_voltages_a_load_has(tmp_path):
+    whole = recording(
+        [*V, *wave(T, phases(0.25 * dip(T))), *I], names=TestWhichVoltages.NAMES, units=["kV"] * 6 + ["kA"] * 3
+    )
+    comtrade.write(whole, tmp_path / "sides.cfg", "ASCII", 1999)
+    with pytest.raises(UserError, match=r"cannot be told: .*110 kV, P = 33.* or .*27.5 kV, P = .*choose one: "):
+        tractexp.read(tmp_path / "sides.cfg")
+    assert len(tractexp.look(tmp_path / "sides.cfg").feeders) == 2

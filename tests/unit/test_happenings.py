@@ -310,3 +310,57 @@ def test_the_pole_slip_of_the_110_kv_station(shared_data):
     events = of(record, Feeder((0, 1, 2), (19, 20, 21), "three_phase"))
     assert {event.kind for event in events} == {"pole slip"}
     assert sum(event.end - event.start for event in events) > 14
+
+
+class TestLoadsAndFuses:
+    """What happens beside the network: the load, or what measures it."""
+
+    def test_a_load_that_is_switched_off_is_an_event(self):
+        t = grid(3.0)
+        [event] = seen(t, phases(KV + 0 * t), load(KV + 0 * t) * np.where(t < 0.9, 1.0, 1e-4))
+        assert (event.kind, event.worth) == ("load loss", False)
+        assert event.start == pytest.approx(0.9, abs=0.015)
+        assert event.before[0] == pytest.approx(3 * KV * KA * np.cos(np.pi / 6), rel=0.01)
+        assert abs(event.after[0]) < 0.05
+
+    @pytest.mark.parametrize("share", [0.5, 1.6])
+    def test_part_of_a_load_is_a_step(self, share):
+        t = grid(3.0)
+        [event] = seen(t, phases(KV + 0 * t), load(KV + 0 * t) * np.where(t < 0.9, 1.0, share))
+        assert event.kind == "load step"
+        assert event.after[0] / event.before[0] == pytest.approx(share, rel=0.02)
+
+    def test_the_powers_of_a_dip_are_those_between_the_steps_of_its_load(self):
+        t = grid(3.0)
+        V = KV * np.where((t >= 1.2) & (t < 1.4), 0.7, 1.0)
+        factor = np.where(t < 0.9, 3.0, np.where(t < 1.7, 1.0, 0.0))
+        events = seen(t, phases(V), load(V) * factor)
+        assert [event.kind for event in events] == ["load step", "dip", "load loss"]
+        P = 3 * KV * KA * np.cos(np.pi / 6)
+        np.testing.assert_allclose([events[1].before[0], events[1].after[0]], P, rtol=0.01)
+
+    @pytest.mark.parametrize(("lost", "back"), [((0,), 9.0), ((1, 2), 9.0), ((0, 1, 2), 9.0), ((0, 1, 2), 1.7)])
+    def test_a_voltage_that_is_lost_while_the_currents_stay_is_a_fuse(self, lost, back):
+        t = grid(3.0)
+        left = np.ones((3, len(t)))
+        left[list(lost)] = np.where((t < 0.8) | (t >= back), 1.0, 1e-3)
+        [event] = seen(t, phases(KV + 0 * t) * left, load(KV + 0 * t))
+        assert (event.kind, event.worth) == ("blown fuse", False)
+        assert event.end == pytest.approx(min(back, 2.99), abs=0.03)
+        assert "a fuse of the voltage transformers" in event.why
+
+    def test_a_line_that_is_dead_with_its_current_is_no_fuse(self):
+        t = grid(3.0)
+        V = KV * np.where(t < 0.8, 1.0, 1e-4)
+        [event] = seen(t, phases(V), load(V))
+        assert event.kind == "dead line"
+        assert event.end > 2.9
+
+    def test_a_fault_of_one_phase_is_no_fuse(self):
+        t = grid(3.0)
+        fault = (t >= 0.8) & (t < 0.95)
+        left = np.ones((3, len(t)))
+        left[0, fault] = 0.05
+        V = phases(KV + 0 * t) * left
+        [event] = seen(t, V, load(KV + 0 * t) * np.where(fault, np.array([[0.3], [0.9], [1.1]]), 1.0))
+        assert event.kind == "dip"

@@ -73,3 +73,16 @@ def names(node: ast.AST) -> list[str]:
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     return [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
+
+
+def test_one_module_quotes():
+    """`tractexp/quoting.py`: what quotes for a language elsewhere would be a second door."""
+    sources = [*PACKAGE.rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
+    imports = {
+        f"{path.relative_to(ROOT)}: {name}"
+        for path in sources
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for name in names(node)
+        if name.split(".")[0] in ("html", "shlex") and path != PACKAGE / "quoting.py"
+    }
+    assert imports == set()

@@ -1,9 +1,14 @@
 """Names of files and channels on the command line as they stand: what Hydra reads of them is what was meant."""
 
+import shlex
+
 import pytest
 from hydra.core.override_parser.overrides_parser import OverridesParser
+from nasty import NASTY
+from omegaconf import OmegaConf
 
-from tractexp.overrides import override
+from tractexp.errors import UserError
+from tractexp.overrides import assigned, override, overrides, survey_of, typed
 
 FILES = [
     "站北.cfg", "name (1).cfg", "a=b.cfg", "Ф1 #2.cfg", "{x}.cfg", "it's.cfg", "~/x.cfg", "[1].cfg", "a b.cfg",
@@ -59,3 +64,33 @@ def test_a_setting_that_takes_names_of_its_own_is_added():
     assert override(columns) == f"++{columns}"
     assert override("data.columns.U=Voltage (kV)") == "++data.columns.U='Voltage (kV)'"
     assert override("data.units.t=ms") == "++data.units.t=ms"
+
+
+def composed(words):
+    """The values that arguments have in a configuration."""
+    for word in overrides(words):
+        yield OmegaConf.to_container(OmegaConf.create({"a": read(word)}), resolve=True)["a"]
+
+
+@pytest.mark.parametrize("name", [name for name in NASTY if name and name.isprintable() and name != "???"])
+def test_a_command_that_is_printed_means_the_name_that_it_holds(name):
+    printed = shlex.split(typed({"name": "csv", "path": name, "train": [name, "b"]}))
+    assert [*composed(printed[1:])] == ["csv", name, [name, "b"]]
+    *_, path = shlex.split(survey_of(name))
+    assert [*composed([path])] == [name]
+
+
+@pytest.mark.parametrize("name", [name for name in NASTY if name and not name.isprintable()])
+def test_a_name_that_cannot_be_printed_is_refused_in_one_line(name):
+    with pytest.raises(UserError) as refused:
+        overrides([assigned("data.path", name)])
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_an_interpolation_that_is_typed_stays_one_but_not_where_a_file_is_called_so(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PLACE", "there")
+    name = "${oc.env:PLACE} (1).csv"
+    assert [*composed([f"data.path={name}"])] == ["there (1).csv"]
+    (tmp_path / name).touch()
+    assert [*composed([f"data.path={name}"])] == [name]

@@ -139,3 +139,43 @@ def test_channels_of_the_220_kv_station(shared_data):
     assert voltage.thd < 0.005
     assert current.bits < 9  # a current transformer of 800 A that carries 75 A
     assert "no waveform" in quality(made, 4, made.segments[1]).fit
+
+
+class TestCalm:
+    """Quality is that of the state before anything happens, however short it is and whatever comes after it."""
+
+    def faulted(self, start, factor, decay, seed=0):
+        after = start <= T
+        fault = np.where(after, factor * (1 + 0.5 * np.exp(-(T - start) / decay)), 1.0)
+        offset = np.where(after, factor / 2 * np.exp(-(T - start) / decay), 0.0) * np.sqrt(2) * KV
+        return of(CLEAN * fault + offset + KV * noise(len(T), 1e-3, seed))
+
+    @pytest.mark.parametrize("start", [0.045, 0.07, 0.1, 0.5])
+    @pytest.mark.parametrize(("factor", "decay"), [(0.1, 0.05), (0.4, 1e3)])
+    def test_a_voltage_before_a_fault(self, start, factor, decay):
+        made = self.faulted(start, factor, decay)
+        assert made.level == pytest.approx(KV, rel=2e-3)
+        assert made.noise == pytest.approx(1e-3 * KV, rel=0.5)
+        assert made.fit == "fit for phasors and for waves"
+
+    @pytest.mark.parametrize("start", [0.045, 0.07, 0.1, 0.5])
+    @pytest.mark.parametrize("factor", [5.0, 28.0, 60.0])
+    def test_a_load_current_before_a_fault_current(self, start, factor):
+        after = start <= T
+        fault = np.where(after, factor * (1 + 0.5 * np.exp(-(T - start) / 0.08)), 1.0)
+        values = 0.35 / KV * CLEAN * fault + np.where(after, 10 * np.exp(-(T - start) / 0.06), 0.0)
+        channel = Channel("Ia", values + 3e-4 * noise(len(T), 1.0, 1), "kA", "current")
+        made = quality(
+            Recording("made.cfg", [channel], [Segment(0, len(T), RATE, 0.0)]), 0, Segment(0, len(T), RATE, 0)
+        )
+        assert made.level == pytest.approx(0.35, rel=5e-3)
+        assert made.noise == pytest.approx(3e-4, rel=0.5)
+        assert made.fit == "fit for phasors and for waves"
+
+    def test_a_load_before_it_is_switched_off(self):
+        made = of(np.where(T < 0.2, CLEAN, 0.0) + KV * noise(len(T), 1e-4, 0))
+        assert made.level == pytest.approx(KV, rel=1e-3)
+
+    def test_a_line_that_is_dead_at_first_is_judged_where_it_is_alive(self):
+        made = of(np.where(T < 0.5, 0.02 * CLEAN, CLEAN) + KV * noise(len(T), 1e-4, 0))
+        assert made.level == pytest.approx(KV, rel=1e-3)

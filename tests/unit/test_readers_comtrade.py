@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.plugin import build
@@ -352,3 +353,21 @@ class TestRealRecordings:
         made = measure(recording.matrix(chosen, segment), segment.rate, 60.0)
         assert np.abs(made.V1).mean() * np.sqrt(3) == pytest.approx(0.6, rel=0.05)  # kV: a 600 V feeder
         np.testing.assert_allclose(made.f, 60, atol=0.1)
+
+
+def test_a_file_whose_time_multiplier_is_wrong_says_so(tmp_path):
+    t = np.arange(4800) / 3200
+    path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4)]), [(0, 4800)], stamps=t)
+    text = path.read_text().rstrip().rsplit("\n", 1)[0] + "\n1000\n"
+    path.write_text(text)
+    with pytest.raises(UserError, match=r"sampled at 3.2 Hz: no waveform, .*the time multiplier 1000; if"):
+        build("data", {"name": "comtrade", "path": str(path)}).read()
+    (file,) = tractexp.look(path).files
+    assert any("no load was recognised: sampled at 3.2 Hz" in note for note in file["notes"])
+
+
+def test_a_file_without_voltages_says_so(tmp_path):
+    t = np.arange(4800) / 3200
+    path = write(tmp_path, waveforms(t, 50.0, []), [(3200, 4800)], names=[f"n{k}" for k in range(6)], units=["Hz", "A"])
+    with pytest.raises(UserError, match=r"no channel is a voltage by its unit, of which there are 'A', 'Hz', or"):
+        build("data", {"name": "comtrade", "path": str(path)}).read()

@@ -68,6 +68,11 @@ def noted(record, *words):
     return next(note for note in record.notes if all(word in note for word in words))
 
 
+def says(record, *words):
+    """Whether one note has all those words."""
+    return any(all(word in note for word in words) for note in record.notes)
+
+
 class TestNamesAndUnits:
     @pytest.mark.parametrize(
         "header",
@@ -131,6 +136,97 @@ class TestNamesAndUnits:
             read(content)
         same(read(content, units={"P": "MW", "Q": "Mvar"}))
         same(read(content, base_voltage=27.5, base_power=20.0))
+
+    @pytest.mark.parametrize("header", ["t,U [kV],P [kW],Q", "t,U [kV],P,Q [Mvar]"])
+    def test_powers_of_which_one_has_no_unit_are_asked_for(self, header):
+        with pytest.raises(UserError, match=r"has no unit, and other columns of P and Q have one; say them, .*Q: Mvar"):
+            read(text(in_units(), header))
+
+    @pytest.mark.parametrize("header", ["t [kV],U,P,Q", "t,U [kV],P [Hz],Q", "t,U [s],P,Q"])
+    def test_a_unit_of_another_quantity_is_refused(self, header):
+        with pytest.raises(UserError, match=r"is no unit; say another column, .*data.units=\{"):
+            read(text(in_units(), header))
+
+    @pytest.mark.parametrize(
+        ("units", "by"),
+        [
+            ({"U": "volts", "P": "MW", "Q": "Mvar"}, 1.0),  # 27.5 V
+            ({"U": "kV", "P": "MW", "Q": "Mvar"}, 1e3),  # 27,500 kV
+        ],
+    )
+    def test_a_load_that_no_network_feeds_ends_in_a_question(self, units, by):
+        with pytest.raises(UserError, match=r"before the first dip is .*say .*data.units=\{U: "):
+            read(text(in_units() * [1, by, 1, 1]), units=units)
+        assert read(text(in_units() * [1, 1e3, 1, 1]), units=units | {"U": "V"}).base.voltage == pytest.approx(27.5)
+
+    @pytest.mark.parametrize(("f", "nominal"), [(59.9, 60), (60.02, 60), (49.8, 50), (16.7, 50 / 3)])
+    def test_the_frequency_recorded_says_which_is_nominal(self, f, nominal):
+        table = np.column_stack([in_units(), np.full(400, f)])
+        record = read(text(table, "t,U [kV],P [MW],Q [Mvar],f [Hz]"))
+        assert record.base.frequency == pytest.approx(nominal)
+        assert (record.f == f).all()
+        assert says(record, "is taken for nominal") == (nominal != 50)
+
+    @pytest.mark.parametrize(("header", "f"), [("FREQ 101", 0.0), ("f", -0.02), ("df [mHz]", 15.0), ("f", 1.0)])
+    def test_a_deviation_is_no_frequency(self, header, f):
+        record = read(text(np.column_stack([dip(), np.full(400, f)]), f"t,U,P,Q,{header}"))
+        assert record.f is None
+        assert header == "df [mHz]" or noted(record, "a deviation from the nominal frequency", "not used")
+        same(record)
+
+    def test_a_frequency_per_unit_is_said_to_be_one(self):
+        table = np.column_stack([dip(), np.full(400, 0.998)])
+        assert read(text(table, "t,U,P,Q,f [pu]")).f[0] == pytest.approx(49.9)
+        assert read(text(table, "t,U,P,Q,f"), units={"f": "pu"}).f[0] == pytest.approx(49.9)
+
+    @pytest.mark.parametrize(
+        ("header", "says"),
+        [
+            (
+                "time,SFS_UfRel,SFS_UgRel,SFS_PRel",
+                r"say which is which: .*\{U: \.\.\., P: \.\.\., Q: \.\.\.\}",
+            ),
+            (
+                "time,voltage_A,real_power,reactive_power",
+                r"if voltage_A is meant, say so: .*\{U: 'voltage_A'",
+            ),
+            ("time,U,Pa,x", r"column P, Q is missing; .*if Pa is meant, say so: data.columns=\{P: 'Pa', Q: \.\.\.\}"),
+            ("C1MAG,U,P,x", r"column t, Q is missing; .*: data.columns=\{t: 'C1MAG', Q: \.\.\.\}"),
+        ],
+    )
+    def test_a_hint_names_what_is_of_the_quantity_or_nothing(self, header, says):
+        with pytest.raises(UserError, match=says):
+            read(text(header=header))
+
+    def test_a_hint_on_a_name_given_is_no_column_of_another_quantity(self):
+        with pytest.raises(UserError, match=r"has no such column\. Columns: t, Voltage, I_MAG, Q"):
+            read(text(header="t,Voltage,I_MAG,Q"), columns={"U": "C_MAG"})
+
+    @pytest.mark.parametrize("header", ["t,v Bus 5,Ppq PQ 5,Qpq PQ 5", "Time(s),VOLT 5,POWR 5 TO 6,VARS 5 TO 6"])
+    def test_the_names_of_simulators(self, header):
+        same(read(text(header=header)))
+
+    def test_a_column_can_be_left_out(self):
+        table = np.column_stack([dip(), np.full(400, 33.0)])
+        with pytest.raises(UserError, match=r"f = 33 .*data.columns=\{f: null\}"):
+            read(text(table, "t,U,P,Q,f"))
+        assert read(text(table, "t,U,P,Q,f"), columns={"f": None}).f is None
+
+    def test_a_load_counted_out_of_itself_is_refused_and_turned_by_the_setting(self):
+        t, U, P, Q = dip().T
+        turned = text(np.column_stack([t, U, -P * U, -Q]))
+        with pytest.raises(UserError, match=r"P is -0.8 before the first dip: .*set data.reverse_current=true"):
+            read(turned)
+        assert read(turned, reverse_current=True).P[0] == pytest.approx(0.8)
+
+    def test_powers_that_may_be_exchanged_are_said_to_be_so(self):
+        t, U, P, Q = dip().T
+        assert noted(read(text(np.column_stack([t, U, Q, P]))), "may be exchanged (data.columns={P: ...")
+        assert not says(read(text()), "exchanged")
+
+    def test_a_base_in_volts_is_refused(self):
+        with pytest.raises(UserError, match=r"base_voltage=27500.* at most 1500"):
+            read(text(in_units() * [1, 1e3, 1, 1]), base_voltage=27500.0, base_power=20.0)
 
     def test_a_phase_voltage_is_said_to_be_taken_as_such(self):
         record = read(text(in_units() / [1, np.sqrt(3), 1, 1], "t,Ua [kV],P [MW],Q [Mvar]"), columns={"U": "Ua"})
@@ -196,6 +292,10 @@ class TestNamesAndUnits:
             ({"columns": {"U": 9}}, "dip.csv has 4 columns, counted from 0"),
             ({"units": {"U": "parsec"}}, "data.units: U=parsec is not a unit"),
             ({"units": {"X": "kV"}}, "data.units names 'X'"),
+            ({"units": {"t": "kV"}}, "data.units: t=kV is no unit of t; one is s, ms"),
+            ({"units": {"U": "MW"}}, "data.units: U=MW is no unit of U; one is kV, V, pu"),
+            ({"units": {"P": "Mvar"}}, "data.units: P=Mvar is no unit of P"),
+            ({"units": {"angle": "Hz"}}, "data.units: angle=Hz is no unit of angle"),
             ({"decimal": ";"}, "data.decimal=; is not one of"),
             ({"header": 0}, "data.header=0 is no line"),
             ({"header": 300}, "there are no rows of numbers below the header line|column t"),
@@ -320,6 +420,16 @@ class TestTimes:
     def test_date_and_time_may_stand_in_two_columns(self):
         rows = [f"2024-01-31,{_clock(3600 + t)},{U},{P},{Q}" for t, U, P, Q in dip().tolist()]
         same(read("\n".join(["Date,Time,U,P,Q", *rows])), atol=2e-6)
+
+    @pytest.mark.parametrize("power", [0, 3, 6, 9])
+    def test_digits_say_what_is_counted_since_1970(self, power):
+        table = dip()
+        first = 17 * 10 ** (8 + power)
+        rows = [f"{first + round(t * 10**power)}" if power else f"{first + t:.3f}" for t in table[:, 0]]
+        lines = [f"{t},{U:.6g},{P:.6g},{Q:.6g}" for t, (_, U, P, Q) in zip(rows, table, strict=True)]
+        record = read("\n".join(["timestamp,U,P,Q", *lines]))
+        assert record.step == pytest.approx(0.005, rel=1e-4)
+        assert power == 0 or says(record, f"t is in {['ms', 'us', 'ns'][power // 3 - 1]} since 1970")
 
     def test_the_day_is_told_in_a_note(self):
         rows = [f"2024-01-31T12:00:0{t:.3f},{U},{P},{Q}" for t, U, P, Q in dip().tolist()]
@@ -493,6 +603,46 @@ class TestPhasors:
         same(record, atol=1e-5)
         assert (record.f == 49.98).all()
         assert record.U2 is None
+
+    @pytest.mark.parametrize("units", [("[kV]", ""), ("", "[A]"), ("[pu]", "[A]"), ("[V]", "")])
+    def test_units_of_one_quantity_alone_are_no_answer(self, units):
+        t, V1, _, I1 = self.stream()
+        table = [t, 0.4 * np.abs(V1) / np.abs(V1[0]), np.angle(V1), np.abs(I1), np.angle(I1)]
+        with pytest.raises(UserError, match=r"say the units, e.g. data.units=\{U: kV, I: A\}"):
+            read(text(np.column_stack(table), f"t,V1 {units[0]},V1 angle [rad],I1 {units[1]},I1 angle [rad]"))
+
+    def test_a_kilovolt_without_a_unit_is_not_per_unit(self):
+        t, V1, _, I1 = self.stream()
+        table = [t, 1200 * np.abs(V1) / np.abs(V1[0]), np.angle(V1), np.abs(I1), np.angle(I1)]
+        record = read(text(np.column_stack(table), "t,V1,V1 angle [rad],I1,I1 angle [rad]"))
+        assert record.base.voltage == pytest.approx(1.2 * np.sqrt(3))
+
+    def test_the_names_of_a_micro_pmu(self):
+        t, V1, _, I1 = self.stream()
+        table = [t, np.abs(V1), np.degrees(np.angle(V1)), np.abs(I1), np.degrees(np.angle(I1))]
+        record = read(text(np.column_stack(table), "t,L1MAG,L1ANG,C1MAG,C1ANG"), units={"angle": "deg"})
+        same(record, atol=1e-5)
+        assert says(record, "U1 = 'L1MAG'", "I1_angle = 'C1ANG'")
+
+    @pytest.mark.parametrize(
+        ("name", "size", "said"),
+        [
+            ("V", 1.0, "taken as phase to ground: times sqrt(3) it is 27.5 kV"),
+            ("V", np.sqrt(3), "taken as line to line: 27.5 kV"),
+            ("V LL", np.sqrt(3), ""),
+            ("V LL", 0.9 * np.sqrt(3), ""),
+            ("V1", 0.9, ""),
+        ],
+    )
+    def test_one_voltage_is_line_or_phase_by_its_name_or_its_size(self, name, size, said):
+        t, V1, _, I1 = self.stream()
+        table = np.column_stack([t, size * np.abs(V1), np.angle(V1), np.abs(I1), np.angle(I1)])
+        record = read(text(table, f"t,{name} [V],{name} angle [rad],I [A],I angle [rad]"))
+        by = size / (np.sqrt(3) if size > 1 else 1)
+        assert record.base.voltage == pytest.approx(27.5 * by)
+        assert record.base.power == pytest.approx(20.0 * by)
+        assert says(record, "taken as") == bool(said)
+        assert says(record, said)
 
     def test_line_voltages_are_taken_to_phases(self):
         t, V1, _, I1 = self.stream()

@@ -2,12 +2,12 @@
 
 import dataclasses
 import functools
-import html
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tractexp import quoting
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
 from tractexp.choices import choices, defaults, replaced
@@ -81,7 +81,7 @@ class LoadModel(Portable, Tabulated):
         return Table(["parameter", "default", "unit", "bounds", "meaning"], rows, self.model.title)
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + "".join(f"<p>$${html.escape(line)}$$</p>" for line in self.model.latex())
+        return super()._repr_html_() + "".join(f"<p>$${quoting.html(line)}$$</p>" for line in self.model.latex())
 
     def _repr_latex_(self) -> str:
         return "\n\n".join(f"$${line}$$" for line in self.model.latex())

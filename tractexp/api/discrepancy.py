@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.api.arguments import public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
@@ -425,5 +425,5 @@ class Discrepancy(Task, call=investigate):
         ]
         return {
             "name": f"{result.verdict} {' '.join(result.names)}".strip(), "metrics": metrics, "children": children,
-            "description": result.reason, "model": job.folder / "result.json",
+            "description": quoting.markdown(result.reason), "model": job.folder / "result.json",
         }  # fmt: skip

@@ -18,7 +18,9 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
+from tractexp.recording.feeder import unrecognised
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
+from tractexp.recording.recording import unit_of
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -42,7 +44,9 @@ class Listed(Tabulated):
     def to_frame(self) -> Any:
         import pandas
 
-        return pandas.DataFrame(list(self.rows))
+        frame = pandas.DataFrame(list(self.rows))
+        unknown = [name for name in frame if all(row[name] is None for row in self.rows)]
+        return frame.astype(dict.fromkeys(unknown, float))  # what no row has is nan, as where some rows have it
 
 
 def _cell(value: Any) -> Any:
@@ -251,7 +255,8 @@ def _content(view: View) -> dict[str, Any]:
             "frequency": made.frequency, "rates": [s.rate for s in made.segments],
             "seconds": last.start + (last.stop - last.first) / last.rate,
             "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in made.segments],
-            "notes": list(made.notes), "channels": [_channel(view, number) for number in range(len(made.channels))],
+            "notes": [*made.notes, *([] if view.sights else [f"no load was recognised: {unrecognised(made)}"])],
+            "channels": [_channel(view, number) for number in range(len(made.channels))],
         }  # fmt: skip
     known["measured_frequency"] = view.frequency
     return known | {"feeders": [_feeder(view, shown) for shown in view.sights]}
@@ -264,7 +269,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
     return {
         "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
         "quantity": channel.quantity, "magnitude": told.level,
-        "primary_unit": {"voltage": "kV", "current": "kA"}.get(channel.quantity, channel.unit),
+        "primary_unit": {"voltage": "kV", "current": "kA"}.get(unit_of(channel.unit)[0], channel.unit),
         "noise_share": share, **asdict(told),
     }  # fmt: skip
 
@@ -278,10 +283,11 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
             "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
             "currents": list(feeder.currents),
             "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
-            "reverse_current": feeder.reverse_current, "why": list(feeder.why),
+            "reverse_current": feeder.reverse_current, "why": list(feeder.why), "loaded": feeder.loaded,
         }  # fmt: skip
     else:
-        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": []}
+        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": [],
+                 "loaded": True}  # fmt: skip
     U, P, Q = told or (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return made | {

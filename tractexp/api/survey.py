@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
 from tractexp.api.surveying import keys, looked
@@ -101,9 +101,13 @@ class Surveyed(Written):
         frame = self.to_frame()
         return [
             files.write_json(folder / "survey.json", self.content),
-            files.write(folder / "survey.csv", frame.to_csv(index=False)),
+            files.write(folder / "survey.csv", frame.map(_cell).to_csv(index=False)),
             files.write(folder / "survey.parquet", frame.to_parquet(index=False)),
         ]
+
+
+def _cell(value: Any) -> Any:
+    return quoting.cell(value) if isinstance(value, str) else value
 
 
 @public

@@ -10,7 +10,7 @@ from pathlib import Path
 from types import UnionType
 from typing import Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
 
-from tractexp import provenance
+from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
@@ -110,7 +110,9 @@ class Task(Plugin):
 
     def run(self, job: "Job") -> None:
         """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
-        self.conclude(job, self.perform(job))
+        result = self.perform(job)
+        job.begin()
+        self.conclude(job, result)
 
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
@@ -169,6 +171,10 @@ def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
     return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
+def _nothing() -> None:
+    """What a job begins with whose folder was emptied before."""
+
+
 @dataclass(frozen=True)
 class Job:
     """One run: its configuration as plain data, and the folder it writes to."""
@@ -181,6 +187,7 @@ class Job:
     given: Mapping[str, str] = field(
         default_factory=dict
     )  # what the user chose, {"optimizer": "pso"}: not the defaults
+    begin: Callable[[], None] = _nothing  # before the first result is written: those of an earlier run go
 
     @functools.cached_property
     def events(self) -> Any:
@@ -295,8 +302,10 @@ class Job:
     @property
     def look(self) -> str:
         """The command that shows what was logged."""
-        uri = self.config["tracking"]["uri"]
-        return f"tractexp ui --uri {uri}" if uri else "tractexp ui"
+        from tractexp import tracking
+
+        uri = tracking.chosen_uri(self.config["tracking"]["uri"])
+        return quoting.shell("tractexp", "ui", *(["--uri", uri] if uri else []))
 
     def send(self, run: Any) -> None:
         """Log a run (`tracking.TrackedRun`), and say how to look at it.
@@ -316,7 +325,8 @@ class Job:
             entry.logged(run_id)
         except UserError as error:
             say(f"not logged: {error}")
-            later = "; 'tractexp sync' logs them when that is mended" if entry else ""
+            named = f", by {quoting.shell('--uri', uri)}" if (uri := self.config["tracking"]["uri"]) else ""
+            later = f"; 'tractexp sync' logs them when that is mended{named}" if entry else ""
             say(f"  the results are in {self.folder}{later}")
             return
         say(f"logged in experiment '{run.experiment}'; to see it: {self.look}")

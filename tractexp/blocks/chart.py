@@ -6,7 +6,6 @@ along. Nothing is drawn here and that package is not imported, so that a page co
 
 import base64
 import functools
-import html
 import importlib.util
 import json
 from collections.abc import Sequence
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import quoting
 from tractexp.blocks import style
 from tractexp.errors import UserError
 
@@ -133,7 +133,7 @@ class Chart:
         self._notes: list[dict[str, Any]] = []
         self._told: set[str] = set()
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
-        self._x: dict[str, Any] = {"title": {"text": html.escape(x)}, "anchor": _axis("y", len(panels) - 1)}
+        self._x: dict[str, Any] = {"title": {"text": quoting.html(x)}, "anchor": _axis("y", len(panels) - 1)}
         self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
         if log_x:
             self._x |= {"type": "log", "dtick": 1, "exponentformat": "power"}
@@ -146,7 +146,7 @@ class Chart:
         top, axes = 1.0, {}
         for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
             low = max(top - share * room, 0.0)
-            axis: dict[str, Any] = {"title": {"text": html.escape(label)}, "domain": [low, top], "ticks": "outside"}
+            axis: dict[str, Any] = {"title": {"text": quoting.html(label)}, "domain": [low, top], "ticks": "outside"}
             axis |= {"gridcolor": "#E4E4E4", "zeroline": False, "automargin": True, "linecolor": "#444"}
             if log:
                 axis |= {"type": "log", "exponentformat": "power"}
@@ -198,7 +198,7 @@ class Chart:
                 "array": (spans[:, 1] - middle).tolist(), "arrayminus": (middle - spans[:, 0]).tolist(),
             }  # fmt: skip
         if hover:
-            trace |= {"text": [html.escape(t) for t in hover], "hovertemplate": "%{text}<extra></extra>"}
+            trace |= {"text": [quoting.html(t) for t in hover], "hovertemplate": "%{text}<extra></extra>"}
         return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **trace)
 
     def bars(
@@ -207,7 +207,7 @@ class Chart:
     ) -> "Chart":  # fmt: skip
         """Horizontal bars, the first label on top."""
         self._axes[_key(panel)] |= {"autorange": "reversed", "type": "category"}
-        trace: dict[str, Any] = {"text": [html.escape(t) for t in hover], "textposition": "auto"} if hover else {}
+        trace: dict[str, Any] = {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
         return self._add(
             name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
             marker={"color": color if isinstance(color, str) else list(color)},
@@ -236,7 +236,7 @@ class Chart:
         )  # fmt: skip
         if text:
             self._notes.append(
-                {"text": html.escape(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
+                {"text": quoting.html(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
                  "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
             )  # fmt: skip
         if name and name not in self._told:
@@ -259,7 +259,7 @@ class Chart:
         if text:
             log = self._axes[_key(panel)].get("type") == "log"
             self._notes.append(
-                {"text": html.escape(text), "xref": "x domain", "x": 1, "xanchor": "right", "yref": axis,
+                {"text": quoting.html(text), "xref": "x domain", "x": 1, "xanchor": "right", "yref": axis,
                  "y": float(np.log10(y)) if log else y, "yanchor": "bottom", "showarrow": False,
                  "font": {"size": 11, "color": color}}
             )  # fmt: skip
@@ -278,7 +278,7 @@ class Chart:
     ) -> "Chart":  # fmt: skip
         """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
         axis = self._x if panel is None else self._axes[_key(panel)]
-        words = [html.escape(label) for label in labels] or [f"{v:g}" for v in at]
+        words = [quoting.html(label) for label in labels] or [f"{v:g}" for v in at]
         axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
         if labels:
             axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
@@ -300,16 +300,16 @@ class Chart:
         if "lines" not in kinds:
             layout |= {"hovermode": "closest"}
         if self._title:
-            layout["title"] = {"text": html.escape(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            layout["title"] = {"text": quoting.html(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
             if not self._legend:  # just above the panels, below the buttons
                 layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         return {"data": self._data, "layout": layout}
 
     def element(self, label: str) -> str:
         """The chart as an element of a page."""
-        data = json.dumps(self.plain(), allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+        data = quoting.script(self.plain())
         return (
-            f'<div class="chart" role="img" aria-label="{html.escape(label)}" style="height:{self._pixels}px"></div>'
+            f'<div class="chart" role="img" aria-label="{quoting.html(label)}" style="height:{self._pixels}px"></div>'
             f'<script type="application/json">{data}</script>'
         )
 
@@ -317,7 +317,7 @@ class Chart:
         shown = bool(name) and name not in self._told and not silent
         if shown:
             self._told.add(name)
-        trace = {"type": kind, "name": html.escape(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
+        trace = {"type": kind, "name": quoting.html(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
                  "yaxis": _axis("y", panel), "hovertemplate": HOVER}  # fmt: skip
         self._data.append(trace | more)
         return self
@@ -349,7 +349,7 @@ def _packed(values: np.ndarray, kind: str) -> dict[str, str]:
 
 def _listed(values: Sequence[Any] | np.ndarray) -> list[Any]:
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
-    return [html.escape(v) if isinstance(v, str) else None if v != v else v for v in plain]
+    return [quoting.html(v) if isinstance(v, str) else None if v != v else v for v in plain]
 
 
 def _faint(color: str) -> str:

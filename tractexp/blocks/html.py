@@ -5,13 +5,13 @@ equations are typeset into SVG; nothing is loaded from elsewhere.
 """
 
 import functools
-import html
 import io
 import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
 
+from tractexp import quoting
 from tractexp.blocks.block import (
     Block,
     ChartBlock,
@@ -72,7 +72,7 @@ details { margin: .8rem 0; } summary { cursor: pointer; color: #0058a0; }
 def page(report: Report) -> str:
     """A whole page that needs nothing else."""
     figures = itertools.count(1)
-    title, lead = html.escape(report.title), html.escape(report.lead)
+    title, lead = quoting.html(report.title), quoting.html(report.lead)
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
@@ -84,21 +84,29 @@ def page(report: Report) -> str:
 
 def frame(report: Report) -> str:
     """The page within another one."""
-    return f'<iframe srcdoc="{html.escape(page(report))}" style="width:100%;height:40rem;border:0"></iframe>'
+    return f'<iframe srcdoc="{quoting.html(page(report))}" style="width:100%;height:40rem;border:0"></iframe>'
 
 
 def fragment(report: Report) -> str:
-    """The blocks that a terminal shows, and equations, as elements of a notebook's page."""
-    parts = [f"<p><b>{html.escape(report.title)}</b></p>"] * bool(report.title)
-    parts += [f"<p>{html.escape(report.lead)}</p>"] * bool(report.lead)
+    """The blocks that a terminal shows, and equations, as elements of a notebook's page.
+
+    The notebook typesets what stands between dollars: equations only, whatever a name holds.
+    """
+    parts = [f"<p><b>{quoting.html(report.title)}</b></p>"] * bool(report.title)
+    parts += [f"<p>{quoting.html(report.lead)}</p>"] * bool(report.lead)
+    parts = [*map(_untypeset, parts)]
     for block in report.blocks:
         if isinstance(block, Table):
-            parts.append(_table(block.brief))
+            parts.append(_untypeset(_table(block.brief)))
         elif isinstance(block, Equation):
-            parts.append(f"<p>$${html.escape(block.latex)}$$</p>")
+            parts.append(f"<p>$${quoting.html(block.latex)}$$</p>")
         elif not isinstance(block, ChartBlock | Charts | Figure | Markup | Fold):
-            parts.append(_element(block, itertools.count(1)))
+            parts.append(_untypeset(_element(block, itertools.count(1))))
     return "\n".join(parts)
+
+
+def _untypeset(element: str) -> str:
+    return f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
 
 
 def _draws(block: Block) -> bool:
@@ -110,18 +118,18 @@ def _element(block: Block, figures: "itertools.count[int]") -> str:
     """A block as HTML; `figures` counts the drawings of a page, whose ids differ by it."""
     match block:
         case Heading(text, level):
-            return f"<h{level}>{html.escape(text)}</h{level}>"
+            return f"<h{level}>{quoting.html(text)}</h{level}>"
         case Paragraphs(texts):
-            return "\n".join(f"<p>{html.escape(text)}</p>" for text in texts)
+            return "\n".join(f"<p>{quoting.html(text)}</p>" for text in texts)
         case VerdictBlock(texts, kind):
             return f'<div class="verdict {kind}">\n{_element(Paragraphs(texts), figures)}\n</div>'
         case Items(texts):
-            return "\n".join(["<ul>", *(f"<li>{html.escape(text)}</li>" for text in texts), "</ul>"])
+            return "\n".join(["<ul>", *(f"<li>{quoting.html(text)}</li>" for text in texts), "</ul>"])
         case CodeBlock(text):
-            return f"<pre>{html.escape(text)}</pre>"  # a click selects it whole
+            return f"<pre>{quoting.html(text)}</pre>"  # a click selects it whole
         case Equation(latex):
             drawing = _typeset(latex)
-            inside = _inline(drawing, f"f{next(figures)}-", latex) if drawing else f"<code>{html.escape(latex)}</code>"
+            inside = _inline(drawing, f"f{next(figures)}-", latex) if drawing else f"<code>{quoting.html(latex)}</code>"
             return f'<div class="equation">{inside}</div>'
         case Table():
             return _table(block)
@@ -135,11 +143,11 @@ def _element(block: Block, figures: "itertools.count[int]") -> str:
             return markup
         case Fold(summary, blocks):
             inside = (_element(inner, figures) for inner in blocks)
-            return "\n".join([f"<details><summary>{html.escape(summary)}</summary>", *inside, "</details>"])
+            return "\n".join([f"<details><summary>{quoting.html(summary)}</summary>", *inside, "</details>"])
 
 
 def _below(caption: str) -> str:
-    return f"<figcaption>{html.escape(caption)}</figcaption>" if caption else ""
+    return f"<figcaption>{quoting.html(caption)}</figcaption>" if caption else ""
 
 
 def _table(table: Table) -> str:
@@ -150,11 +158,11 @@ def _table(table: Table) -> str:
 
     def line(cells: Sequence[str], tag: str) -> str:
         marked = zip(marks, cells, strict=True)
-        return f"<tr>{''.join(f'{m.format(tag)}{html.escape(str(c))}</{tag}>' for m, c in marked)}</tr>"
+        return f"<tr>{''.join(f'{m.format(tag)}{quoting.html(str(c))}</{tag}>' for m, c in marked)}</tr>"
 
     body = "\n".join(line(row, "td") for row in table.cells)
     head = f"<thead>{line(table.columns, 'th')}</thead>" if table.columns else ""
-    above = f"<caption>{html.escape(table.title)}</caption>" if table.title else ""
+    above = f"<caption>{quoting.html(table.title)}</caption>" if table.title else ""
     grid = f'<div class="wide"><table>{above}{head}<tbody>\n{body}\n</tbody></table></div>'
     return f'<figure class="table">{grid}{_below(table.caption)}</figure>'  # the caption stays where a table scrolls
 
@@ -165,7 +173,7 @@ def _inline(drawing: str, prefix: str, label: str) -> str:
     drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
     drawing = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", drawing).replace("xlink:href=", "href=")
     drawing = re.sub(r'(\sid="|url\(#|href="#)', rf"\g<1>{prefix}", drawing)
-    return drawing.replace("<svg", f'<svg role="img" aria-label="{html.escape(label)}"', 1)
+    return drawing.replace("<svg", f'<svg role="img" aria-label="{quoting.html(label)}"', 1)
 
 
 def _displayed(latex: str) -> str:

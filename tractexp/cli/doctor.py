@@ -10,7 +10,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
 from tractexp.progress import say
@@ -27,7 +27,7 @@ def doctor(arguments: list[str]) -> int:
     """Check and heal; returns the exit code, 2 where something is left that is wrong."""
     parser = argparse.ArgumentParser(prog="tractexp doctor", description=DOES)
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
-    parser.add_argument("--uri", help="the MLflow store; default: outputs/mlflow.db of the current folder")
+    parser.add_argument("--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
 
@@ -66,7 +66,8 @@ def versions() -> Iterator[Finding]:
         except PackageNotFoundError:
             wrong.append(f"{needed.name} is not installed, and {needed} is needed")
     for sentence in wrong:
-        yield WRONG, f"{sentence}: pip install '{sentence.rpartition('and ')[2].removesuffix(' is needed')}'"
+        needed = sentence.rpartition("and ")[2].removesuffix(" is needed")
+        yield WRONG, f"{sentence}: {quoting.shell('pip', 'install', needed)}"
     if not wrong:
         yield SOUND, "every package is of a version that is known to work"
 
@@ -144,6 +145,9 @@ def store(uri: str) -> Iterator[Finding]:
         if problem == "locked":
             yield WRONG, f"the MLflow store {database} is locked by another process: runs are kept until it lets go"
             return
+        if not _ours(database):
+            yield WRONG, f"{database} is no MLflow store ({problem}) and is left as it is: name another by --uri"
+            return
         aside = database.with_name(f"{database.name}.damaged-{time.strftime('%Y-%m-%d_%H-%M-%S')}")
         files.move(database, aside)
         yield HEALED, f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}"
@@ -153,6 +157,12 @@ def store(uri: str) -> Iterator[Finding]:
         yield WRONG, str(error)
         return
     yield SOUND, f"the MLflow store {uri} can be used"
+
+
+def _ours(database: Path) -> bool:
+    """Whether a damaged file was a store of MLflow's, as far as what is left of it says; an empty one is nobody's."""
+    content = database.read_bytes()
+    return not content.strip(b"\0") or b"alembic_version" in content or b"mlflow." in content
 
 
 def _unsound(database: Path) -> str:

@@ -1,10 +1,12 @@
 """From a composed configuration to a task that runs."""
 
-import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from tractexp import credentials
 from tractexp.api.task import Job
+from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build
@@ -19,34 +21,33 @@ def run(config: Any) -> None:
 
     hydra = HydraConfig.get()
     folder, choices = Path(hydra.runtime.output_dir), dict(hydra.runtime.choices)
+    begin: Callable[[], None] | None = None
     try:
         plain: Any = OmegaConf.to_container(config, resolve=True)
-        perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices)))
+        credentials.check("", plain)
+        begin = configuration.written(folder, config)
+        perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), begin=begin))
+        configuration.concluded(folder)
     except UserError:
-        _cleared(folder)
+        configuration.removed(folder)
         raise
     except KeyboardInterrupt as stop:
-        kept = so_far(stop, folder)
-        _cleared(folder)
+        kept = so_far(stop, folder, begin)
+        configuration.removed(folder)
         raise Stopped(f"{_how(stop)}; {kept or again(config)}", getattr(stop, "code", 130)) from None
-
-
-def _cleared(folder: Path) -> None:
-    """Remove a folder that holds nothing but what was asked."""
-    if {p.name for p in folder.iterdir()} <= {".hydra"}:
-        shutil.rmtree(folder)
 
 
 def _how(stop: KeyboardInterrupt) -> str:
     return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
 
 
-def so_far(stop: KeyboardInterrupt, folder: Path) -> str:
+def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | None) -> str:
     """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
-    if (found := getattr(stop, "result", None)) is None:
+    if begin is None or (found := getattr(stop, "result", None)) is None:
         return ""
     from tractexp.identification.result import write_history
 
+    begin()
     path = found.result.write(folder / "interrupted.json")
     write_history(folder / "history.csv", found.ended.history)
     return (

@@ -8,14 +8,15 @@ from tractexp.errors import UserError
 from tractexp.progress import say
 
 FOLDER = Path("outputs")
+OWN = "outputs/mlflow.db of the current folder, for the runs that name it"
 DOES = "Log the runs whose results are in files but not in MLflow; what is there already is left as it is."
 
 
 def sync(arguments: list[str]) -> int:
-    """Send what folders keep to the stores it belongs to; returns the exit code, 2 where something could not be."""
+    """Send what folders keep to the store that is named, to no other; the exit code, 2 where something could not be."""
     parser = argparse.ArgumentParser(prog="tractexp sync", description=DOES)
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
-    parser.add_argument("--uri", help="the MLflow store to send them to; default: the one each was to be logged in")
+    parser.add_argument("--uri", help=f"the MLflow store to send them to; default: {OWN}")
     chosen = parser.parse_args(arguments)
     if not chosen.folder.is_dir():
         raise UserError(f"tractexp sync: there is no folder {chosen.folder}; name the folder of the runs")
@@ -25,9 +26,10 @@ def sync(arguments: list[str]) -> int:
 
 def brought(folder: Path, uri: str | None) -> Counter[str]:
     """Send what is kept below a folder and say what became of it."""
+    from tractexp import tracking
     from tractexp.tracking.sync import sync
 
-    counts = sync(folder.absolute(), uri, tell=lambda line: say(f"  {line}"))
+    counts = sync(folder.absolute(), uri, own=tracking.address(uri), tell=lambda line: say(f"  {line}"))
     told = ", ".join(f"{count} {what}" for what, count in counts.items()) or "none are kept there"
     say(f"runs in {folder}: {told}")
     return counts

@@ -11,7 +11,7 @@ def ui(arguments: list[str]) -> int:
     The address printed opens on the comparison of the newest experiment, by variant.
     """
     parser = argparse.ArgumentParser(prog="tractexp ui", description="Open the MLflow UI on this computer only.")
-    parser.add_argument("--uri", help="tracking store; default: outputs/mlflow.db of the current folder")
+    parser.add_argument("--uri", help="tracking store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
     parser.add_argument("--port", type=int, default=5000)
     parser.add_argument("--open", action="store_true", help="open it in the browser")
     chosen = parser.parse_args(arguments)

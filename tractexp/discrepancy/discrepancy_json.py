@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.discrepancy import recommended
 from tractexp.discrepancy.forms import by_name, forms
 from tractexp.discrepancy.gap import Curves, GapTest
@@ -155,7 +155,7 @@ def write_left(investigation: Findings, path: Path) -> Path:
     for e, event in enumerate(investigation.context.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
-        lines += [",".join([event.record.name, *(f"{x:.9g}" for x in row)]) for row in rows]
+        lines += [",".join([quoting.csv(event.record.name), *(f"{x:.9g}" for x in row)]) for row in rows]
     return files.write(path, "\n".join(lines) + "\n")
 
 
@@ -212,13 +212,12 @@ def _number(value: float) -> float | None:
 
 def use_of(domain: str, conf: str) -> str:
     """The command that runs the extended model, to be found in the folder `conf`."""
-    return f"python -m tractexp --config-dir {conf} {DOMAINS[domain].setting}model=extended"
+    setting = DOMAINS[domain].setting.split()
+    return quoting.shell("python", "-m", "tractexp", "--config-dir", conf, *setting, "model=extended")
 
 
 def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Path:
     """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
-    import yaml
-
     effects = sorted({*node.get("effects", ()), *investigation.names})
     settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
     extended: dict[str, Any] = {
@@ -232,4 +231,4 @@ def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Pa
     if not investigation.verdict.complete:
         after = (investigation.validate or investigation.train).after.error
         head += f"# Something is missing still: it misses {in_percent(after.value)} of the load's response.\n"
-    return files.write(path, head + yaml.safe_dump(extended, sort_keys=False))
+    return files.write(path, head + quoting.yaml(extended))

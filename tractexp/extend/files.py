@@ -2,10 +2,12 @@
 
 from tractexp.files import PACKAGE, located
 from tractexp.filetypes import cev, comtrade, tidy
+from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
 from tractexp.filetypes.tidy import restored
-from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
+from tractexp.overrides import survey_of
+from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered, signs
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
 from tractexp.recording.estimator import estimator_of
@@ -15,6 +17,7 @@ __all__ = [
     "DECLARATION",
     "LOAD",
     "PACKAGE",
+    "QUANTITIES",
     "SIZES",
     "FileDip",
     "Powers",
@@ -22,6 +25,7 @@ __all__ = [
     "Tabular",
     "beside",
     "cev",
+    "check_load",
     "check_numbers",
     "chosen",
     "comtrade",
@@ -35,5 +39,7 @@ __all__ = [
     "recording",
     "records",
     "restored",
+    "signs",
+    "survey_of",
     "tidy",
 ]

@@ -1,5 +1,6 @@
-"""The base of export formats."""
+"""The base of export formats, and how each language quotes a text."""
 
+from tractexp import quoting
 from tractexp.exchange.format import Format
 
-__all__ = ["Format"]
+__all__ = ["Format", "quoting"]

@@ -7,17 +7,15 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from tractexp.recording.recording import UNITS as ELECTRICAL
 from tractexp.recording.recording import unit_of
+from tractexp.recording.unit import amount
 
-# {unit in lower case: (quantity, factor to s, kV, kA, MW, Mvar, Hz, rad, pu)}
+# {unit in lower case, but those of voltage and current: (quantity, factor to s, MW, Mvar, Hz, rad, pu)}
 UNITS: Mapping[str, tuple[str, float]] = {
-    **ELECTRICAL,
     **{unit: ("t", 1.0) for unit in ("s", "sec", "second", "seconds", "sek", "秒", "с", "сек")},
     **{unit: ("t", 1e-3) for unit in ("ms", "msec", "millisecond", "milliseconds", "毫秒", "мс")},
     **{unit: ("t", 1e-6) for unit in ("us", "µs", "μs", "usec", "microseconds", "微秒", "мкс")},
     "ns": ("t", 1e-9), "min": ("t", 60.0), "h": ("t", 3600.0),
-    "кв": ("voltage", 1.0), "в": ("voltage", 1e-3), "ка": ("current", 1.0), "а": ("current", 1e-3),
     "mw": ("power", 1.0), "kw": ("power", 1e-3), "w": ("power", 1e-6), "gw": ("power", 1e3), "мвт": ("power", 1.0),
     "квт": ("power", 1e-3),
     "mvar": ("reactive", 1.0), "kvar": ("reactive", 1e-3), "var": ("reactive", 1e-6), "gvar": ("reactive", 1e3),
@@ -33,6 +31,11 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "%": ("", 1e-2),
 }  # fmt: skip
 PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quantity)
+FITTING: Mapping[str, tuple[str, ...]] = {
+    "t": ("t",), "U": ("voltage", ""), "I": ("current", ""), "P": ("power", ""), "Q": ("reactive", ""),
+    "f": ("frequency", ""), "dfdt": ("rocof", "frequency", ""), "angle": ("angle", ""), "day": ("t", ""),
+}  # fmt: skip
+ALSO: Mapping[str, tuple[str, ...]] = {"P": ("reactive",), "Q": ("power",), "t": ("",)}  # as files write them
 BRACKETED = (
     r"(.+?)[\s_]*[\[(（{<]\s*([^\])）}>]*?)\s*[\])）}>]", r"(.+?)\s*/\s*(\S+)", r"(.+?)\s+in\s+(\S+)",
 )  # fmt: skip
@@ -49,10 +52,10 @@ WORDS: Mapping[str, str] = {
                      "spannung", "напряжение", "电压", "tension", "tensión"), "U"),
     **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente"),
                     "I"),
-    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "active", "real",
+    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "ppq", "active", "real",
                      "wirkleistung", "активная", "有功", "有功功率"), "P"),
-    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "reactive", "blindleistung",
-                     "реактивная", "无功", "无功功率"), "Q"),
+    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "qpq", "reactive",
+                     "blindleistung", "реактивная", "无功", "无功功率"), "Q"),
     **dict.fromkeys(("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"),
     **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
 }  # fmt: skip
@@ -105,15 +108,27 @@ def split_unit(name: str) -> tuple[str, str]:
 
 def is_unit(text: str) -> bool:
     """Whether a text is a unit of `UNITS`."""
-    return text.strip().lower() in UNITS and not text.strip().isdigit()
+    return meaning(text) is not None and not text.strip().isdigit()
+
+
+def meaning(unit: str) -> tuple[str, float] | None:
+    """(quantity, factor to the unit used inside) of a unit; the quantity is "" of per unit. None for no unit."""
+    if unit.strip() == "mW":
+        return "power", 1e-9
+    electrical = unit_of(unit)
+    return electrical if electrical[0] else UNITS.get(unit.strip().lower())
 
 
 def factor(unit: str) -> float:
-    """From a unit to the one used inside, 1 for none."""
-    if unit.strip() == "mW":
-        return 1e-9
-    quantity, by = unit_of(unit)
-    return by if quantity else UNITS.get(unit.strip().lower(), ("", 1.0))[1]
+    """From a unit to the one used inside, 1 for none; a setting's may have a number before it: "89.8 kV"."""
+    number, unit = amount(unit)
+    return number * (meaning(unit) or ("", 1.0))[1]
+
+
+def fits(quantity: str, unit: str, exact: bool = False) -> bool:
+    """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless `exact`."""
+    kind = (meaning(amount(unit)[1]) or ("",))[0]
+    return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
 def role(name: str, unit: str = "") -> Role | None:
@@ -121,11 +136,11 @@ def role(name: str, unit: str = "") -> Role | None:
     words = _words(name)
     if not words:
         return None
-    meaning = next((pair for pair in (_compound(words), _worded(words)) if pair), None)
-    if meaning is None:
+    said = next((pair for pair in (_compound(words), _worded(words)) if pair), None)
+    if said is None:
         return None
-    key, phase = meaning
-    kind = UNITS.get(unit.strip().lower(), ("",))[0]
+    key, phase = said
+    kind = (meaning(unit) or ("",))[0]
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}")
     if key in ("U", "I") and (kind == "angle" or _tells_angle(words)):

@@ -19,7 +19,7 @@ from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode, lines
 from tractexp.filetypes.timeline import Stretch
-from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
+from tractexp.recording.recording import Channel, Recording, StatusChannel, quantity_of
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
@@ -116,7 +116,7 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch])
     analog, raw = header.analogs[k], samples.analogs[k]
     raw, missing = _missing(header.kind, analog, raw)
     return Channel(
-        analog.name, timeline.evened(raw, stretches, missing), analog.unit, unit_of(analog.unit)[0],
+        analog.name, timeline.evened(raw, stretches, missing), analog.unit, quantity_of(analog.unit),
         analog.phase, analog.circuit, analog.gain, analog.offset, analog.ratio, analog.skew * 1e-6, analog.limits,
         missing,
     )  # fmt: skip
@@ -157,6 +157,12 @@ def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remar
     if header.kind != "ASCII":
         stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))  # the counter ran over
     result = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
+    if header.timemult != 1:
+        rates = ", ".join(f"{s.segment.rate:g}" for s in result[:3])
+        remarks.add(
+            f"sampled at {rates} Hz, by the time stamps and the time multiplier {header.timemult:g}; if that is wrong, "
+            "correct the multiplier"
+        )
     if len(result) > 1:
         gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (" ..." if len(result) > 6 else "")
         remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")

@@ -15,6 +15,7 @@ from tractexp.recording.recording import unit_of
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
+MOST_RATES = 10  # sampling rates of one file, where their number stands for the nominal frequency
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
@@ -260,6 +261,9 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     line, text = rows.take("the nominal frequency")
     header.lines["frequency"] = line
     parsed = number(text.strip(", "))
+    if parsed is not None and 0 < parsed < MOST_RATES and parsed == int(parsed) and _is_rate(rows.peek()):
+        rows.rest.appendleft((line, text))  # the number of sampling rates: the line of the frequency is blank
+        text, parsed = "", None
     if "," in text.strip(", "):
         raise rows.refuse(
             line,

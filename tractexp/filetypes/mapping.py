@@ -1,13 +1,16 @@
 """Which columns of a table are time, voltage, power, ...: as the user says, else by their names."""
 
+import itertools
+import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from tractexp.errors import UserError, among, nearest
 from tractexp.filetypes.cells import is_number, is_time
-from tractexp.filetypes.columns import Role, is_unit, role
+from tractexp.filetypes.columns import Role, fits, is_unit, role
 from tractexp.filetypes.table import TableFile
+from tractexp.recording.unit import amount
 
 CONTRACT = ("t", "U", "P", "Q", "f", "U2")
 PHASES = ("a", "b", "c")
@@ -17,7 +20,11 @@ KEYS = (
     *(x + p for x in "PQ" for p in PHASES),
 )  # fmt: skip
 ANGLES = tuple(f"{key}_angle" for key in KEYS if key[0] in "UI")
-QUANTITIES = ("t", "U", "I", "P", "Q", "f", "angle")  # as data.units names them
+OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units of it}
+    "t": ("s", "ms", "us", "ns"), "U": ("kV", "V", "pu"), "I": ("kA", "A", "pu"), "P": ("MW", "kW", "W", "pu"),
+    "Q": ("Mvar", "kvar", "var", "pu"), "f": ("Hz", "mHz", "pu"), "angle": ("deg", "rad"),
+}  # fmt: skip
+QUANTITIES = tuple(OF)
 
 
 @dataclass(frozen=True)
@@ -45,13 +52,17 @@ class Mapped:
 def mapped(
     table: TableFile, columns: Mapping[str, Any], units: Mapping[str, str], other_columns: Collection[str] = ()
 ) -> Mapped:
-    """What the columns of a table are, by the user's `columns` {key: name or number from 0}, `units` {quantity: unit}.
+    """What the columns of a table are, by the user's `columns` {key: name, number from 0, or None to leave it
+    out}, `units` {quantity: unit}.
 
     No note mentions `other_columns`, which serve elsewhere. Raises `UserError` for a chosen column that is not there,
     for one that is missing, and where several columns fit one key.
     """
-    numbers = {_key(key): _column_number(table, key, choice) for key, choice in columns.items()}
+    numbers = {_key(key): _column_number(table, key, choice) for key, choice in columns.items() if choice is not None}
     options = _options(table, numbers)
+    for key, choice in columns.items():
+        if choice is None:  # left out
+            options.pop(_key(key), None)
     kind, keys = _kind(table, options, numbers)
     chosen: dict[str, MappedColumn] = {}
     for key in keys:
@@ -63,6 +74,8 @@ def mapped(
             )
         chosen[key] = options[key][0]
     chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
+    for one in chosen.values():
+        _check_unit(table, one)
     return Mapped(kind, chosen, tuple(_notes(table, chosen, other_columns)))
 
 
@@ -76,11 +89,13 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     for quantity, unit in units.items():
         if quantity not in QUANTITIES:
             raise UserError(f"data.units names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}")
-        if not is_unit(str(unit)):
+        if not is_unit(amount(str(unit))[1]):
             raise UserError(
                 f"data.units: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW, Mvar, Hz, s, ms, "
                 "deg, rad, pu"
             )
+        if not fits(quantity, str(unit), exact=True):
+            raise UserError(f"data.units: {quantity}={unit} is no unit of {quantity}; one is {', '.join(OF[quantity])}")
 
 
 def _key(name: str) -> str:
@@ -105,8 +120,11 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     matches = [k for k, name in enumerate(names) if _squeezed(name) == wanted]
     matches = matches or [k for k, name in enumerate(names) if _squeezed(name + units[k]) == wanted]
     if not matches:
+        roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
+        fitting = [n for n, r in zip(names, roles, strict=True) if r is None or r.quantity == Role(key).quantity]
         raise UserError(
-            f"data.columns: {key}={choice}: {table.source} has no such column{among(str(choice), names, 'Columns')}"
+            f"data.columns: {key}={choice}: {table.source} has no such column{nearest(str(choice), fitting) or '.'} "
+            f"Columns: {', '.join(names)}"
         )
     if len(matches) > 1:
         raise UserError(
@@ -129,7 +147,8 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         line = label.line if label and label.quantity == "U" else None
         options[key] = [MappedColumn(number, table.label(number), Role(key, heading.units[number], line))]
     free = [k for k in range(len(heading.names)) if k not in numbers.values() and heading.names[k]]
-    roles = {k: one for k in free if (one := role(heading.names[k], heading.units[k]))}
+    names = _spelled(heading.names)
+    roles = {k: one for k in free if (one := role(names[k], heading.units[k]))}
     exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
     if "U" not in exact and "U" not in numbers:
         exact.discard("U2")  # of U1, U2, U3
@@ -142,6 +161,17 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         line = None if key == "U" and name == "U" else one.line
         options.setdefault(key, []).append(MappedColumn(k, name, replace(one, key=key, line=line)))
     return _timed(table, options)
+
+
+def _spelled(names: Sequence[str]) -> Sequence[str]:
+    """The names with those of a micro-PMU, L1MAG and C1ANG, as they are meant: voltage and current of a phase."""
+    parts = [re.fullmatch(r"([LC])([123])_?(MAG|ANG)", name.strip(), re.IGNORECASE) for name in names]
+    if {match[1].upper() for match in parts if match} != {"L", "C"}:
+        return names
+    letters = {"L": "V", "C": "I"}
+    return [
+        f"{letters[m[1].upper()]}{m[2]} {m[3].lower()}" if m else name for m, name in zip(parts, names, strict=True)
+    ]
 
 
 def _numbered(roles: Mapping[int, Role]) -> dict[str, str]:
@@ -250,23 +280,56 @@ def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, 
             f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by number, from 0: "
             "data.columns={t: 0, U: 1, P: 2, Q: 3}"
         )
-    if groups:
-        missing = [key for key in ("t",) if key not in options] or ["what data.columns names"]
-    else:
-        missing = [key for key in ("t", "P", "Q") if not _has(options, key)]
-        missing[len(missing) and missing[0] == "t" : 0] = [] if _set(options, "U", ("U", "U1")) else ["U"]
-    hint = nearest(missing[0], names)
-    meant = hint.partition("'")[2].rpartition("'")[0] or names[-1]
-    return (
-        f"{table.source}: column {', '.join(missing)} is missing; the header line names {', '.join(names)}{hint}; if "
-        f"another name is meant, say so: data.columns={{{missing[0]}: '{meant}'}}"
-    )
+    listed = f"the header line names {', '.join(names)}"
+    if groups and "t" in options:
+        return (
+            f"{table.source}: what data.columns names makes no table of powers, phasors or waveforms with the others; "
+            f"{listed}; name all that are needed: data.columns={{t: ..., U: ..., P: ..., Q: ...}}"
+        )
+    missing = [key for key in ("t",) if key not in options]
+    if not groups:
+        missing += [] if _set(options, "U", ("U", "U1")) else ["U"]
+        missing += [key for key in ("P", "Q") if not _has(options, key)]
+    meant = {key: name for key in missing if (name := _meant(table, options, key))}
+    said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
+    which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
+    return f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}: data.columns={{{said}}}"
+
+
+def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
+    """The one column that may be meant by a key that is missing: of its quantity by name, or that counts up as t does.
+
+    "" where there is none or several: a name that only looks alike says nothing.
+    """
+    if key != "t":
+        alike = {c.number: c for k, several in options.items() if k[0] == key and "_" not in k for c in several}
+        return next(iter(alike.values())).name if len(alike) == 1 else ""
+    taken = {c.number for several in options.values() for c in several}
+    free = [k for k, name in enumerate(table.heading.names) if name and k not in taken and _increases(table, k)]
+    return table.label(free[0]) if len(free) == 1 else ""
+
+
+def _increases(table: TableFile, number: int) -> bool:
+    cells = [row[number] for row in table.sample if number < len(row)]
+    values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
+    return len(values) == len(cells) > 1 and all(a < b for a, b in itertools.pairwise(values))
 
 
 def _with_unit(one: MappedColumn, units: Mapping[str, str]) -> MappedColumn:
     """The user's unit goes before that in the header."""
     quantity = one.role.quantity
     return replace(one, role=replace(one.role, unit=str(units[quantity]))) if quantity in units else one
+
+
+def _check_unit(table: TableFile, one: MappedColumn) -> None:
+    """Raise `UserError` for a column whose unit is one of another quantity."""
+    quantity = one.role.quantity
+    if one.role.unit and is_unit(one.role.unit) and not fits(quantity, one.role.unit):
+        raise UserError(
+            f"{table.source}: column {one.label} is read as {one.role.key}, of which {one.role.unit} is no unit; say "
+            f"another column, data.columns={{{one.role.key}: ...}}, or the unit, "
+            f"data.units={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
+        )
 
 
 def _notes(table: TableFile, chosen: Mapping[str, MappedColumn], other_columns: Collection[str]) -> list[str]:

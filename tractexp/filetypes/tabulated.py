@@ -2,8 +2,7 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from datetime import datetime
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -11,18 +10,29 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import PER_UNIT, factor, role
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped, check_mapping, mapped
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import TableFile, TableForm, open_table
+from tractexp.filetypes.table import TableColumn, TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
+from tractexp.recording.unit import in_units
 
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
+ALIVE = 0.5  # of the median voltage: at less the frequency is noise
+SLOWEST = 10.0  # Hz: no network's frequency is lower
+# kV line to line (IEC 60038, EN 50163, China, North America), and 27.5 kV of traction substations
+NOMINAL_VOLTAGES = (
+    0.23, 0.4, 0.48, 0.69, 1.0, 3.0, 3.3, 6.0, 6.6, 10.0, 11.0, 13.8, 15.0, 20.0, 22.0, 25.0, 27.5, 33.0, 35.0, 66.0,
+    69.0, 110.0, 115.0, 132.0, 138.0, 150.0, 161.0, 220.0, 230.0, 275.0, 330.0, 345.0, 380.0, 400.0, 500.0, 765.0,
+)  # fmt: skip
 GAP = 1.5  # usual steps: a longer one parts two segments
 EPOCH = 1e6  # s: times beyond it are counted from the first
+LATEST = 2.6e9  # s since 1970, of a record: 2052
+SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}  # {unit of times: how many times larger than s they are at least}
 HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 
@@ -71,6 +81,7 @@ class Powers:
     columns: dict[str, np.ndarray]
     absolute: dict[str, bool | None]  # of U and of P; None where no unit says
     notes: tuple[str, ...]
+    frequency: float = 50.0  # Hz, nominal: as f shows it, else as declared
 
 
 def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
@@ -90,10 +101,32 @@ def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kil
         )
     if reverse:
         result.columns["P"], result.columns["Q"] = -result.columns["P"], -result.columns["Q"]
-    return result
+    return _tuned(result, nominal, mapping.columns.get("f"))
+
+
+def _tuned(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
+    """The same with the nominal frequency that f shows, and without an f that is none; both with a note."""
+    if "f" not in result.columns or source is None:
+        return replace(result, frequency=declared)
+    columns, U = {**result.columns}, result.columns["U"]
+    f = columns["f"] if source.role.unit.strip().lower() not in PER_UNIT else columns["f"] * declared
+    alive = ALIVE * np.nanmedian(U) < U
+    level = float(np.median(f[alive])) if alive.any() else declared
+    if level < SLOWEST:
+        del columns["f"]
+        note = (
+            f"{source.label} is about {level:.3g}, a deviation from the nominal frequency or per unit of it: not used"
+        )
+        return replace(result, columns=columns, notes=(*result.notes, note), frequency=declared)
+    columns["f"], nominal = f, nearest_nominal(level)
+    if nominal is None or abs(nominal / declared - 1) < OTHER_FREQUENCY:
+        return replace(result, columns=columns, frequency=declared)
+    note = f"f is {level:.5g} Hz: {nominal:.3g} Hz is taken for nominal, where {declared:g} Hz stands in the settings"
+    return replace(result, columns=columns, notes=(*result.notes, note), frequency=nominal)
 
 
 def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
+    _check_power_units(table, mapping)
     values, start = _read(table, mapping)
     columns, notes = {"t": values["t"]}, [*mapping.notes, *start]
     for letter in "UPQ":
@@ -109,6 +142,18 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     if absolute["U"] or (absolute["U"] is None and kilovolts):
         notes += _to_lines(columns, mapping.columns[first].role.line, first)
     return Powers(columns, absolute, (*table.notes, *notes))
+
+
+def _check_power_units(table: TableFile, mapping: Mapped) -> None:
+    """Raise `UserError` where some columns of P and Q have a unit and others none: it could be a thousand times off."""
+    ours = {key: one for key, one in mapping.columns.items() if key[0] in "PQ"}
+    bare = [one for one in ours.values() if not one.role.unit.strip()]
+    if bare and len(bare) < len(ours):
+        units = ", ".join(f"{letter}: {unit}" for letter, unit in (("P", "MW"), ("Q", "Mvar")))
+        raise UserError(
+            f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one; say them, e.g. "
+            f"data.units={{{units}}}"
+        )
 
 
 def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
@@ -133,10 +178,9 @@ def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], lis
     values |= {
         key: values[key] * by
         for key, one in mapping.columns.items()
-        if not key.endswith("_angle") and (by := factor(one.role.unit)) != 1 and not cells[one.number].clock
+        if not key.endswith("_angle") and key != "t" and (by := factor(one.role.unit)) != 1
     }
-    time = cells[mapping.columns["t"].number]
-    values["t"], note = _counted(values["t"], time.start)
+    values["t"], note = _seconds(cells[mapping.columns["t"].number], mapping.columns["t"].role.unit)
     return values, note
 
 
@@ -144,54 +188,90 @@ def _wanted(key: str) -> str:
     return "time" if key == "t" else "gaps" if key[0] in "PQ" else "number"
 
 
-def _counted(t: np.ndarray, start: datetime | None) -> tuple[np.ndarray, list[str]]:
-    """Times from the first row on where they have a date or are seconds since long ago; a note on it."""
-    if start is not None:
-        return t, [f"t counted from {start.isoformat()}, the first row"]
-    if len(t) and abs(t[0]) > EPOCH:
+def _seconds(time: TableColumn, unit: str) -> tuple[np.ndarray, list[str]]:
+    """Times [s], from the first row on where they have a date or are counted from long ago; a note on it.
+
+    Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds.
+    """
+    t = time.values
+    if time.start is not None:
+        return t, [f"t counted from {time.start.isoformat()}, the first row"]
+    if time.clock or not len(t):
+        return t, []
+    first = float(t[0])
+    since = next((u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), "")
+    if not unit and since:
+        note = f"t is in {since} since 1970 by its size: counted from {first:.0f} {since}, the first row"
+        return (t - first) * factor(since), [note]
+    t = t * factor(unit)
+    if abs(t[0]) > EPOCH:
         return t - t[0], [f"t counted from {t[0]:.6f} s, the first row"]
     return t, []
 
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     values, note = _read(table, mapping)
-    values = _in_units(table, mapping, values)
+    values, absolute = _in_units(table, mapping, values)
     keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
     scale, angle_notes = _radians(table, mapping, values)
     V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
-    absolute = _absolute(mapping, keys["U"][0])
-    absolute = absolute if absolute is not None else not NEAR_ONE[0] < np.nanmedian(np.abs(V1)) < NEAR_ONE[1]
+    V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
     columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
     if V2 is not None:
         columns["U2"] = size * np.abs(V2)
     source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
-    notes = [*mapping.notes, *note, *angle_notes, source]
+    notes = [*mapping.notes, *note, *angle_notes, *sort, source]
     if "f" in values:
         columns["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
     else:
         columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
-    return Powers(columns, {"U": bool(absolute), "P": bool(absolute)}, (*table.notes, *notes))
+    return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes))
 
 
-def _in_units(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Magnitudes without a unit as V and A where a voltage can be nothing else, as per unit where it is near one."""
-    result = dict(values)
-    for key, one in mapping.columns.items():
-        if key[0] not in "UI" or key.endswith("_angle") or one.role.unit:
-            continue
-        level = float(np.nanmedian(np.abs(values[next(k for k in values if k[0] == "U")])))
-        if level > VOLTS:
-            result[key] = values[key] * 1e-3
-        elif not NEAR_ONE[0] < level < NEAR_ONE[1]:
-            raise UserError(
-                f"{table.source}: {one.label} has no unit, and its voltage is {level:.4g}: say the units, "
-                "e.g. data.units={U: kV, I: A}"
-            )
-    return result
+def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does not say it."""
+    if one.role.key != "U" or one.role.line is False:
+        return V, []
+    level = float(np.nanmedian(np.abs(V)))
+    if one.role.line:
+        return V / np.sqrt(3), []
+    line = _off_nominal(level) <= _off_nominal(np.sqrt(3) * level)
+    if line:
+        why = f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than {np.sqrt(3) * level:.4g} kV"
+        return V / np.sqrt(3), [f"{one.label} {why} (data.columns={{U1: ..., U1_angle: ...}} says phase to ground)"]
+    why = f"taken as phase to ground: times sqrt(3) it is {np.sqrt(3) * level:.4g} kV, nearer to a nominal voltage"
+    return V, [f"{one.label} {why} (a name with LL says line to line)"]
+
+
+def _off_nominal(voltage: float) -> float:
+    """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm."""
+    return min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES) if voltage > 0 else np.inf
+
+
+def _in_units(
+    table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
+) -> tuple[dict[str, np.ndarray], bool]:
+    """(magnitudes in kV and kA or per unit, whether they are in kV and kA).
+
+    Without units they are in V and A where a voltage can be nothing else, per unit where it is near one. Raises
+    `UserError` where neither is so, and where one has a unit and another none, or one per unit.
+    """
+    sizes = {key: one for key, one in mapping.columns.items() if key[0] in "UI" and not key.endswith("_angle")}
+    stated = {_absolute(mapping, key) for key in sizes}
+    level = float(np.nanmedian(np.abs(values[next(key for key in sizes if key[0] == "U")])))
+    if stated == {None} and level > VOLTS:
+        return {**values, **{key: values[key] * 1e-3 for key in sizes}}, True
+    if stated == {None} and NEAR_ONE[0] < level < NEAR_ONE[1]:
+        return {**values}, False
+    if len(stated) > 1 or None in stated:
+        odd = next((one for key, one in sizes.items() if _absolute(mapping, key) is None), next(iter(sizes.values())))
+        what = "is per unit and others are not" if odd.role.unit else f"has no unit, and its voltage is {level:.4g}"
+        raise UserError(f"{table.source}: {odd.label} {what}: say the units, e.g. data.units={{U: kV, I: A}}")
+    return {**values}, bool(stated.pop())
 
 
 def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
@@ -246,16 +326,12 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
             raise table.refuse(
                 i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
             )
-    time, note = _counted(cells[t.number].values * (1.0 if cells[t.number].clock else factor(t.role.unit)), None)
+    time, note = _seconds(replace(cells[t.number], start=None), t.role.unit)
     segments, odd = _segments(table, time)
     named = {one.number: key for key, one in mapping.columns.items()}
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
-    bare = [c.name for c in channels if c.quantity and not c.unit]
-    if bare:
-        odd.append(f"no unit of {', '.join(bare)}: taken as V and A (data.units={{U: kV, I: kA}} says else)")
-    return Recording(
-        table.source, channels, segments, nominal, start=cells[t.number].start, notes=[*table.notes, *note, *odd]
-    )
+    start, notes = cells[t.number].start, [*table.notes, *note, *odd]
+    return in_units(Recording(table.source, channels, segments, nominal, start=start, notes=notes), {}, {})
 
 
 def _numeric(table: TableFile, number: int) -> bool:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.filetypes.table import TableForm, open_table
 from tractexp.record.record import Record
@@ -192,7 +192,7 @@ def _written(columns: Mapping[str, np.ndarray], path: Path) -> Path:
         parquet.write_table(table, out)
     else:
         header = io.StringIO()
-        csv.writer(header, lineterminator="\n").writerow(columns)
+        csv.writer(header, lineterminator="\n").writerow(map(quoting.cell, columns))
         out.write(header.getvalue().encode())
         arrow.write_csv(table, out, arrow.WriteOptions(include_header=False))
     return files.write(path, out.getvalue())

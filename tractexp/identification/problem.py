@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import Domain, domain_of
-from tractexp.errors import UserError, among
+from tractexp.errors import UserError, among, check_range
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
 from tractexp.model.drive import Drive
@@ -122,6 +122,7 @@ class Problem:
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
             _check_name(name, {p.name: p for p in self.parameters}, "model.fixed")
+            check_range(f"model.fixed.{name}", self.fixed[name])
         for name in per_event:
             _check_name(name, {p.name: p for p in self.parameters}, "model.per_event")
             if name in self.fixed:

@@ -2,15 +2,15 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.provenance import digest
+from tractexp.record.direction import OUTWARD, direction
 from tractexp.record.event import Event, detect, find_dips, steady
 from tractexp.record.reader import Events
-from tractexp.record.record import Record
+from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 
 REACH = 60.0  # s of a record that are used before its dip and after
 
@@ -38,7 +38,7 @@ def numbered(wholes: Sequence[Record], where: str, pre: float, post: float) -> l
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
             window, number = slice(max(first, early), min(stop, late)), len(file_dips) + 1
             name, source = f"{whole.name}_dip{number}", f"{where} dip {number}"
-            record = _refused(replace(whole, name=name, source=source, **_part(whole, window)))
+            record = _refused(replace(whole.part(window), name=name, source=source))
             file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), record))
     return file_dips
 
@@ -54,13 +54,8 @@ def around(event: Event) -> Event:
     if record.waves is not None or stop - first == record.samples:
         return event
     note = f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about the first dip"
-    part = _part(record, slice(first, stop))
-    return detect(replace(record, digest=digest(record), notes=(*record.notes, note), **part))
-
-
-def _part(whole: Record, window: slice) -> dict[str, Any]:
-    more = {name: values[window] for name, values in whole.more.items()}
-    return {name: values[window] for name, values in whole.channels.items()} | {"more": more}
+    part = record.part(slice(first, stop))
+    return detect(replace(part, digest=digest(record), notes=(*record.notes, note)))
 
 
 def _refused(record: Record) -> Record | UserError:
@@ -77,6 +72,42 @@ def level(record: Record) -> tuple[float, float]:
     P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
     S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
     return float(record.U[before].mean()), S
+
+
+def check_load(where: str, U: float, S: float = 0.0) -> None:
+    """Raise `UserError` for a load of U [kV] and S [MVA] that no network feeds: another unit was meant."""
+    low, high = SIZES["voltage"]
+    if not low <= U <= high:
+        raise UserError(
+            f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most {high:g} kV; if the "
+            "numbers are in V, say so: data.units={U: V}"
+        )
+    if np.sqrt(3) * U * GREATEST_CURRENT < S:
+        raise UserError(
+            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, and "
+            "no load draws as much; say the units of voltage and of current or power, such as data.units={U: kV, I: A} "
+            "or data.units={U: kV, P: kW, Q: kvar}"
+        )
+
+
+def signs(record: Record) -> list[str]:
+    """What is odd about P and Q of a table before its first dip, one sentence each.
+
+    Raises `UserError` for a load that is counted out of itself for certain.
+    """
+    calm = np.zeros(record.samples, bool)
+    calm[steady(record)] = True
+    P, Q = (float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0 for x in (record.P, record.Q))
+    reason = direction(record.U, record.P, record.Q, calm=calm)
+    if OUTWARD in reason:
+        raise UserError(f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}")
+    said = [f"P is {record.base.power * P:.4g} before the first dip: {reason}"] if reason else []
+    if abs(Q) > abs(P):
+        said.append(
+            f"Q ({record.base.power * Q:.4g}) is greater than P ({record.base.power * P:.4g}) before the first dip: "
+            "the two columns may be exchanged (data.columns={P: ..., Q: ...} says which is which)"
+        )
+    return said
 
 
 def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, validate: Sequence[int] | None,

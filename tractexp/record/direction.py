@@ -10,6 +10,7 @@ STEEPEST = 4.0  # exponent that no load exceeds: what falls faster was switched 
 IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
 REACTIVE = 0.1  # of |P|: a smaller Q says nothing about the direction
 NOISY = 3.0  # times the noise that P must exceed to have a sign
+OUTWARD = "its current is counted out of it, or this feeder supplies such loads"  # where that is certain
 TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
 REMEDY = "set data.reverse_current=true"
 
@@ -50,7 +51,7 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, ca
         shown = (
             "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"
         )
-        return f"{shown}: its current is counted out of it, or this feeder supplies such loads ({REMEDY})"
+        return f"{shown}: {OUTWARD} ({REMEDY})"
     if polarity > 0:
         return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
     if fell and a < FALLS:

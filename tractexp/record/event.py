@@ -1,13 +1,17 @@
 """The event inside a record: where the dip is, what came before it, and how noisy the recording is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.provenance import digest
+from tractexp.record.aftermath import loss, until_change
+from tractexp.record.change import smear, voltage_changes
 from tractexp.record.direction import direction
 from tractexp.record.record import DEAD, Record
+from tractexp.record.steadiness import steady_part
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
@@ -15,7 +19,9 @@ RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing,
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
+PHASE_GONE = 0.42  # the same where next to nothing of a phase is left
 UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
+SAME_CURRENT = 0.1  # of a current that stays: how far it moves, and for how much of the time it may move farther
 STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
 COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
@@ -135,6 +141,8 @@ def _scan(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tup
             continue
         crossing = k + int(np.argmax(below))
         start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
+        if crossing - start > block:
+            start = _after_a_step(t, U, start, crossing, margin)
         end = _recovery(U, crossing, reference, margin)
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
@@ -177,6 +185,16 @@ def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: f
     return first + int(high[-1]) + 1 if len(high) else crossing
 
 
+def _after_a_step(t: np.ndarray, U: np.ndarray, start: int, crossing: int, margin: float) -> int:
+    """The onset of a dip that comes long after a small step of the voltage, which is none of it."""
+    begin = max(0, 2 * start - crossing)
+    steps = voltage_changes(U[begin:crossing], MERGED * (len(t) - 1) / float(t[-1] - t[0]))
+    if not steps:
+        return start
+    stop = begin + steps[-1].stop
+    return _onset(U, stop, crossing, float(np.median(U[stop:crossing])), margin)
+
+
 def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
     """The first sample that has recovered from the lowest voltage so far, or len(U)."""
     after = U[crossing:]
@@ -188,7 +206,9 @@ def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> 
 def detect(record: Record) -> Event:
     """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
 
-    An interruption, an open pole and a step are refused by their names.
+    An interruption, an open pole and a step are refused by their names, and so is a load that steps right before. The
+    record begins after an earlier step and ends where its load changes after the dip for another reason than the
+    voltage; its notes say what was done.
     """
     dips, swells = _scan(record.t, record.U)
     if not dips:
@@ -201,22 +221,30 @@ def detect(record: Record) -> Event:
         )
     if reason := _no_such_dip(record, start, end):
         raise UserError(f"{record.where}: {reason}")
-    before = _steady(record, start, swells)
+    usual = _steady(record, start, swells)
+    before, notes = steady_part(record, usual, _least(record))
+    if before.start > usual.start:  # what was before is another state, which is not fitted
+        first = before.start
+        start, end, before = start - first, end - first, slice(0, before.stop - first)
+        record = replace(record.part(slice(first, record.samples)), digest=digest(record))
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
             f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
             f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be computed"
         )
-    U0 = float(U.mean())
+    U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
+    if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
+        record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
+    record = until_change(record, start, end, complex(P0, Q0))
     return Event(
         record=record,
         start=start,
         end=end,
         depth=1 - float(record.U[start:end].min()) / U0,
         U0=U0,
-        P0=float(np.nanmean(P)),
-        Q0=float(np.nanmean(Q)),
+        P0=P0,
+        Q0=Q0,
         f0=record.base.frequency if record.f is None else float(record.f[before].mean()),
         noise_U=noise(t, U),
         noise_P=noise(t, P),
@@ -230,13 +258,20 @@ def steady(record: Record) -> slice:
     """The samples of the steady state before the first dip; all where there is none, or too little before it."""
     dips, swells = _scan(record.t, record.U)
     start = dips[0][0] if dips else 0
-    return _steady(record, start, swells) if start >= FEWEST_BEFORE else slice(0, record.samples)
+    if start < FEWEST_BEFORE:
+        return slice(0, record.samples)
+    return steady_part(record, _steady(record, start, swells), _least(record))[0]
+
+
+def _least(record: Record) -> int:
+    """Samples that a steady state has at least."""
+    return max(FEWEST_BEFORE, round(0.1 * record.rate))
 
 
 def _steady(record: Record, start: int, swells: list[tuple[int, int]]) -> slice:
     """The last second before the dip, or before a swell that leaves too little room behind it."""
     most = max(FEWEST_BEFORE, round(STEADY * record.rate))
-    least = max(FEWEST_BEFORE, round(0.1 * record.rate))
+    least = _least(record)
     stop, first = start, max(0, start - most)
     for begin, end in reversed([swell for swell in swells if swell[0] < start]):
         if end <= first:
@@ -254,6 +289,11 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
     before = float(U[:start].mean())
     inside = U[start:end]
     lowest, when = float(inside.min()), f"at t = {t[start]:g} s"
+    if _current_stays(record, start, end):
+        return (
+            f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of the voltage "
+            "transformers, or their wiring, and no dip of the network; choose another event"
+        )
     if lowest < DEAD * before:
         if end < len(U):
             return (
@@ -280,6 +320,22 @@ def _no_such_dip(record: Record, start: int, end: int) -> str:
             f"record of at least {COARSE:g} Hz"
         )
     return ""
+
+
+def _current_stays(record: Record, start: int, end: int) -> bool:
+    """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the current as it was."""
+    edge = max(1, round(smear(record)))
+    inside, before = slice(start + edge, end - edge * (end < record.samples)), slice(max(0, start - 10 * edge), start)
+    if inside.stop - inside.start < max(3 * edge, FEWEST_INSIDE):
+        return False
+    U = record.U[inside]
+    share = 0.0 if record.U2 is None else float(np.median(record.U2[inside] / np.maximum(U, 1e-12)))
+    gone = float(np.median(U)) < DEAD * float(record.U[:start].mean())
+    if not gone and not share > (OPEN_POLE if (end - start) * record.step > UNCLEARED else PHASE_GONE):
+        return False
+    usual, current = (np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12) for at in (before, inside))
+    level = float(np.nanmedian(usual)) if np.isfinite(usual).any() else 0.0
+    return level > 0 and bool((np.abs(current / level - 1) < SAME_CURRENT).mean() > 1 - SAME_CURRENT)
 
 
 def _unfinished(record: Record, start: int, before: float) -> str:

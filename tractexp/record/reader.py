@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from tractexp.errors import UserError
+from tractexp.overrides import survey_of
 from tractexp.plugin import Plugin, discover
 from tractexp.record import foreign
 
@@ -58,9 +59,7 @@ def reader_of(path: str) -> type[Any]:
     classes: list[Any] = list(discover()[Reader.group].values())
     readers = [cls for cls in classes if ending and ending in cls.endings]
     if Path(path).is_dir():
-        raise UserError(
-            f"{path} is a folder; give a file of it, or 'tractexp task=survey data.path={path}' for a table"
-        )
+        raise UserError(f"{path} is a folder; give a file of it, or make a table: {survey_of(path)}")
     if not readers:
         reason = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
         raise UserError(f"{reason}; endings that can be read: {', '.join(endings())}")

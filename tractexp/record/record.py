@@ -19,7 +19,8 @@ FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
 DEAD = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
-SIZES = {"voltage": (1e-6, 1e5), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
+GREATEST_CURRENT = 50.0  # kA, of a load before a dip
+SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
 
 
 DECLARATION, LOAD = "given", "load"
@@ -120,6 +121,11 @@ class Record:
         """The arrays present, by name, time first."""
         every = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q, "f": self.f, "U2": self.U2}
         return {name: values for name, values in every.items() if values is not None}
+
+    def part(self, window: slice) -> "Record":
+        """Some of its samples, as a record."""
+        channels = {name: values[window] for name, values in self.channels.items()}
+        return replace(self, more={name: values[window] for name, values in self.more.items()}, **channels)
 
     def check(self, place: Callable[[int], str] | None = None) -> "Record":
         """Return the record; raise `UserError` with the source, the place and the value of what is wrong.
@@ -255,13 +261,13 @@ class Record:
         if not low <= U <= high:
             raise UserError(
                 f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is expected); if it is "
-                "in kV, give the base as data.base_voltage (kV, line to line)"
+                "in V or kV, say so, data.units={U: V}, or give the base as data.base_voltage (kV, line to line)"
             )
         S = float(np.nanmax(np.abs([self.P, self.Q])))
         if S > PLAUSIBLE_POWER:
             raise UserError(
                 f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
-                "if it is in MW, give the base as data.base_power (MVA)"
+                "if it is in kW or MW, say so, data.units={P: kW, Q: kvar}, or give the base as data.base_power (MVA)"
             )
         if self.f is None:
             return
@@ -271,5 +277,6 @@ class Record:
             i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
-                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz"
+                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say its unit, "
+                "data.units={f: mHz}, the nominal frequency, data.frequency=60, or leave f out, data.columns={f: null}"
             )

@@ -20,7 +20,7 @@ from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.label import backward, groups, kind, order, residual
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal, snapshots
 
 ALIVE = 0.5  # of the upper level of V1: less is a fault, or a dead line
 LOADED = 0.2  # of the upper level of I1, as well
@@ -30,7 +30,6 @@ BALANCED = 0.5  # I2 over I1 of an order that makes sense
 SENSIBLE = 75.0  # degrees between V1 and I1 that a load has at most
 BACKWARD = 135.0  # degrees from which on the current is turned round, or power fed back
 REACTIVE = 2.0  # degrees about 90: a capacitor bank or a reactor, whatever its order
-OTHER_FREQUENCY = 0.06  # of the nominal one: what is farther off belongs to another
 ZERO = 0.02  # V0 over V2 of line voltages in a fault to earth, whose sum is zero whatever happens
 UNBALANCED = 0.05  # V2 over V1 of such a fault
 EARTH = 0.1  # I0 over I1 of such a fault
@@ -148,17 +147,19 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
     if not V.shape[1] or size.max() == 0 or load.max() == 0:
         return None
-    alive = (size > ALIVE * np.percentile(size, 90)) & (load > LOADED * np.percentile(load, 50))
-    if not alive.any():
-        return None
-    V, I, size = V[:, alive], I[:, alive], size[alive]
-    even = np.ones(len(size), bool)
+    alive = size > ALIVE * np.percentile(size, 90)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        even = small_share if (small_share := small < UNBALANCED * large).any() else even
+        even = alive & (small < UNBALANCED * large)
+        even = even if even.any() else alive
+    else:
+        even = alive
     calm = np.zeros(len(size), bool)
     calm[even] = at_level(size[even], CALM)
-    return _LivePhasors(V, I, calm)
+    alive &= load > LOADED * np.median(load[calm])  # not of all: a fault may last longer than the calm
+    if not (alive & calm).any():
+        return None
+    return _LivePhasors(V[:, alive], I[:, alive], calm[alive])
 
 
 def _zero(x: np.ndarray) -> np.ndarray:

@@ -45,6 +45,7 @@ def excursions(trace: Trace) -> list[Excursion]:
     if not levels.any() or len(trace.t) < 4:
         return []
     alive = levels.max(axis=0) > DEAD * np.percentile(levels.max(axis=0), 95)
+    levels = np.maximum(levels, DEAD * levels.max(axis=1, keepdims=True))  # what is gone does not change
     events: list[Excursion] = []
     k = int(np.argmax(alive))
     count = max(2, round(REFERENCE / trace.step))
@@ -104,9 +105,10 @@ def _one(
         end, returned, new_level = (flat, False, True) if flat is not None and flat < stop else (stop, False, False)
     end = max(end, k + 1)
     whole = levels[:, start:end] / reference[:, None] - 1
-    most = whole[0][np.argmax(np.abs(whole[0]))]
+    first = trace.U[start:end] / reference[0] - 1
+    most = first[np.argmax(np.abs(first))]
     if new_level:
-        after = levels[0, end : end + max(2, round(REFERENCE / trace.step))]
+        after = trace.U[end : end + max(2, round(REFERENCE / trace.step))]
         most = float(np.median(after)) / reference[0] - 1 if len(after) else most
     within = max(2, round(ABRUPT * trace.cycle / trace.step))
     sudden = _fastest(levels[row, max(start - 2, 0) : end + 1] / reference[row], within) > 0.5 * max(

@@ -7,18 +7,24 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.errors import UserError
+from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
+from tractexp.recording.unit import in_doubt
 
 ALIKE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
 SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
+LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
+PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
+FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -33,6 +39,12 @@ class Feeder:
     name: str = ""
     why: tuple[str, ...] = ()  # the evidence for it, and what was changed in the order, one sentence each
     loaded: bool = True
+    question: str = ""  # where other voltages may as well be its own: which there are, one sentence
+
+    @property
+    def channels(self) -> dict[str, tuple[int, ...]]:
+        """Numbers of its channels by the letter of their quantity."""
+        return {"U": self.voltages, "I": self.currents}
 
     @property
     def settings(self) -> dict[str, Any]:
@@ -59,12 +71,47 @@ def propose(recording: Recording) -> list[Feeder]:
     buses = _groups(recording, phasors, volts)
     three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
     loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
-    feeders = [_feeder(recording, phasors, load, buses) for load in loads if buses and _fits(load, buses)]
-    feeders += _single(recording, phasors, volts, amps, [*buses, *loads])
-    feeders = _kirchhoff(phasors, feeders)
+    level = max(_size(phasors, each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
+    options = [_feeders(recording, phasors, load, buses, level) for load in loads if buses and _fits(load, buses)]
+    options += _single(recording, phasors, volts, amps, [*buses, *loads], level)
+    feeders = _with_others(_kirchhoff(phasors, [each[0] for each in options]), options)
     level = max((_size(phasors, f.currents) for f in feeders), default=0.0)
     marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
     return sorted(marked, key=lambda f: not f.loaded)
+
+
+def unrecognised(recording: Recording) -> str:
+    """Why a recording shows no load by itself, one clause."""
+    kinds = [kind(c) for c in recording.channels if c.form == "waveform"]
+    longest = max(recording.segments, key=lambda s: (s.stop - s.first) / s.rate)
+    seconds = (longest.stop - longest.first) / longest.rate
+    try:
+        recording.waveforms()
+    except UserError as error:
+        return str(error).removeprefix(f"{recording.source}: ")
+    if 2 / recording.frequency >= seconds:
+        return f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of {recording.frequency:g} Hz"
+    for wanted in ("voltage", "current"):
+        if wanted not in kinds:
+            units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
+            return f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
+    volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
+    f = frequency(recording, volts)
+    if f is not None and nearest_nominal(f) is None:
+        return f"the strongest line of its voltages is at {f:.3g} Hz, which is no network's"
+    phasors = snapshots(recording, volts)
+    if phasors is None or not any(_size(phasors, [i]) > 0 for i in volts):
+        return "its voltages are zero"
+    return "no three voltages and currents have names or angles of phases"
+
+
+def _with_others(feeders: Sequence[Feeder], options: Sequence[Sequence[Feeder]]) -> list[Feeder]:
+    """The feeders, each followed by those that exclude it, of which the same is said."""
+    result = []
+    for feeder, (first, *others) in zip(feeders, options, strict=True):
+        said, reverse = feeder.why[len(first.why) :], feeder.reverse_current
+        result += [feeder, *(replace(f, reverse_current=reverse, why=(*f.why, *said)) for f in others)]
+    return result
 
 
 def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) -> tuple[float, str]:
@@ -90,7 +137,8 @@ def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) ->
     while k + 3 <= len(free):
         ordered = _symmetric(phasors, free[k : k + 3])
         if ordered:
-            result.append(Group(ordered, False, f"channels {', '.join(map(str, ordered))}", False))
+            name = f"channels {', '.join(map(str, ordered))}"
+            result.append(Group(ordered, False, name, False, "equal, 120 degrees apart"))
             k += 3
         else:
             k += 1
@@ -123,18 +171,50 @@ def _fits(load: Group, buses: Sequence[Group]) -> bool:
     return len(load.numbers) == 3 or any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
 
 
-def _feeder(recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]) -> Feeder:
-    bus, why = _bus(recording, phasors, load, buses)
-    voltages, connection = _connection(load, bus)
-    said = [
-        f"currents {_names(recording, load.numbers)}: {_by(load)}",
-        f"voltages {_names(recording, bus.numbers)}: {why}",
+def _feeders(
+    recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group], level: float
+) -> list[Feeder]:
+    """The feeder of a group of currents; one for each bus where it cannot be told which they belong to."""
+    feeders = []
+    for bus, why in _buses(recording, phasors, load, buses, level):
+        voltages, connection = _connection(load, bus)
+        said = [
+            f"currents {_names(recording, load.numbers)}: {load.evidence}",
+            f"voltages {_names(recording, bus.numbers)}: {why}",
+        ]
+        if bus.pairs:
+            said.append("the voltages are line to line, as their names say")
+        if len(load.numbers) == 2:
+            said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
+        name = load.name or bus.name or "the feeder"
+        feeders.append(Feeder(voltages, load.numbers, connection, name=name, why=tuple(said)))
+    return _asked(recording, phasors, feeders)
+
+
+def _asked(recording: Recording, phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
+    """The same, and where they are several that exclude each other, the question which it is in each of them."""
+    if len(feeders) == 1:
+        return feeders
+    which = " or ".join(f"{_names(recording, f.voltages)} ({_size_of(recording, phasors, f)})" for f in feeders)
+    question = f"which voltages these currents belong to cannot be told: {which}"
+    return [
+        replace(f, name=f"{f.name} at {', '.join(map(str, f.voltages))}", why=(*f.why, question), question=question)
+        for f in feeders
     ]
-    if bus.pairs:
-        said.append("the voltages are line to line, as their names say")
-    if len(load.numbers) == 2:
-        said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
-    return Feeder(voltages, load.numbers, connection, name=load.name or bus.name or "the feeder", why=tuple(said))
+
+
+def _size_of(recording: Recording, phasors: Snapshots, feeder: Feeder) -> str:
+    """Voltage and powers of a feeder while it is alive, in words."""
+    if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+        return "units in doubt"
+    connection = chosen("connection", feeder.connection)
+    V = connection.voltage() @ phasors.of(feeder.voltages)
+    I = connection.current() @ phasors.of(feeder.currents)
+    size = np.nan_to_num(np.linalg.norm(V, axis=0))
+    alive = size >= np.percentile(size, 50)
+    S = complex(np.nanmedian((V * I.conj()).sum(axis=0)[alive]))
+    U = float(np.median(size[alive]))  # of three phases: line to line
+    return f"{U:.4g} kV, P = {S.real:.4g} MW, Q = {S.imag:.4g} Mvar"
 
 
 def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
@@ -154,20 +234,43 @@ def _connection(load: Group, bus: Group) -> tuple[tuple[int, ...], Any]:
     return voltages, settings or connection
 
 
-def _by(group: Group) -> str:
-    if group.certain:
-        return "their names differ in the phase alone"
-    return "the file's phases say so" if not group.name.startswith("channels ") else "equal, 120 degrees apart"
-
-
 def _names(recording: Recording, numbers: Sequence[int]) -> str:
     return ", ".join(f"{i} '{recording.channels[i].name}'" for i in numbers)
 
 
-def _bus(recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]) -> tuple[Group, str]:
-    """The voltages that a group of currents belongs to, and what says so."""
+def _buses(
+    recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group], level: float
+) -> list[tuple[Group, str]]:
+    """The voltages that a group of currents belongs to, and what says so; several where that cannot be told.
+
+    `level` [kA] is the greatest current in the file. What carries a load has no dead voltage, whatever its name.
+    """
     if len(buses) == 1:
-        return buses[0], "the only ones in the file"
+        return [(buses[0], "the only ones in the file")]
+    loaded = _size(phasors, load.numbers) > UNLOADED * level
+    greatest = max(_size(phasors, bus.numbers) for bus in buses)
+    alive = [b for b in buses if not _dead(phasors, b.numbers) and _size(phasors, b.numbers) > PICK_UP * greatest]
+    buses = alive if alive and loaded else buses
+    if len(buses) == 1:
+        return [(buses[0], "the only ones alive")]
+    ties, why = _named_alike(recording, load, buses)
+    if len(ties) == 1:
+        return [(ties[0], why)]
+    apart = max(_apart(phasors, a, b) for a, b in combinations(ties, 2))
+    if apart < SAME_BUS:
+        return [(ties[0], f"{len(ties)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken")]
+    stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
+    best = min(buses, key=lambda bus: stray[id(bus)])
+    if FOLLOWS * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
+        best = min(ties, key=lambda bus: stray[id(bus)])
+    others = [b for b in buses if FOLLOWS * stray[id(b)] < stray[id(best)] and _apart(phasors, best, b) >= SAME_BUS]
+    if not (loaded and any(b in ties for b in others)):
+        return [(best, "the currents follow these voltages best")]
+    return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
+
+
+def _named_alike(recording: Recording, load: Group, buses: Sequence[Group]) -> tuple[list[Group], str]:
+    """(the voltages whose names share most with those of the currents, what they share where it is one group)."""
     texts = [_text(recording, each) for each in (load, *buses)]
     own = sorted(texts[0])
     common = [sum(w in t for t in texts[1:]) for w in own]
@@ -176,16 +279,8 @@ def _bus(recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[
     ]  # a word that names one bus only weighs most
     best = max(scores)
     ties = [bus for bus, score in zip(buses, scores, strict=True) if score >= best - 1e-9]
-    if len(ties) == 1:
-        shared = sorted(w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses))
-        return ties[0], f"their names share '{' '.join(shared)}' with the currents'"
-    alive = [bus for bus in ties if _size(phasors, bus.numbers) > 0.5 * max(_size(phasors, b.numbers) for b in ties)]
-    apart = max(_apart(phasors, a, b) for a, b in combinations(alive, 2)) if len(alive) > 1 else np.inf
-    if len(alive) == 1:
-        return alive[0], "the only ones alive"
-    if apart < SAME_BUS:
-        return alive[0], f"{len(alive)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken"
-    return min(alive, key=lambda bus: _stray(phasors, bus, load)), "the currents follow these voltages best"
+    shared = sorted(w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses))
+    return ties, f"their names share '{' '.join(shared)}' with the currents'"
 
 
 def _text(recording: Recording, group: Group) -> set[str]:
@@ -197,9 +292,12 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 
 def _size(phasors: Snapshots, numbers: Sequence[int]) -> float:
-    """Magnitude [kV, kA] where it is large: the upper quartile of the mean over the channels."""
+    """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
     size = np.nan_to_num(np.abs(phasors.of(numbers))).mean(axis=0)
-    return float(np.percentile(size, 75)) if len(size) else 0.0
+    if not len(size):
+        return 0.0
+    spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG, len(size) // 4)))
+    return float(np.percentile(spans, 25, axis=1).max())
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
@@ -225,19 +323,23 @@ def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
 
 
 def _single(
-    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
-) -> list[Feeder]:
-    """Single-phase feeders among the channels no group has taken: each current with its voltage."""
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group],
+    level: float,
+) -> list[list[Feeder]]:  # fmt: skip
+    """Single-phase feeders among the channels no group has taken: each current with its voltage, or with several."""
     used = {i for group in taken for i in group.numbers}
     free = [i for i in volts if i not in used and not residual(recording.channels[i]) and phasors.pure(i)]
     single = []
     for i in amps:
         if i in used or residual(recording.channels[i]) or not free or not phasors.pure(i):
             continue
-        group = Group((i,), False, recording.channels[i].name.strip(), False)
-        bus, why = _bus(recording, phasors, group, [Group((v,), False, "", False) for v in free])
-        said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-        single.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
+        group = Group((i,), False, recording.channels[i].name.strip(), False, "")
+        buses = _buses(recording, phasors, group, [Group((v,), False, "", False, "") for v in free], level)
+        feeders = []
+        for bus, why in buses:
+            said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
+            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
+        single.append(_asked(recording, phasors, feeders))
     return single
 
 
@@ -312,6 +414,9 @@ def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: flo
     if _dead(phasors, feeder.voltages):
         why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)
+    if not any(phasors.pure(i) for i in feeder.currents):
+        said = "no load here: the currents are no more than noise or harmonics"
+        return replace(feeder, why=(*feeder.why, said), loaded=False)
     size = _size(phasors, feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp.record.change import SMALL, Change, load_changes
 from tractexp.record.event import FEWEST_BEFORE, OPEN_POLE, SHALLOWEST, STEADY, UNCLEARED
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import Record
@@ -12,6 +13,7 @@ from tractexp.recording.trace import Trace, of_record, of_waves
 
 KINDS = (
     "dip", "swell", "interruption", "step", "ramp", "open pole", "dead line", "pole slip", "inrush",
+    "blown fuse", "load loss", "load step",
 )  # fmt: skip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
 SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
@@ -25,6 +27,13 @@ OPEN_CYCLES = 3.0  # so long at least
 SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
+OF_LOADS = ("load loss", "load step")  # kinds of which the voltage shows nothing
+LISTED = 0.2  # of the apparent power: a smaller step of a load is no event
+SAME = 0.1  # of a current: within it the current stays while a voltage is lost
+BLOWN = 0.1  # of a phase: less is left where a fuse has blown
+LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03  # the same, longer than a fault lasts; how little the others change
+FUSE_CYCLES = 3.0  # so long at least
+FUSE_SAMPLES = 50  # half cycles before it, whose median it is compared with
 CARRIES = 0.05  # of the record's greatest current: what is less is no load
 
 
@@ -62,15 +71,28 @@ def _happenings(trace: Trace) -> list[Happening]:
         return []
     if _no_system(trace):
         whole = Excursion(0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True)
-        return [replace(_describe(trace, "dead line", whole, [whole]), why=NO_SYSTEM)]
+        return [replace(_describe(trace, "dead line", whole, []), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
     outside = [e for e in excursions(trace) if not any(_part(trace, e, slip) for slip in slips)]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
     spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
+    changes = _own_changes(trace, [e for _, e in spans])
+    spans += [(_load_kind(c), _beside(trace, c.first + 1, c.stop)) for c in changes if abs(c.ratio - 1) > LISTED]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
-    return [_describe(trace, kind, e, [s for _, s in spans]) for kind, e in spans]
+    bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
+    return [_describe(trace, kind, e, bounds) for kind, e in spans]
+
+
+def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
+    """The steps of the load beside what happens to the voltage."""
+    changes, near = load_changes(trace.U, trace.P, trace.Q, trace.cycle / trace.step), round(trace.cycle / trace.step)
+    return [c for c in changes if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)]
+
+
+def _load_kind(change: Change) -> str:
+    return "load loss" if change.ratio < SMALL else "load step"
 
 
 def _no_system(trace: Trace) -> bool:
@@ -88,8 +110,10 @@ def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
 
 def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     """The kind of an excursion; two parts of a fault that leaves a pole open."""
+    if (fuse := _fuse(trace, e)) is not None:
+        return [("blown fuse", fuse)]
     if e.dead or _all_dead(trace, e):
-        return [("dead line" if e.dead or not e.returned else "interruption", e)]
+        return [("interruption", e)] if e.returned and not e.dead else [("dead line", _until_alive(trace, e))]
     opened = _open(trace, e)
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
@@ -104,9 +128,40 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
 
 
 def _all_dead(trace: Trace, e: Excursion) -> bool:
-    """Whether every phase is gone at some time of the excursion."""
-    rows = np.concatenate([trace.U[None], trace.phases])[:, e.start : e.end]
-    return bool((rows.max(axis=0) < DEAD * e.reference).any())
+    """Whether every phase is gone at some time of the excursion, or at the new level that it leads to."""
+    return bool(_dead(trace, e)[e.start : e.end + 2 * e.new_level * round(trace.cycle / trace.step)].any())
+
+
+def _until_alive(trace: Trace, e: Excursion) -> Excursion:
+    """The excursion up to where a phase is back for good, or to the end."""
+    dead = _dead(trace, e)[e.end :]
+    return replace(e, end=e.end + int(np.flatnonzero(dead)[-1])) if dead.any() and e.new_level else e
+
+
+def _dead(trace: Trace, e: Excursion) -> np.ndarray:
+    """When (M,) every phase is gone."""
+    return np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD * e.reference
+
+
+def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
+    """The span in which voltages are lost while all currents stay: a fuse of the voltage transformers; else None."""
+    edge, before = round(trace.cycle / trace.step), slice(max(e.start - FUSE_SAMPLES, 0), max(e.start - 1, 0))
+    if e.dead or not len(trace.I) or e.start < 4:
+        return None
+    current, voltage = (np.maximum(np.median(x[:, before], axis=1), 1e-12) for x in (trace.I, trace.phases))
+    lost = (trace.phases / voltage[:, None])[:, e.start + edge :].min(axis=0) < LOST_VOLTAGE
+    end = e.start + edge + (len(lost) if lost.all() else int(np.argmin(lost)))
+    inside = slice(e.start + edge, end - edge * (end < len(trace.t)))
+    flows = current.min() > CARRIES * np.percentile(trace.I, 95) and np.median(_clean(trace)[:, before], axis=1).all()
+    if not flows or (inside.stop - inside.start) * trace.step < FUSE_CYCLES * trace.cycle:
+        return None
+    stays = np.abs(trace.I[:, inside] - current[:, None]) < SAME * current[:, None]
+    left = np.median(trace.phases[:, inside], axis=1) / voltage
+    lasts = (end - e.start) * trace.step > UNCLEARED
+    gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
+    alone = gone.any() and not gone.all() and ((gone | others).all() or lasts)
+    blown = stays.mean() > 1 - CARRIES and ((left < DEAD).all() or alone)
+    return replace(e, end=min(end, len(trace.t) - 1)) if blown else None
 
 
 def _open(trace: Trace, e: Excursion) -> Excursion | None:
@@ -232,9 +287,10 @@ def _even(t: np.ndarray) -> bool:
     return bool(steps.min() >= low and steps.max() <= high and steps.max() <= EVEN * steps.min())
 
 
-def _describe(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> Happening:
-    first = max((s.end for s in spans if s.end <= e.start), default=0)
-    stop = min((s.start for s in spans if s.start >= e.end), default=len(trace.t))
+def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int]]) -> Happening:
+    """An event; `bounds` are the first and the last sample of all that changes voltage or load."""
+    first = max((b for _, b in bounds if b <= e.start), default=0)
+    stop = min((a for a, _ in bounds if a >= e.end), default=len(trace.t))
     count = max(2, round(STEADY / trace.step))
     before = _power(trace, max(first, e.start - count - 1), max(e.start - 1, first))
     after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
@@ -243,7 +299,7 @@ def _describe(trace: Trace, kind: str, e: Excursion, spans: list[Excursion]) -> 
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
     depth = -e.worst if e.new_level or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
     last = min(e.end, len(trace.t) - 1)
-    worth, why = _worth(trace, kind, e, depth, first, before)
+    worth, why = _worth(trace, kind, e, depth, first, (before, after))
     return Happening(
         kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
         float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
@@ -262,9 +318,10 @@ def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
 
 
 def _worth(
-    trace: Trace, kind: str, e: Excursion, depth: float, first: int, before: tuple[float, float]
+    trace: Trace, kind: str, e: Excursion, depth: float, first: int, powers: tuple[tuple[float, float], ...]
 ) -> tuple[bool, str]:
-    """Whether a load model can be fitted to it, and why (not)."""
+    """Whether a load model can be fitted to it, and why (not); `powers` are P and Q before and after."""
+    before, after = powers
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
@@ -284,6 +341,8 @@ def _worth(
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
+    if np.hypot(*after) < CARRIES * np.hypot(*before):
+        return False, f"{size}, but the load is switched off in it: nothing is left of it after"
     if not e.sudden:
         return False, f"{size}, but slowly: it determines only the static part of the load"
     if before[0] < 0:
@@ -303,5 +362,8 @@ NO_FIT = {
     "open pole": "one phase is open: the unbalance is not that of a fault, and single-phase power decides",
     "dead line": "the line is dead: there is no voltage to draw a load from",
     "pole slip": "the voltage swings with machines that have lost synchronism: frequency and angle swing with it",
+    "blown fuse": "voltage is lost while the currents stay: a fuse of the voltage transformers, not the network",
+    "load loss": "the load is switched off while the voltage stays: it is no answer to the voltage",
+    "load step": "the load changes while the voltage stays: it is no answer to the voltage",
     "inrush": "the currents are rich in the second harmonic: a transformer's inrush, not the load",
 }

@@ -4,6 +4,7 @@ One mark in a name stands for its phase: `Ia`, `UL1`, `VRS`. Three names equal b
 no list of naming schemes is needed: only the alphabets that number phases, and where in a name the mark may stand.
 """
 
+import itertools
 import re
 import unicodedata
 from collections import defaultdict
@@ -23,7 +24,15 @@ COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number o
 # U21 is V1 - V2 where that name is used (an arrow from 2 to 1), as U12 is elsewhere
 PLACE = {"ab": 0, "bc": 1, "ca": 2, "ba": 0, "cb": 1, "ac": 2}
 SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
+BY_NAME = "their names differ in the phase alone"
+GLUED = 0.5  # score of a mark at the end of a word, where any word may end
+MOST_MARKS = 3  # in a name: "HCSA -HVS1A" has two
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
+OTHER_UNITS = frozenset((  # of what is neither voltage nor current, whatever its name begins with
+    "hz", "mhz", "hz/s", "w", "kw", "mw", "gw", "var", "kvar", "mvar", "va", "kva", "mva", "wh", "kwh", "deg", "°",
+    "degree", "degrees", "rad", "s", "ms", "us", "min", "h", "%", "rpm", "1/min", "°c", "bar", "pa", "kpa", "ohm", "ω",
+    "cos", "pf", "dimensionless",
+))  # fmt: skip
 ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
 
 
@@ -35,6 +44,7 @@ class Group:
     pairs: bool  # line-to-line quantities
     name: str  # what the names share
     certain: bool  # said by the names, not only by the file's phase column or by geometry
+    evidence: str  # what says that they belong together
     missing: int | None = None  # the phase that is not there, of two phases
 
 
@@ -54,7 +64,7 @@ def kind(channel: Channel) -> str:
         return ""
     if channel.quantity:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
-    if channel.unit.strip().lower() not in ("", "pu", "p.u.", "none"):
+    if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
     letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
@@ -130,7 +140,7 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
     result, used = [], set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
         places = buckets[label]
-        if size == 2 and not _two_may_do(label, places):
+        if size == 2 and not _two_may_do(label, places, worth[label] >= SURE):
             continue
         for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
             have = [n for n in numbers if n is not None]
@@ -140,15 +150,15 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
             used |= set(have)
             pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
             result.append(
-                Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, missing)
+                Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, BY_NAME, missing)
             )
     return result
 
 
-def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]]) -> bool:
-    """Two voltages AB and BC, or two currents a and c, are enough; two numbered things are none."""
+def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]], sure: bool) -> bool:
+    """Two voltages AB and BC, or two currents a and c, are enough; two numbered things, or ...V and ...W, are none."""
     have = {k for k, numbers in places.items() if numbers}
-    return len(have) == 2 and (label[2] or label[1] != "123")
+    return len(have) == 2 and (label[2] or (label[1] != "123" and (sure or label[1] != "uvw")))
 
 
 def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
@@ -163,9 +173,24 @@ def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
                 place = PLACE["abc"[x] + "abc"[y]]
                 key = f"{text[: match.start()]}**{text[match.end() :]}"
                 yield f"{key}{'-' if (y - x) % 3 == 2 else ''}", letters, True, place, 6.0 - 2 * digits
-        for match in re.finditer(rf"{before}({one})(?!{word}(?<![ng]))", text):
-            score = 3.0 * _quantity_before(text, match.start()) + 2 * (not digits)
-            yield f"{text[: match.start()]}*{text[match.end() :]}", letters, False, letters.index(match[1]), score
+        yield from _single_marks(text, letters)
+
+
+def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int, float]]:
+    """The readings of a name with one phase: a mark that stands alone, after a word ("HCSA"), or several times."""
+    digits = letters == "123"
+    word, glued = (r"\d", r"(?<!\d)") if digits else ("[a-z]", "")
+    marks: dict[int, list[tuple[int, float]]] = defaultdict(list)  # {place: [(where it stands, how likely)]}
+    for match in re.finditer(rf"{glued}[{letters}](?!{word}(?<![ng]))", text):
+        at = match.start()
+        alone = digits or not text[:at][-1:].isalpha() or text[at - 1] in f"{QUANTITY}l"
+        score = 3.0 * _quantity_before(text, at) + 2 * (not digits) if alone else GLUED
+        marks[letters.index(match[0])].append((at, score))
+    for place, several in marks.items():
+        for size in range(1, min(len(several), MOST_MARKS) + 1):
+            for those in itertools.combinations(several, size):
+                key = "".join("*" if i in dict(those) else c for i, c in enumerate(text))
+                yield key, letters, False, place, max(score for _, score in those)
 
 
 def _quantity_before(text: str, at: int) -> bool:
@@ -187,7 +212,8 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
             have = tuple(n for n in numbers if n is not None)
             if len(have) == size:
                 missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
-                result.append(Group(have, pairs, _shared([channels[n] for n in have]), False, missing))
+                shared = _shared([channels[n] for n in have])
+                result.append(Group(have, pairs, shared, False, "the file's phases say so", missing))
     return result
 
 
@@ -201,10 +227,12 @@ def _shared(channels: list[Channel]) -> str:
     while stop < min(map(len, names)) - start and len({n[-1 - stop] for n in names}) == 1:
         stop += 1
     head, tail = names[0][:start], names[0][len(names[0]) - stop :]
+    if len({*map(len, names)}) == 1:  # the mark may stand in several places
+        tail = "".join(c for c, *others in zip(*(n[start:] for n in names), strict=True) if {c} == {*others})
     counters = [COUNTER.match(plain(n)) for n in names]
     head = "" if counters[0] and len({counter and counter[0] for counter in counters}) > 1 else head
     head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)
-    name = f"{head} {tail}".strip(" _-.:")
+    name = " ".join(f"{head} {tail}".split()).strip(" _-.:")
     circuit = channels[0].circuit.strip()
     if len(name) > 1:
         return name

@@ -10,15 +10,16 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
-from tractexp.record.dips import FileDip
+from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
-from tractexp.recording.happening import Happening, happenings, happenings_of
+from tractexp.recording.happening import OF_LOADS, Happening, happenings, happenings_of
 from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
+from tractexp.recording.unit import check_known, in_doubt
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -68,7 +69,14 @@ class Sight:
         return self.record is not None and self.record.base.voltage == self.record.base.power == 1
 
     def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] at the beginning, before the first event; None without measurements."""
+        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else before the first event.
+
+        Of a load's own steps, what it draws after the last before that. None without measurements.
+        """
+        for event in (each.event for each in self.events if each.worth):
+            if event is not None:
+                base = event.record.base
+                return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
         if self.record is not None:
             first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
             U, P, Q = (float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q))
@@ -76,9 +84,14 @@ class Sight:
         if not self.phasors:
             return None
         p = self.phasors[0]
-        before = p.t < (self.events[0].what.start if self.events else np.inf)
-        first = slice(0, max(1, min(int(np.count_nonzero(before)), len(p.t))))
-        return tuple(float(np.median(v[first])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
+        changes = [each.what for each in self.events]
+        first = next((what for what in changes if what.kind not in OF_LOADS), changes[0] if changes else None)
+        stop = np.inf if first is None else first.start
+        begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
+        before = np.flatnonzero((p.t > begin) & (p.t < stop))
+        if not len(before):
+            before = slice(0, 1)
+        return tuple(float(np.median(v[before])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +145,9 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     for feeder in feeders:
         said = ()
         try:
-            feeder = arranged(recording, feeder)
+            check_known(recording, feeder.channels)
+            if feeder.loaded or not loaded:
+                feeder = arranged(recording, feeder)
         except UserError as error:
             said = (str(error),)
         shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)
@@ -147,6 +162,8 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     """
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
+    if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+        return blank  # no kV, no MW
     try:
         segments = recording.waveforms()
     except UserError as error:
@@ -167,7 +184,18 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
     except UserError as error:
         refused = str(error)
     numbered = _numbered(changes, dips, reader.path, refused)
-    return replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
+    shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
+    return replace(shown, said=(*said, *_improbable(reader.path, shown)))
+
+
+def _improbable(where: str, shown: Sight) -> list[str]:
+    """What is said of a load that no network feeds."""
+    try:
+        if (load := shown.powers()) is not None and shown.feeder is not None and shown.feeder.loaded:
+            check_load(where, load[0], float(np.hypot(*load[1:])))
+    except UserError as error:
+        return [str(error)]
+    return []
 
 
 def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
@@ -209,11 +237,12 @@ def _numbered(
 
 
 def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
-    """The event of a record, or why there is none."""
+    """The event of a record with what the detection noted of it, or why there is none."""
     if not isinstance(result, Record):
         return None, str(result or refused or "it is no dip")
     try:
-        return detect(result), ""
+        event = detect(result)
+        return event, "; ".join(note for note in event.record.notes if note not in result.notes)
     except UserError as error:
         return None, str(error)
 
@@ -234,5 +263,7 @@ def _common(what: Happening, start: float, end: float) -> float:
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """What makes it (not) worth fitting: the event itself, or that it gives no record."""
-    return what.why if event is not None or not what.worth else f"it gives no record: {refused}"
+    """What makes it (not) worth fitting: the event itself, or that it gives no record; what the detection noted."""
+    if not what.worth:
+        return what.why
+    return f"{what.why}; {refused}".removesuffix("; ") if event is not None else f"it gives no record: {refused}"

@@ -14,7 +14,12 @@ FEW_CLIPPED = 1e-3  # of the samples: more is not fit for waves
 WHITE = 3.0  # standard errors that the lag-1 correlation of white noise stays within
 GAP = 1.5  # steps: time stamps farther apart leave a gap
 HARMONICS = 25  # as many as the rate allows are taken away to see the noise
-QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated
+QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated, if so many are calm
+FEWEST_CALM = 2  # cycles in a row that repeat: one alone is no calm
+REPEATS = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
+LEVEL = 0.05  # by which their RMS differs at most
+AT_WORK = {"voltage": 0.5}  # of the RMS of the largest calm: less is a dead line's, and not the state before an event
+IDLE = 0.005  # the same of a current, which a fault multiplies
 
 
 @dataclass(frozen=True)
@@ -46,7 +51,7 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     step, span = _step(channel, x[valid])
     f = _frequency(recording, number, segment)
     clipped = _clipped(channel, x, segment, f or recording.frequency, step)
-    offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f)
+    offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE))
     colour = _colour(lag, count, noise, step)
     return Quality(
         segment.rate, jitter, gaps, clipped, offset, step, float(np.log2(span / step + 1)) if step > 0 else 0.0,
@@ -116,8 +121,10 @@ def _frequency(recording: Recording, number: int, segment: Segment) -> float | N
     return f if f is not None and nearest_nominal(f) is not None else recording.frequency
 
 
-def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, float, float, int, float]:
-    """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a wave.
+def _quiet(
+    x: np.ndarray, rate: float, f: float | None, at_work: float
+) -> tuple[float, float, float, float, int, float]:
+    """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a wave's first calm.
 
     Mean, fundamental and harmonics are fitted together by least squares over those cycles, each with a slow change
     of its amplitude, so that neither a drift nor a frequency a little off passes for noise.
@@ -127,8 +134,9 @@ def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, f
     if f is None or rate < 2.5 * f:
         rest = x[valid]
         return (float(rest.mean()) if len(rest) else none), none, none, none, 0, none
+    x = x[_calm(x, round(rate / f), at_work)]
     n = min(round(QUIET_CYCLES * rate / f), len(x))
-    if n < 2 * rate / f:
+    if n < 2 * round(rate / f):
         return none, none, none, none, 0, none
     first = _quietest(x, n, round(rate / f))
     part = x[first : first + n]
@@ -145,6 +153,27 @@ def _quiet(x: np.ndarray, rate: float, f: float | None) -> tuple[float, float, f
     lag = float(rest[1:] @ rest[:-1] / (rest @ rest)) if rest.any() else none
     thd = float(np.linalg.norm(size[1:]) / size[0]) if size[0] > 0 and len(size) > 1 else none
     return float(weights[0]), float(size[0]), noise, lag, n, thd
+
+
+def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
+    """The first cycles in a row that repeat, of a wave that is at work; all of it where none do.
+
+    What comes after a fault or a trip is another state, however quiet, and a fault is quiet for its size.
+    """
+    blocks = x[: len(x) // cycle * cycle].reshape(-1, cycle)
+    energy, whole = blocks.var(axis=1), slice(0, len(x))
+    both = energy[1:] + energy[:-1]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        alike = np.diff(blocks, axis=0).var(axis=1) / both < REPEATS
+        alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LEVEL
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], alike, [False]]).astype(int)))
+    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a + 1 >= FEWEST_CALM]
+    size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in runs]
+    for (a, b), rms in zip(runs, size, strict=True):
+        if rms >= at_work * max(size):
+            first, last = a + (a > 0), b + (b == len(alike))  # an edge may hold a part of what comes before or after
+            return slice(first * cycle, len(x) if b == len(alike) else max(last, first + 2) * cycle)
+    return whole
 
 
 def _quietest(x: np.ndarray, n: int, cycle: int) -> int:

@@ -1,26 +1,26 @@
 """Readers of waveform files: from channels to the dips of one load, numbered in order of time."""
 
-import shlex
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
-from tractexp import plugin
+from tractexp import plugin, quoting
 from tractexp.errors import UserError, check_range
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
-from tractexp.record.dips import FileDip, check_numbers, chosen, level, numbered
+from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.feeder import Feeder, propose, unrecognised
 from tractexp.recording.label import order
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
+from tractexp.recording.unit import check_known, check_units, in_units
 from tractexp.wording import counted
 
 Stream = tuple[Phasors, Waves | None]  # of one segment
@@ -32,9 +32,12 @@ COUNT = {1: "one", 2: "two", 3: "three"}
 class WaveformReader(Reader):
     """Base of the readers of waveform files. A plugin reads the file; which load, which dips, is common to all."""
 
+    quantities: ClassVar[Sequence[str]] = ("U", "I")  # that `units` may name
+
     path: str = ""  # the file
     voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
+    units: dict[str, str] = field(default_factory=dict)  # {U: kV, I: A} where the file does not say, or says wrongly
     connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
     estimator: Any = None  # of the phasors, a name or name and settings; null: one cycle
     harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
@@ -46,9 +49,11 @@ class WaveformReader(Reader):
     skew: bool = False  # true: correct the time skew of each channel that the file states
 
     def opened(self) -> Recording:
-        """The file, at the nominal frequency that its voltages really have."""
+        """The file, its units and the nominal frequency that its voltages really have."""
         recording = self.recording()
-        chosen = [recording.number(each, "data.voltages") for each in self.voltages]
+        keys = {"U": "voltages", "I": "currents"}
+        numbers = {x: [recording.number(i, f"data.{key}") for i in getattr(self, key)] for x, key in keys.items()}
+        recording, chosen = in_units(recording, self.units, numbers), numbers["U"]
         every = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage" and c.form == "waveform"]
         return tuned(recording, chosen or every)
 
@@ -59,6 +64,7 @@ class WaveformReader(Reader):
     def check(self) -> None:
         if not self.path:
             raise UserError(f"data.path is missing: give the file, e.g. data.path=station{self.endings[0]}")
+        check_units(self.units, self.quantities)
         check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)
         check_range("data.post", self.post, 0.1)
@@ -87,6 +93,7 @@ class WaveformReader(Reader):
         U, S = level(first)
         if S < 1e-6:
             raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
+        check_load(self.path, U, S)
         return [replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD))) for dip in file_dips]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
@@ -131,7 +138,9 @@ class WaveformReader(Reader):
                         f"data.{key}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
                         f"{recording.channels[i].unit}; choose {key}"
                     )
-        return arranged(recording, Feeder(**numbers, connection=name, reverse_current=self.reverse_current))
+        feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
+        check_known(recording, feeder.channels)
+        return arranged(recording, feeder)
 
     def _usual(self, recording: Recording) -> Any:
         """The connection that the number of channels says; two voltages to ground say none."""
@@ -148,15 +157,25 @@ class WaveformReader(Reader):
             (only,) = proposed
             channels = ", ".join(recording.channels[i].name for i in (*only.voltages, *only.currents))
             why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *only.why)
+            check_known(recording, only.channels)
             reverse = only.reverse_current != self.reverse_current
             return arranged(recording, replace(only, reverse_current=reverse, why=why))
-        every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+        if not proposed:
+            every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+            noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
+            raise UserError(
+                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; data.voltages and "
+                f"data.currents name one; its channels: {every}"
+            )
         loads = "; ".join(
-            f"{f.name}: {shlex.join(assigned(f'data.{key}', value) for key, value in f.settings.items())}"
+            f"{f.name}: {quoting.shell(*(assigned(f'data.{key}', value) for key, value in f.settings.items()))}"
             for f in proposed
         )
-        shown = f"{len(proposed)} loads; choose one: {loads}" if proposed else f"none by itself; its channels: {every}"
-        raise UserError(f"data.voltages and data.currents are missing, and {recording.source} shows {shown}")
+        asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
+        raise UserError(
+            f"data.voltages and data.currents are missing, and {recording.source} shows {len(proposed)} loads; {asked}"
+            f"choose one: {loads}"
+        )
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:
         """The phasors and the waves of each segment that holds waveforms."""
@@ -179,8 +198,6 @@ class WaveformReader(Reader):
             spans = ", ".join(f"{s.rate:g} Hz from {s.start:.3f} s" for s in slow)
             notes.append(f"segments without waveform not used: {spans}")
         chosen = [recording.channels[i] for i in (*feeder.voltages, *feeder.currents)]
-        if unknown := [channel for channel in chosen if not channel.quantity]:
-            notes.append(f"unit '{unknown[0].unit}' of channel '{unknown[0].name}' taken as V or A")
         skew = max(abs(channel.skew) for channel in chosen)
         if skew > 0 and not self.skew:
             notes.append(f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true does)")

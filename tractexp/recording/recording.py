@@ -4,6 +4,8 @@ Readers of files make a `Recording` and nothing else; which channels make up a l
 from it (`feeder`, `happening`), whatever the format was.
 """
 
+import re
+import unicodedata
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -13,20 +15,36 @@ import numpy as np
 
 from tractexp.errors import UserError, nearest
 
-# {unit as files write it, in lower case: (quantity, factor to the unit used inside: kV, kA, MW, Mvar, Hz, rad)}
+# {unit as files write it, in lower case: (quantity, factor to the unit used inside: kV, kA)}
 UNITS: Mapping[str, tuple[str, float]] = {
-    "v": ("voltage", 1e-3), "volt": ("voltage", 1e-3), "volts": ("voltage", 1e-3), "kv": ("voltage", 1.0),
-    "mv": ("voltage", 1e-6), "a": ("current", 1e-3), "amp": ("current", 1e-3), "amps": ("current", 1e-3),
-    "ampere": ("current", 1e-3), "amperes": ("current", 1e-3), "ka": ("current", 1.0), "ma": ("current", 1e-6),
+    f"{prefix}{name}": (quantity, factor)
+    for quantity, units in {
+        "voltage": {"v": "", "volt": "kilo milli", "volts": "kilo milli", "вольт": "кило милли", "伏": "千 毫"},
+        "current": {
+            "a": "", "amp": "kilo milli", "amps": "kilo milli", "ampere": "kilo milli", "amperes": "kilo milli",
+            "ампер": "кило милли", "安": "千 毫",
+        },
+    }.items()
+    for name, prefixes in units.items()
+    for prefix, factor in zip(["", *(prefixes.split() or ("k", "m"))], (1e-3, 1.0, 1e-6), strict=True)
 }  # fmt: skip
 MEGA = {"MV": ("voltage", 1e3), "MA": ("current", 1e3)}  # which small letters would make milli
+CYRILLIC = str.maketrans("вВаАкКмМ", "vVaAkKmM")  # кВ, А
 FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitudes
 
 
 def unit_of(text: str) -> tuple[str, float]:
     """(quantity, factor to kV or kA) of a unit as a file writes it; ("", 1.0) for another."""
-    text = text.strip()
-    return MEGA.get(text) or UNITS.get(text.lower(), ("", 1.0))
+    text = unicodedata.normalize("NFKC", text).strip(" .")
+    text = text[1:-1].strip() if (text[:1], text[-1:]) in (("[", "]"), ("(", ")")) else text
+    latin = text.translate(CYRILLIC)
+    return MEGA.get(latin) or UNITS.get(text.lower()) or UNITS.get(latin.lower(), ("", 1.0))
+
+
+def quantity_of(text: str) -> str:
+    """The quantity of a unit as a file writes it, also of several ("V/kV"), where the size stays open; "" of others."""
+    quantities = {unit_of(part)[0] for part in re.split(r"[/|;]", text)}
+    return quantities.pop() if len(quantities) == 1 else ""
 
 
 @dataclass(frozen=True)
@@ -82,9 +100,8 @@ class Channel:
 
     @property
     def factor(self) -> float:
-        """From the file's unit to the one used inside."""
-        quantity, factor = unit_of(self.unit)
-        return factor if quantity else 1e-3 if self.quantity in ("voltage", "current") else 1.0
+        """From the file's unit to the one used inside; 1 where it is not known."""
+        return unit_of(self.unit)[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +165,9 @@ class Recording:
                 )
             return each
         if str(each) not in names:
-            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), names)}")
+            other = {"data.voltages": "current", "data.currents": "voltage"}.get(where)
+            fitting = [name for name, c in zip(names, self.channels, strict=True) if c.quantity != other]
+            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), fitting)}")
         if names.count(str(each)) > 1:
             raise UserError(f"{where}: {self.source} has several channels '{each}'; give the number, from 0")
         return names.index(str(each))

@@ -8,6 +8,7 @@ import numpy as np
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Recording, Segment
 
 NOMINAL = (50.0, 60.0, 50 / 3)  # Hz, of the networks there are
+OTHER_FREQUENCY = 0.06  # of the nominal one: what is farther off belongs to another
 TUNED = 0.06  # of a nominal frequency: a network's frequency strays no farther
 MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a longer one is sampled
 PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave

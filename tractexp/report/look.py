@@ -29,6 +29,8 @@ LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
+BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
+NO_LOAD = "no load here: what happens to the voltage is listed with the loads of its bus"
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
     " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
@@ -49,7 +51,7 @@ def summary(content: Mapping[str, Any]) -> Report:
             wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
             page.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
             page.items([*feeder["why"], *feeder["said"]])
-            page.add(*[events(feeder)] * bool(feeder["events"])).items([NOTHING] * (not feeder["events"]))
+            page.add(*[events(feeder)] * bool(feeder["events"])).items([_quiet(feeder)] * (not feeder["events"]))
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
         if not entry["feeders"]:
@@ -73,7 +75,7 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
         if len(entry["feeders"]) > 1:
             page.table(
                 ["load", "connected as", "channels", "U", "P", "Q", "events", "worth fitting"],
-                [_summary(f) for f in entry["feeders"]], words=(1, 2), caption="At the beginning; P and Q consumed.",
+                [_summary(f) for f in entry["feeders"]], words=(1, 2), caption=BEFORE,
             )  # fmt: skip
         for k, (shown, feeder) in enumerate(zip(view.sights, entry["feeders"], strict=True)):
             _load(page, view, shown, feeder, folded=k >= OPEN)
@@ -86,7 +88,7 @@ def channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
         "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise about fundamental"
-        " and harmonics in the quietest ten cycles, as a share of it."
+        " and harmonics in the quietest ten cycles of the first calm, as a share of it."
     )
     columns = ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"]
     rows = [_channel(c) for c in entry["channels"]]
@@ -168,7 +170,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     if entry["events"]:
         page.add(events(entry))
     else:
-        page.text(as_sentence(NOTHING))
+        page.text(as_sentence(_quiet(entry)))
     if folded:
         with page.folded(f"Charts of {entry['name']}"):
             _charts(page, view, shown)
@@ -197,11 +199,17 @@ def _described(entry: Mapping[str, Any]) -> list[str]:
         reverse = ", current reversed" * entry["reverse_current"]
         sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
     if size := _size(entry):
-        sentences.append(f"At first {size}.")
+        when = "Before the dip" if any(e["worth"] for e in entry["events"]) else "At first"
+        sentences.append(f"{when} {size}.")
     if entry["sum_V"] is not None:
         current = "" if entry["sum_I"] is None else f", the currents to {entry['sum_I']:.2%}"
         sentences.append(f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}.")
     return sentences
+
+
+def _quiet(entry: Mapping[str, Any]) -> str:
+    """What is said of a load without events."""
+    return NOTHING if entry["loaded"] else NO_LOAD
 
 
 def event_row(e: Mapping[str, Any]) -> list[str]:

@@ -1,10 +1,9 @@
 """The page of a survey: its table with small pictures, sorted and filtered where it is read, for thousands of rows."""
 
-import html
-import json
 from collections.abc import Mapping
 from typing import Any
 
+from tractexp import quoting
 from tractexp.blocks import Report, Table
 from tractexp.blocks.block import Markup
 from tractexp.blocks.style import ACTIVE, VOLTAGE
@@ -165,7 +164,7 @@ def report(content: Mapping[str, Any]) -> Report:
     data = {
         "columns": COLUMNS, "rows": rows, "atOnce": AT_ONCE, "colors": {"U_picture": VOLTAGE, "P_picture": ACTIVE},
     }  # fmt: skip
-    packed = json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    packed = quoting.script(data)
     worth = sum(row["worth"] for row in rows)
     lead = f"{content['files']} files, {len(rows)} rows, {worth} events worth fitting."
     page = _best(Report(f"Survey of {content['folder']}", lead), content)
@@ -191,7 +190,7 @@ def _heads() -> str:
     heads = []
     for key, label, kind, _ in COLUMNS:
         left = ' class="words"' if kind in ("name", "words", "why") else ""
-        heads.append(f"<th{left}{'' if kind == 'picture' else f' data-key={key}'}>{html.escape(label)}</th>")
+        heads.append(f"<th{left}{'' if kind == 'picture' else f' data-key={key}'}>{quoting.html(label)}</th>")
     return "".join(heads)
 
 

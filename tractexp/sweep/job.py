@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import credentials, files
 from tractexp.api.task import variant
 from tractexp.cli.chosen import given
 from tractexp.errors import UserError
@@ -34,7 +34,8 @@ class SweepJob:
 
     @classmethod
     def of(cls, config: Mapping[str, Any], choices: Mapping[str, str], overrides: Any, folder: Path) -> "SweepJob":
-        """A job from its composed configuration; Hydra's own choices are left out."""
+        """A job from its composed configuration; Hydra's own choices are left out. Raises `UserError` for passwords."""
+        credentials.check("", config)
         groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
         digest = identity.configuration(config, groups)
         chosen = given(overrides, choices)

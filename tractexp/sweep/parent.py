@@ -6,7 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import provenance
+from tractexp import provenance, quoting
 from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
@@ -30,7 +30,7 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
 
     uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
     run_id = _opened(folder, run, uri, afresh)
-    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides})
+    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides}, private=True)
     status = "FAILED"
     try:
         yield
@@ -72,7 +72,7 @@ def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
     except UserError as error:
         say(f"not logged: {error}")
     left = waiting(folder)
-    if left and sync(folder, tell=lambda line: None)[NOT]:
+    if left and sync(folder, uri, tell=lambda line: None)[NOT]:
         say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
 
 
@@ -96,5 +96,5 @@ def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         name=f"sweep {folder.name}",
         parameters=shared,
         tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
-        description=f"A sweep of {len(jobs)} jobs: `{' '.join(overrides)}`",
+        description=f"A sweep of {len(jobs)} jobs: {quoting.markdown(' '.join(overrides))}",
     )

@@ -31,7 +31,9 @@ from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
+from tractexp.tracking.sweepfile import PAGES
 
+SWEEP = "multirun.yaml"
 REPEAT = "repeat the command to go on with the jobs that are left"
 
 
@@ -77,7 +79,10 @@ class Grid(Sweeper):
         if done := len(jobs) - len(remaining):
             say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if remaining:
-            files.write(folder / "multirun.yaml", OmegaConf.to_yaml(self.config))
+            if (folder / SWEEP).exists():  # what an earlier sweep came to goes before its configuration does
+                for name in PAGES:
+                    (folder / name).unlink(missing_ok=True)
+            files.write(folder / SWEEP, OmegaConf.to_yaml(self.config))
             with parent_run(folder, jobs, arguments, afresh=self.redo):
                 self._run(remaining)
         self._conclude(jobs, comparison)

@@ -10,5 +10,6 @@ from tractexp.tracking.run import reopen_parent as reopen_parent
 from tractexp.tracking.run import start_parent as start_parent
 from tractexp.tracking.run import tag_experiment as tag_experiment
 from tractexp.tracking.store import address as address
+from tractexp.tracking.store import chosen_uri as chosen_uri
 from tractexp.tracking.store import default_uri as default_uri
 from tractexp.tracking.store import prepare as prepare

@@ -147,7 +147,7 @@ def _whole_run(client: Any, run: TrackedRun) -> str:
     """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is deleted."""
     experiments = [one.experiment_id for one in client.search_experiments()]
     for one in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
-        if one.info.status == run.status:
+        if one.info.status in (run.status, STATUSES[0]):
             return one.info.run_id
         for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{one.info.run_id}'"):
             client.delete_run(child.info.run_id)
@@ -183,7 +183,7 @@ def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
 
 
 def start_parent(run: TrackedRun, uri: str) -> str:
-    """Open the run of a sweep and return its id, for `Run.parent` of the jobs. Close it in a `finally`."""
+    """Open the run of a sweep and return its id, for `TrackedRun.parent` of the jobs. Close it in a `finally`."""
     run.check()
     client = open_store(uri)
     with sentences(uri):
@@ -297,7 +297,7 @@ def _experiment(client: Any, name: str, uri: str) -> str:
     experiment = client.get_experiment_by_name(name)
     if experiment is None:
         database = database_of(uri)
-        folder = re.sub(r"[^\w.-]+", "_", name)
+        folder = re.sub(r"[^\w.-]+|^\.+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
             return client.create_experiment(name, artifact_location=location)

@@ -5,6 +5,7 @@ sends what a store lacks, and sends nothing twice.
 """
 
 import json
+import re
 import time
 import uuid
 from collections.abc import Mapping
@@ -17,6 +18,7 @@ from tractexp.errors import UserError
 from tractexp.tracking.run import Line, TrackedRun, flatten, thinned
 
 FILE = "mlflow.json"
+KEY = re.compile(r"[\w-]*", re.ASCII)  # what may stand in MLflow's filter
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ class RunFile:
     def write(self) -> "RunFile":
         """Write it. Raises `UserError` where that is impossible."""
         content = {"uri": self.uri, "run_id": self.run_id, "sweep": self.sweep, "run": _plain(self.run, self.folder)}
-        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n")
+        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n", private=True)
         return self
 
     def logged(self, run_id: str, uri: str | None = None) -> "RunFile":
@@ -54,7 +56,8 @@ def read(folder: Path) -> RunFile | None:
     path = folder / FILE
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-        return RunFile(folder, _run(content["run"], folder), content["uri"], content["run_id"], content["sweep"])
+        uri, run_id = _texts(content, "uri", "run_id")
+        return RunFile(folder, _run(content["run"], folder), uri, run_id, bool(content["sweep"]))
     except FileNotFoundError:
         return None
     except OSError as error:
@@ -92,7 +95,18 @@ def _relative(path: Path, folder: Path) -> str:
     return path.relative_to(folder.absolute()).as_posix() if path.is_relative_to(folder.absolute()) else str(path)
 
 
+def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
+    """Entries that are texts; raises `TypeError` where one is none."""
+    for name in names:
+        if not isinstance(content[name], str):
+            raise TypeError(f"its {name} is {content[name]!r:.60}")
+    return [content[name] for name in names]
+
+
 def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
+    key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
+    if not KEY.fullmatch(key):
+        raise ValueError(f"its key is {key!r:.60}")
     there = {
         "artifacts": [folder / path for path in content["artifacts"]],
         "model": None if content["model"] is None else folder / content["model"],

@@ -16,11 +16,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import credentials, files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking.owner import close_quietly
 
 PATIENCE = 15.0  # s to wait for a process that writes to the database
+VARIABLE = "MLFLOW_TRACKING_URI"  # by which MLflow's own tools choose the store
 HELD = 120.0  # s to wait for another process that makes the store or opens it
 
 
@@ -29,10 +30,20 @@ def default_uri(folder: Path) -> str:
     return f"sqlite:///{(Path(folder).absolute() / 'outputs' / 'mlflow.db').as_posix()}"
 
 
-def address(chosen: str | None) -> str:
-    """The store that was chosen, or the default one; both from the current folder, as an absolute address."""
+def chosen_uri(setting: str | None) -> str:
+    """The store that a setting chooses, else MLflow's own variable; "" where neither does."""
+    return setting or os.environ.get(VARIABLE, "").strip()
+
+
+def address(setting: str | None) -> str:
+    """The store that was chosen, or the default one; both from the current folder, as an absolute address.
+
+    Raises `UserError` where it holds a password.
+    """
+    chosen = chosen_uri(setting)
     if not chosen:
         return default_uri(Path.cwd())
+    credentials.check("the MLflow store", chosen)
     database = database_of(chosen)
     return f"sqlite:///{database.as_posix()}" if database else chosen
 
@@ -56,6 +67,7 @@ def open_store(uri: str) -> Any:
 
     Runs still marked as running by processes that have ended are closed.
     """
+    credentials.check("the MLflow store", uri)
     if not uri.strip():
         raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
     database = database_of(uri)
@@ -158,8 +170,9 @@ def sentences(uri: str) -> Iterator[None]:
         reason = str(error).strip().partition("\n")[0]
         if "database schema" in reason or "Can't locate revision" in reason:
             raise UserError(
-                f"the MLflow store {uri} comes from another version of MLflow: 'mlflow db upgrade {uri}' brings an "
-                "older one up to date (keep a copy), a newer one needs the newer MLflow"
+                f"the MLflow store {uri} comes from another version of MLflow: '"
+                f"{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date (keep a copy), a "
+                "newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error
 

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 FILE = "sweep.json"
+PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
 
 
 def parent_of(folder: Path) -> str | None:

@@ -1,29 +1,34 @@
 """Bring into a store what folders hold and it lacks: runs that could not be logged, or that a lost store had."""
 
+import os
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import files
+from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking import runfile
-from tractexp.tracking.run import finish_parent, log, reopen_parent, run_of, start_parent
+from tractexp.tracking.run import KEY, TrackedRun, finish_parent, log, reopen_parent, run_of, start_parent
 from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
-from tractexp.tracking.sweepfile import FILE, parent_of
+from tractexp.tracking.sweepfile import FILE, PAGES, parent_of
 
-PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
 
-def sync(root: Path, uri: str | None = None, tell: Callable[[str], None] = lambda line: None) -> Counter[str]:
+def sync(
+    root: Path, uri: str | None = None, tell: Callable[[str], None] = lambda line: None, own: str | None = None
+) -> Counter[str]:
     """Send every run file at `root` and below to its store, or to `uri`, unless it is there; counts by outcome.
 
-    `tell` hears a sentence for each that could not be. Sending twice is harmless: its key identifies a run.
+    `tell` hears a sentence for each that could not be. Sending twice is harmless: its key identifies a run. Where the
+    folder may be somebody else's, `own` is the only store that what stands in it may name. Of a run nothing is sent
+    that does not lie in its folder.
     """
     counts: Counter[str] = Counter()
+    said: set[str] = set()
     broken: dict[str, str] = {}  # {address: why it cannot be used}: nobody waits for it twice
     for folder in runfile.below(root):
         try:
@@ -34,18 +39,42 @@ def sync(root: Path, uri: str | None = None, tell: Callable[[str], None] = lambd
             continue
         if one is None:
             continue
-        where = address(uri or one.uri)
+        where = uri or one.uri
         try:
+            where = address(where)
+            if own is not None and uri is None and where != own:
+                raise UserError(f"the MLflow store {where} is named in {root} alone, not by you: {_named(where)}")
             if where in broken:
                 raise UserError(broken[where])
-            counts[_sent(one, where)] += 1
+            counts[_sent(replace(one, run=_within(one.run, one.folder, tell)), where)] += 1
         except UserError as error:
             counts[NOT] += 1
-            if str(error) not in broken.values():
+            if str(error) not in said:
                 tell(str(error))
+            said.add(str(error))
             if "cannot be used" in str(error) or "another version" in str(error):
                 broken[where] = str(error)
     return counts
+
+
+def _named(uri: str) -> str:
+    """How to say that a store is meant."""
+    return f"where it is yours, {quoting.shell('tractexp', 'sync', '--uri', uri)} sends it there"
+
+
+def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
+    """The run with those of its files, and of the runs below it, that are there and lie in its folder."""
+
+    def lies(path: Path) -> bool:
+        if not os.path.exists(path) or files.inside(path, folder):
+            return os.path.exists(path)
+        tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
+        return False
+
+    children = [_within(child, folder, tell) for child in run.children]
+    artifacts = [path for path in run.artifacts if lies(path)]
+    model = run.model if run.model and lies(run.model) else None
+    return replace(run, artifacts=artifacts, model=model, children=children)
 
 
 def _sent(one: RunFile, uri: str) -> str:
@@ -54,6 +83,8 @@ def _sent(one: RunFile, uri: str) -> str:
     parent = None if one.sweep else parent_of(one.folder.parent)
     one = replace(one, run=replace(one.run, parent=parent or one.run.parent))
     run_there = run_of(client, uri, one.run_id)
+    if run_there is not None and not _same(one, run_there):
+        run_there = None
     if run_there is not None and run_there.info.lifecycle_stage == "deleted":
         return DELETED
     if one.sweep:
@@ -61,10 +92,16 @@ def _sent(one: RunFile, uri: str) -> str:
     if run_there is not None and run_there.info.status == one.run.status:
         _below(client, uri, run_there, one.run.parent)
         return THERE
-    model = one.run.model if one.run.model and one.run.model.exists() else None
-    run = replace(one.run, artifacts=[path for path in one.run.artifacts if path.exists()], model=model)
-    one.logged(log(run, uri, again=True), uri)
+    one.logged(log(one.run, uri, again=True), uri)
     return BROUGHT
+
+
+def _same(one: RunFile, run_there: Any) -> bool:
+    """Whether a run in the store is that of the file, whose id may be anybody's."""
+    tags = run_there.data.tags
+    if one.sweep:
+        return (run_there.info.run_name, tags.get("sweep")) == (one.run.name, one.run.tags.get("sweep"))
+    return tags.get(KEY) == one.run.key
 
 
 def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
@@ -74,11 +111,13 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     run_id = one.run_id
     if run_there is None or not reopen_parent(run_id, uri):
         run_id = start_parent(replace(one.run, metrics={}), uri)
-    pages = [path for name in PAGES if (path := one.folder / name).is_file()]
+    pages = [path for name in PAGES if (path := one.folder / name).is_file() and files.inside(path, one.folder)]
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.logged(run_id, uri)
     sweep_file = one.folder / FILE
-    files.write_json(sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()})
+    files.write_json(
+        sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()}, private=True
+    )
     return BROUGHT
 
 

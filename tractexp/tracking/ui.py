@@ -32,7 +32,8 @@ def serve(
     address = f"http://{host}:{port}/"
     print(f"starting the MLflow UI on {address}, which takes about {USUAL} s; it shows {uri}", flush=True)
     started = time.monotonic()
-    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", uri, "--registry-store-uri", uri]
+    command = [sys.executable, "-m", "tractexp.compat.mlflow_own_origin", "server"]
+    command += ["--backend-store-uri", uri, "--registry-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1", *_guard(host, port)]
     settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"} | os.environ
     settings["MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE"] = "false"
@@ -58,8 +59,9 @@ def _guard(host: str, port: int) -> list[str]:
     MLflow's own choice lets in every name of a private network; and the settings of a server of the user's own, which
     may stand in the environment, are not meant for this one.
     """
-    names = [name for each in dict.fromkeys((host, "localhost")) for name in (each, f"{each}:{port}")]
-    origins = [f"http://{name}" for name in names]
+    served = [f"{each}:{port}" for each in dict.fromkeys((host, "localhost"))]
+    names = [name for each in served for name in (each.rpartition(":")[0], each)]
+    origins = [f"http://{name}" for name in (names if port == 80 else served)]
     return [
         "--allowed-hosts",
         ",".join(names),

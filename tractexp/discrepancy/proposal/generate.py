@@ -7,6 +7,7 @@ import inspect
 import re
 from collections.abc import Callable, Mapping
 
+from tractexp import quoting
 from tractexp.discrepancy.proposal import shapes
 from tractexp.discrepancy.proposal.library import Term
 
@@ -24,7 +25,7 @@ SOURCE = "proposed by the data; tractexp, docs/missing-effects.md"
 CLASS = '''
 @plugin
 class ProposedEffect(Effect):
-    r"""{headline}.
+    """{headline}.
 
         {latex}
 
@@ -62,14 +63,15 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
         f"{c} = {getattr(shapes, c):g}" for c in CONSTANTS if any(re.search(rf"\b{c}\b", f) for f in functions)
     ]
     sites = ", sites" * any("sites." in f for f in functions)
-    headline = f"{term.words[:1].upper()}{term.words[1:]}"
+    headline = quoting.python(f"{term.words[:1].upper()}{term.words[1:]}")
     text = HEAD.format(
         headline=headline, constants="\n".join(constants),
         imports=f"from tractexp.extend import Effect, Parameter, plugin{sites}",
     )  # fmt: skip
     text += "".join(f"\n\n{f}" for f in functions)
     return text.replace("\n\n\n\n", "\n\n\n") + "\n" + CLASS.format(
-        headline=headline, latex=term.latex, time=TIME * term.exogenous, records=records,
+        headline=headline, latex=quoting.python(term.latex), time=TIME * term.exogenous,
+        records=quoting.python(records),
         parameters="\n".join(_declared(term, values)), relevant=_relevant(term),
         arguments=", ".join(parameters_of(term)), body="\n".join(_body(term)),
     )  # fmt: skip
@@ -89,7 +91,8 @@ def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
     for p in parameters:
         null = "" if p.null is None else f", null={p.null}"
         null += f", power_exponent={p.power_exponent}" if p.power_exponent else ""
-        text = f'"{p.unit}", "{p.about}", SOURCE, r"{p.symbol}"{null}'
+        unit, about, symbol = map(quoting.python, (p.unit, p.about, p.symbol))
+        text = f'"{unit}", "{about}", SOURCE, "{symbol}"{null}'
         lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {text})")
     return lines
 

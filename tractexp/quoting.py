@@ -1,0 +1,101 @@
+"""Text of others, such as names in records, as it stands in what is read as code: one function for each language.
+
+Whatever the text holds, what is read back is the text, and nothing of it is obeyed.
+"""
+
+import html as _html
+import json
+import re
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+INTERPOLATION = re.compile(r"(\\*)\$\{")  # what OmegaConf replaces, and the backslashes that keep it from that
+MARKDOWN = frozenset("\\`*_<>[]|$~&#")
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # what begins a formula where a spreadsheet opens a table
+
+
+def python(text: str) -> str:
+    """The inside of a string literal of Python that is not raw, whatever its quotes: of a docstring, too.
+
+    What is no character, as in the name of a file that is no UTF-8, is read back as its escape.
+    """
+    text = text.encode(errors="backslashreplace").decode()
+    return "".join(f"\\{c}" if c in "\\\"'" else c if c.isprintable() else _code(ord(c)) for c in text)
+
+
+def _code(point: int) -> str:
+    return f"\\x{point:02x}" if point < 0x100 else f"\\u{point:04x}" if point < 0x10000 else f"\\U{point:08x}"
+
+
+def modelica(text: str) -> str:
+    """A string of Modelica (specification 3.6, section 2.4.3), with its quotes."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def html(text: str) -> str:
+    """Text in an element, or in an attribute with its quotes around."""
+    return _html.escape(text)
+
+
+def script(data: Any) -> str:
+    """JSON within a <script> element, which no text in it ends."""
+    return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def markdown(text: str) -> str:
+    """Text in a line of Markdown, of a table, too."""
+    return "".join(f"\\{c}" if c in MARKDOWN else c for c in " ".join(text.splitlines()))
+
+
+def fenced(text: str) -> str:
+    """A block of code of Markdown, which no backticks in the text end."""
+    fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
+    return f"{fence}\n{text}\n{fence}"
+
+
+def hydra(text: str, *, literal: bool = True) -> str:
+    """A value of Hydra's grammar in quotes; where it is `literal`, an interpolation within it is text, too."""
+    return "'" + re.sub(r"\\*('|$)", _doubled, omegaconf(text) if literal else text) + "'"
+
+
+def _doubled(found: re.Match[str]) -> str:
+    """Backslashes before a quote, or at the end: only there are they read as an escape."""
+    mark, slashes = found[1], found[0].removesuffix(found[1])
+    return 2 * slashes + ("\\'" if mark else "")
+
+
+def omegaconf(text: str) -> str:
+    """A text of a configuration, within which an interpolation is text."""
+    return INTERPOLATION.sub(lambda found: 2 * found[1] + "\\${", text)
+
+
+def yaml(content: Mapping[str, Any]) -> str:
+    """A configuration's file: keys stay in order, and no text in it is an interpolation."""
+    import yaml as library
+
+    return library.safe_dump(_literal(content), sort_keys=False, allow_unicode=True)
+
+
+def _literal(content: Any) -> Any:
+    if isinstance(content, Mapping):
+        return {key: _literal(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_literal(value) for value in content]
+    return omegaconf(content) if isinstance(content, str) else content
+
+
+def shell(*words: str) -> str:
+    """A command as a shell takes it."""
+    return shlex.join(words)
+
+
+def csv(text: str) -> str:
+    """A cell of a row of CSV."""
+    marked = cell(text)
+    return '"' + marked.replace('"', '""') + '"' if set(marked) & set(',"\r\n') else marked
+
+
+def cell(text: str) -> str:
+    """The content of such a cell: where a spreadsheet would take it for a formula, an apostrophe makes it text."""
+    return f"'{text}" if text.startswith(FORMULA) else text

@@ -1,0 +1,115 @@
+"""Steps of a load, or of its voltage: changes for another reason than the voltage, over within a cycle.
+
+The mean of one cycle is compared with that of the cycle after the next: a step is over within a cycle, and so is what
+the window of a phasor makes of it. A load's own answer to a dip decays, so that each cycle changes less than the one
+before it; a step does not follow from what came before it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.record.record import Record
+
+CHANGED = 0.05  # of the apparent power: what a load that is steady does not leave
+CHANGED_U = 0.01  # of the voltage: a step of a tap changer
+ANSWERED = 4.0  # times the relative change of voltage: what a load answers to it at most
+ABRUPT = 3.0  # times the changes right before and after: what does not go on
+USUAL = 8.0  # times the lower quartile of all such changes, six standard deviations of noise: more is none of them
+SMALL = 0.2  # of the greatest apparent power: steps of a smaller load count as those of this one
+STAYS = 5, 0.5  # cycles over which a step is still seen, and how much of it
+
+
+@dataclass(frozen=True)
+class Change:
+    """A step of a load, or of its voltage: samples before `first` and from `stop` on are those of steady levels."""
+
+    first: int
+    stop: int
+    before: complex  # P + jQ, in the unit of the record
+    after: complex
+
+    @property
+    def ratio(self) -> float:
+        """Apparent power after over that before."""
+        return abs(self.after) / max(abs(self.before), 1e-300)
+
+
+def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> list[Change]:
+    """The steps of P + jQ (N,), of more than 5 %, that the voltage U (N,) does not explain; `cycle` in samples."""
+    S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(cycle))
+    (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
+    if not len(before):
+        return []
+    size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL * _greatest(S))
+    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), 1e-300)
+    return list(_steps(before, after, size, answer, CHANGED, n))
+
+
+def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
+    """The steps of a voltage (N,) of more than 1 %, with the voltages in place of powers."""
+    n = max(1, round(cycle))
+    low, high = _levels(U.astype(complex), n)
+    return list(_steps(low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), CHANGED_U, n))
+
+
+def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Means (N,) of the n samples before each, and of the n that begin n samples later; empty for too few samples."""
+    if len(x) < 3 * n + 1:
+        return np.empty(0, complex), np.empty(0, complex)
+    total = np.concatenate([[0.0], np.cumsum(x)])
+    means = (total[n:] - total[:-n]) / n
+    return means[: -2 * n], means[2 * n :]
+
+
+def _steps(
+    before: np.ndarray, after: np.ndarray, size: np.ndarray, answer: np.ndarray, least: float, n: int
+) -> Iterator[Change]:
+    """The changes that stand out; entry k compares the samples up to k + n with those from k + 2 n on."""
+    if not len(before):
+        return
+    change = np.abs(after - before) / size
+    apart = np.pad(change, 2 * n)
+    beside = np.maximum(apart[: -4 * n], apart[4 * n :])
+    usual = USUAL * float(np.percentile(change, 25))
+    steps = (change - answer > max(least, usual)) & (change > ABRUPT * beside)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]]).astype(int)))
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        k = int(a + np.argmax(np.abs(after - before)[a:b]))
+        earlier, later = before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n], after[k : k + (STAYS[0] - 1) * n + 1 : n]
+        if abs(later.mean() - earlier.mean()) > STAYS[1] * abs(after[k] - before[k]):
+            yield Change(k + n, k + 2 * n, complex(before[k]), complex(after[k]))
+
+
+def without_gaps(x: np.ndarray) -> np.ndarray:
+    """x (N,) with its gaps (nan) filled in linearly; zero where it has no value."""
+    valid = np.isfinite(x)
+    if valid.all():
+        return x
+    return np.interp(np.arange(len(x)), np.flatnonzero(valid), x[valid]) if valid.any() else np.zeros(len(x))
+
+
+def _greatest(S: np.ndarray) -> float:
+    return max(float(np.percentile(np.abs(S), 95)), 1e-300)
+
+
+def smear(record: Record) -> float:
+    """Samples that a step is smeared over: a cycle, or the window of the phasors if that is longer."""
+    length = record.window.length if record.window else 0.0
+    return max(1 / record.base.frequency, length) * record.rate
+
+
+def clause(record: Record, begin: int, change: Change) -> str:
+    """What a step is; its samples count from `begin`."""
+    name = "is switched off" if change.ratio < SMALL else "changes"
+    when = record.t[begin + (change.first + change.stop) // 2]
+    return f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while the voltage stays"
+
+
+def from_to(record: Record, before: complex, after: complex) -> str:
+    """Two powers P + jQ of a record in words, in MW and Mvar where its base says so."""
+    base = record.base
+    size, units = (base.power, (" MW", " Mvar")) if base.in_mva else (1.0, ("", ""))
+    parts = zip("PQ", units, (before.real, before.imag), (after.real, after.imag), strict=True)
+    return ", ".join(f"{name} {size * a:.4g} to {size * b:.4g}{unit}" for name, unit, a, b in parts)

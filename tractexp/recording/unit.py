@@ -1,0 +1,126 @@
+"""The units of a recording's voltages and currents: as its user says, as its file says, or as their size leaves it.
+
+What a factor of a thousand hangs on is never assumed: where neither says it, the channel stays in doubt, and whoever
+needs it raises the question.
+"""
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from tractexp.errors import UserError, among
+from tractexp.recording.label import kind
+from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
+
+PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
+GREATEST = {"U": 1500.0, "I": 100.0}  # RMS in kV, kA: no network has more, so that a larger number is in V, A
+LEAST_AMPERES = 1.0  # RMS: fewer beside voltages in V may as well be kA
+_AMOUNT = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*(\D.*)", re.ASCII)
+
+
+def amount(text: str) -> tuple[float, str]:
+    """(number, unit) of a setting such as "89.8 kV", what one of the file's units stands for; (1, "kV") of "kV"."""
+    match = _AMOUNT.fullmatch(str(text))
+    return (float(match[1]), match[2].strip()) if match else (1.0, str(text).strip())
+
+
+def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAIN)) -> None:
+    """Raise `UserError` for a setting that names no quantity of a recording, or a unit that does not fit it."""
+    if not isinstance(units, Mapping):
+        raise UserError(f"data.units={units!s:.60} must be a mapping, such as data.units={{U: kV, I: A}}")
+    for letter, text in units.items():
+        if letter not in quantities:
+            raise UserError(f"data.units names '{letter}'{among(letter, quantities, 'Quantities')}")
+        if letter in PLAIN and (unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0):
+            _, small, large = PLAIN[letter]
+            raise UserError(
+                f"data.units: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small} or {large}, or, where "
+                f"the file has units of its own, so many of them: '89.8 {large}'"
+            )
+
+
+def in_units(recording: Recording, units: Mapping[str, Any], chosen: Mapping[str, Sequence[int]]) -> Recording:
+    """The recording with the unit of each voltage and current, as far as it can be known, and a note where size says.
+
+    `units` {U: kV, I: "0.5 kA"} goes before the file's; `chosen` {U: numbers, I: numbers} are channels that the user
+    calls so.
+    """
+    channels, taken, voltage = [*recording.channels], {}, ""
+    for letter, (quantity, small, _) in PLAIN.items():
+        ours = [i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen.get(letter, ())]
+        ours = [i for i in ours if channels[i].quantity in (quantity, "")]
+        if letter in units:
+            number, unit = amount(units[letter])
+            for i in ours:
+                channels[i] = _of_unit(channels[i], quantity, unit, number)
+            continue
+        stated = {channels[i].unit for i in ours if not in_doubt(channels[i])}
+        bare = [i for i in ours if not channels[i].unit.strip()]
+        if bare and _plain(letter, max(_size(channels[i]) for i in bare), stated, voltage):
+            for i in bare:
+                channels[i] = _of_unit(channels[i], quantity, small)
+            taken |= {letter: bare}
+        voltage = next((c.unit for c in (channels[i] for i in ours) if not in_doubt(c)), "")
+    return replace(recording, channels=channels, notes=(*recording.notes, *_note(channels, taken)))
+
+
+def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> list[str]:
+    """What was taken for what, in one sentence; [] where nothing was."""
+    names = ", ".join(channels[i].name.strip() for numbers in taken.values() for i in numbers)
+    small, large = (" and ".join(PLAIN[x][1] for x in taken), ", ".join(f"{x}: {PLAIN[x][2]}" for x in taken))
+    return [f"no unit of {names}: taken as {small} (data.units={{{large}}} says else)"] if taken else []
+
+
+def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
+    gain, offset = number * channel.gain, number * channel.offset
+    return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset)
+
+
+def _plain(letter: str, size: float, stated: set[str], voltage: str) -> bool:
+    """Whether numbers without a unit, of that RMS, can be nothing but volts or amperes."""
+    if size > GREATEST[letter]:
+        return True
+    in_volts = bool(voltage) and unit_of(voltage)[1] == unit_of("V")[1]
+    return letter == "I" and not stated and in_volts and size >= LEAST_AMPERES
+
+
+def _size(channel: Channel) -> float:
+    """RMS about the mean, as recorded, on the primary side."""
+    x = channel.recorded()
+    x = x[np.isfinite(x)]
+    return abs(channel.ratio) * float(x.std()) if len(x) else 0.0
+
+
+def in_doubt(channel: Channel) -> bool:
+    """Whether a channel's unit is none of voltage or current that is known."""
+    return not unit_of(channel.unit)[0]
+
+
+def check_known(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
+    """Raise `UserError` where a channel of {U: ..., I: ...} is in doubt: the question, and the setting that answers."""
+    odd = {x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])] for x, ours in numbers.items()}
+    odd = {letter: channels[0] for letter, channels in odd.items() if channels}
+    if not odd:
+        return
+    said = "; ".join(
+        f"'{c.name.strip()}' has {_unit_said(c, letter)} and numbers of an RMS of {_size(c):.4g}"
+        for letter, c in odd.items()
+    )
+    plainly = ", ".join(f"{letter}: {PLAIN[letter][2]}" for letter in odd)
+    stands = ", ".join(f"{letter}: '1.5 {PLAIN[letter][2]}'" for letter in odd)
+    raise UserError(
+        f"{recording.source}: {said}: say the unit, data.units={{{plainly}}} or V, A, or what one of the file's units, "
+        f"or one per unit, stands for, data.units={{{stands}}}"
+    )
+
+
+def _unit_said(channel: Channel, letter: str) -> str:
+    """The unit of a channel that is in doubt, and what is open about it."""
+    unit = channel.unit.strip()
+    if not unit:
+        return "no unit"
+    open_question = f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if quantity_of(unit) else ""
+    return f"the unit '{unit}'{open_question}"
