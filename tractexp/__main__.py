@@ -14,6 +14,8 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 from tractexp import credentials  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
+from tractexp.output import outlet  # noqa: E402
+from tractexp.wording import one_line  # noqa: E402
 
 UNLOGGED = (
     "-",
@@ -33,39 +35,60 @@ FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 def main(argv: Sequence[str] | None = None) -> int:
     """Entry point of `tractexp` and `python -m tractexp`; returns the exit code. `argv` is by default the process's."""
     arguments = sys.argv[1:] if argv is None else [*argv]
-    traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
     gc.set_threshold(*SELDOM)
     try:
-        for argument in arguments:
-            key, equals, _ = argument.partition("://")[0].rpartition("=")
-            credentials.check(key if equals else "what is given", argument)
-        if arguments[:1] and (place := COMMANDS.get(arguments[0])):
-            return _command(place, arguments[1:])
-        if arguments[:1] and _is_file(arguments[0]):
-            return _command(COMMANDS["look"], arguments)
-        if {"--help", "-h"} & {*arguments}:
-            from tractexp.usage import usage
-
-            print(usage())
-            return 0
-        return _run(arguments)
-    except UserError as error:
-        if traceback:
-            raise
-        print(f"tractexp: {error}", file=sys.stderr)
-    except MemoryError:
-        if traceback:
-            raise
-        print(
-            "tractexp: this takes more memory than there is; ask for less, such as a smaller population",
-            file=sys.stderr,
-        )
-    except KeyboardInterrupt as stop:
-        print(f"tractexp: {str(stop) or 'interrupted; nothing was logged for this run'}", file=sys.stderr)
-        return getattr(stop, "code", 130)
+        with outlet() as out:
+            code = _explained(arguments)
+        if out and out.lost:
+            return _refused(f"what was to be printed could not be written ({out.lost}); files are whole", code or 2)
+        return code
     finally:
         gc.freeze()  # nor at the end, when everything goes anyway
-    return 2
+
+
+def _explained(arguments: list[str]) -> int:
+    """Do what is asked; a sentence where it cannot be done."""
+    traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
+    try:
+        return _asked(arguments)
+    except KeyboardInterrupt as stop:
+        sentence = str(stop) or "interrupted; nothing was logged for this run"
+        return _refused(sentence, getattr(stop, "code", 130))
+    except (UserError, OSError, MemoryError) as error:
+        if traceback:
+            raise
+        if isinstance(error, MemoryError):
+            return _refused("this takes more memory than there is; ask for less, such as a smaller population")
+        if isinstance(error, OSError):
+            return _refused(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}")
+        return _refused(str(error))
+    except Exception as error:
+        if traceback:
+            raise
+        kind = type(error).__name__
+        why = f"the program failed, which is its own mistake: {kind}: {error}; {FULL_ERROR}=1 shows where"
+        return _refused(why, 1)
+
+
+def _refused(sentence: str, code: int = 2) -> int:
+    print(f"tractexp: {one_line(sentence)}", file=sys.stderr)
+    return code
+
+
+def _asked(arguments: list[str]) -> int:
+    for argument in arguments:
+        key, equals, _ = argument.partition("://")[0].rpartition("=")
+        credentials.check(key if equals else "what is given", argument)
+    if arguments[:1] and (place := COMMANDS.get(arguments[0])):
+        return _command(place, arguments[1:])
+    if arguments[:1] and _is_file(arguments[0]):
+        return _command(COMMANDS["look"], arguments)
+    if {"--help", "-h"} & {*arguments}:
+        from tractexp.usage import usage
+
+        print(usage())
+        return 0
+    return _run(arguments)
 
 
 def _command(place: str, arguments: list[str]) -> int:
@@ -121,7 +144,7 @@ def _run(arguments: list[str]) -> int:
         try:
             with explained():
                 (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
-        except (UserError, OSError, MemoryError) as error:  # raised again below, beyond what Hydra would print about it
+        except Exception as error:  # raised again below, beyond what Hydra would print about it
             ended.append(error)
 
     with explained():

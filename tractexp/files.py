@@ -1,4 +1,4 @@
-"""Paths of files, and the only way in which the package writes them: whole, or not at all.
+"""Paths of files, how others' files are read, and the only way in which the package writes: whole, or not at all.
 
 Nothing else in the package opens a file to write. What a job prints, which grows, has its own way in.
 """
@@ -11,6 +11,7 @@ import json
 import math
 import os
 import re
+import stat
 import tempfile
 import time
 from collections.abc import Iterator
@@ -22,6 +23,8 @@ from tractexp.errors import UserError
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".tractexp.part"  # ends the name of a file that is being written
 OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)  # that name: nobody else gives a file such a one
+LARGEST = 2 << 30  # bytes of a file that is read at once
+ODD = {stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
 def located(path: str) -> Path:
@@ -35,6 +38,61 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
+def there(path: Path | str) -> bool:
+    """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for no name of a file.
+
+    To open a named pipe waits for ever, a device may have no end, and a name that is no text can be stored nowhere.
+    """
+    name = str(path)
+    try:
+        os.fsencode(name).decode()
+        kind = stat.S_IFMT(os.stat(path).st_mode)
+    except UnicodeError:
+        raise UserError(f"{name}: this name is no UTF-8 text; rename the file") from None
+    except (FileNotFoundError, NotADirectoryError):
+        if os.path.islink(path):
+            raise UserError(f"{name} is a link that leads nowhere; give the file itself") from None
+        return False
+    except (OSError, ValueError) as error:
+        raise UserError(f"{name:.200} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+    if kind in ODD:
+        raise UserError(f"{name} is {ODD[kind]}, no ordinary file; write what it holds to a file, and give that")
+    return kind == stat.S_IFREG
+
+
+def read(path: Path | str, limit: int | None = None) -> bytes:
+    """The content of an ordinary file, or its first bytes to a limit.
+
+    Raises `UserError` for what is none, is larger than `LARGEST` or cannot be read, `FileNotFoundError` where it is
+    missing.
+    """
+    try:
+        if there(path) and limit is None and (size := os.stat(path).st_size) > LARGEST:
+            raise UserError(
+                f"{path} has {size / 1e9:.3g} GB; what is read at once has at most {LARGEST / 1e9:.2g} GB: give a part"
+            )
+        with open(path, "rb") as file:
+            return file.read(-1 if limit is None else limit)
+    except FileNotFoundError:
+        raise
+    except OSError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
+
+
+def read_json(path: Path | str) -> Any:
+    """What a JSON file holds. Raises `UserError` for what is none, and as `read`."""
+    try:
+        return json.loads(read(path).decode("utf-8-sig"))
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}: line {error.lineno}: not valid JSON ({error.msg})") from error
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
+    except RecursionError as error:
+        raise UserError(f"{path}: its brackets lie deeper within one another than can be read") from error
+    except ValueError as error:  # what Python's reader of whole numbers refuses
+        raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
+
+
 def write(
     path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None,
     private: bool = False,
@@ -46,7 +104,7 @@ def write(
     Raises `UserError` where the folder or the file cannot be written.
     """
     path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
+    data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting, private)
         if modified is not None:
@@ -57,10 +115,15 @@ def write(
     return path
 
 
+def encoded(content: str | bytes) -> bytes:
+    """Text as UTF-8; half a character, as in a name that is no text, becomes its escape."""
+    return content.encode(errors="backslashreplace") if isinstance(content, str) else content
+
+
 def offer(path: Path | str, content: str | bytes) -> None:
     """As `write`, but a file that is there already stays: of several processes the first one's stands."""
     path = Path(path)
-    data = content.encode() if isinstance(content, str) else content
+    data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
         _fill(temporary, data, lasting=False)
         try:
@@ -233,7 +296,7 @@ def plain(content: Any) -> Any:
         return plain(content.tolist())
     if isinstance(content, float):
         return content if math.isfinite(content) else None
-    return content if isinstance(content, str | int | bool | None) else str(content)
+    return content if isinstance(content, int | bool | None) else encoded(str(content)).decode()
 
 
 def _umask() -> int:

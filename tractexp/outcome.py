@@ -5,7 +5,6 @@ such as the figures of a page, is computed again from the call where it is asked
 with the same records, settings and seed gives the same bits.
 """
 
-import json
 import tempfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -70,7 +69,7 @@ class Outcome(Tabulated):
         """As `from_dict`; raises `UserError` where something is missing or of the wrong kind."""
         try:
             return cls.from_dict(content)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
+        except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
             raise UserError(f"this is not a whole saved {cls.kind}: {reason}; save it again") from error
 
@@ -144,11 +143,11 @@ def not_drawn(path: Path, error: Exception) -> str:
 def saved(path: Path | str) -> dict[str, Any]:
     """The content of a saved result, its kind checked to be there. Raises `UserError` where it is none."""
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or error}; give a file written by save()") from error
-    except ValueError as error:
-        raise UserError(f"{path} is not a saved result: {error}") from error
-    if not (isinstance(content, dict) and MARK in content and "kind" in content):
+        content = files.read_json(path)
+    except FileNotFoundError as error:
+        raise UserError(f"{path} cannot be read: {error.strerror}; give a file written by save()") from error
+    except UserError as error:
+        raise UserError(f"{error}: this is not a saved result") from error
+    if not (isinstance(content, dict) and MARK in content and isinstance(content.get("kind"), str)):
         raise UserError(f"{path} is not a saved result: it lacks the keys '{MARK}' and 'kind', which save() writes")
     return content

@@ -12,6 +12,8 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from tractexp.wording import one_line, shown
+
 LOG_WIDTH = 120  # characters a table may take in a log file
 FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
 BLINK = 0.15  # s between two pictures of a bar in a notebook
@@ -31,7 +33,7 @@ def console() -> Any:
 
 def say(text: str = "") -> None:
     """Print one line."""
-    console().print(text, markup=False)
+    console().print(shown(text), markup=False)
 
 
 @contextmanager
@@ -103,8 +105,8 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
     if callable(progress) or progress is False:
         yield progress or (lambda line: None)
     elif _lively():
-        with _live([TimeElapsedColumn(), TextColumn("{task.fields[stage]}")], None, stage="") as update:
-            yield lambda line: update(stage=line)
+        with _live([TimeElapsedColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage="") as update:
+            yield lambda line: update(stage=one_line(line))
     else:
         yield lambda line: say(f"  {line}")
 

@@ -1,10 +1,25 @@
 """Numbers as a person reads them: the one format of probabilities and errors on pages and the console."""
 
 import math
+import re
 from collections.abc import Sequence
 
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
 MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
+
+
+# what moves a cursor, recolors a terminal or turns the direction of what follows, and halves of characters
+UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def shown(text: object) -> str:
+    """A text of others, such as a channel's name, for a terminal: its control characters as `\\x1b`, but for lines."""
+    return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), str(text))
+
+
+def one_line(text: object) -> str:
+    """As `shown`, where a line break would be a line of somebody else's."""
+    return shown(text).replace("\n", "\\n")
 
 
 def in_words(p: float) -> str:
@@ -27,6 +42,11 @@ def with_error(value: float, error: float) -> str:
 def percent(share: float) -> str:
     """A share of a whole that is itself estimated: what seems more than all of it is all, and less than none, none."""
     return f"{min(max(share, 0.0), 1.0):.0%}"
+
+
+def epsilon(error: float | None) -> str:
+    """A relative error of Eq. (20); a record without that power has none."""
+    return "undefined" if error is None or not math.isfinite(error) else f"{error:.3%}"
 
 
 def joined(names: Sequence[str], last: str = "and") -> str:

@@ -4,8 +4,13 @@ import time
 import tracemalloc
 
 import numpy as np
+import pytest
 
+import tractexp
 from tractexp.plugin import build
+from tractexp.provenance import digest
+from tractexp.record import Record, detect
+from tractexp.record.dips import around
 
 
 def test_a_million_rows_take_about_a_second_and_memory_like_the_file(tmp_path, monkeypatch):
@@ -22,3 +27,27 @@ def test_a_million_rows_take_about_a_second_and_memory_like_the_file(tmp_path, m
     reader.read()
     assert tracemalloc.get_traced_memory()[1] < 400e6
     tracemalloc.stop()
+
+
+def hour(rows: int) -> Record:
+    """A table at 50 Hz with a dip every 100 s from 150 s on."""
+    t = np.arange(rows) / 50
+    U = np.where((t > 100) & (t % 100 > 50) & (t % 100 < 50.2), 0.6, 1.0)
+    return Record("hour", t, U, 0.8 * U, 0.6 * U)
+
+
+@pytest.mark.parametrize("rows", [45_000, 90_000, 180_000])
+def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
+    whole = detect(hour(rows))
+    part = around(whole)
+    assert part.record.samples == 6_009  # whatever the table holds: a minute before, the dip, a minute after
+    assert (part.t_start, part.depth, part.P0, part.noise_P) == (
+        whole.t_start, whole.depth, pytest.approx(whole.P0), pytest.approx(whole.noise_P, abs=1e-12),
+    )  # fmt: skip
+    assert digest(part.record) == digest(whole.record)
+    assert part.record.notes == (f"of {rows / 50:.0f} s those from 90 to 210 s are used, about the first dip",)
+
+
+def test_shorter_records_are_as_they_are():
+    for event in tractexp.read("tibet_50pct"):
+        assert around(event) is event

@@ -4,31 +4,20 @@ import dataclasses
 import functools
 import inspect
 import re
-import types
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from numbers import Integral, Real
-from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, ParamSpec, TypeVar, get_type_hints
 
 from tractexp import plugin
 from tractexp.choices import defaults
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_distinct
+from tractexp.kinds import check_kind
 
 P = ParamSpec("P")
 R = TypeVar("R")
 
 SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
-WORDS: Mapping[Any, str] = {
-    int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
-}  # fmt: skip
-GIVEN: Mapping[Any, str] = {
-    bool: "a truth value",
-    type(None): "nothing",
-    dict: "a mapping",
-    list: "a list",
-    tuple: "a list",
-}
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
@@ -65,47 +54,6 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             raise UserError(sentence) from error.__cause__
 
     return called
-
-
-def check_kind(name: str, value: Any, annotation: Any) -> None:
-    """Raise `UserError` where a value is not of the kind an annotation says."""
-    if not _is(value, annotation):
-        kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
-        allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
-        raise UserError(f"{name}={value!r:.60} is {_kind(value)}, but it must be {allowed}")
-
-
-def _is(value: Any, kind: Any) -> bool:
-    origin, inner = get_origin(kind), get_args(kind)
-    if origin in (Union, types.UnionType):
-        return any(_is(value, one) for one in inner)
-    if kind in (int, float):
-        return isinstance(value, Integral if kind is int else Real) and not isinstance(value, bool)
-    if origin in (Sequence, list, tuple):
-        listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
-        return listed and all(_is(one, inner[0]) for one in value)
-    if origin is Mapping or origin is dict:
-        return isinstance(value, Mapping) and all(_is(one, inner[1]) for one in value.values())
-    kind = origin or kind
-    return not isinstance(kind, type) or kind in (Any, inspect.Parameter.empty) or isinstance(value, kind)
-
-
-def _word(kind: Any) -> str:
-    origin = get_origin(kind)
-    if origin in (Sequence, list, tuple):
-        return f"a list, each {_word(get_args(kind)[0])}"
-    if origin is Mapping or origin is dict:
-        return f"a mapping, each value {_word(get_args(kind)[1])}"
-    return WORDS.get(kind) or _article(getattr(kind, "__name__", str(kind)))
-
-
-def _kind(value: Any) -> str:
-    """What a value is, in the words in which it is said what it must be."""
-    return GIVEN.get(type(value)) or WORDS.get(type(value)) or _article(type(value).__name__)
-
-
-def _article(name: str) -> str:
-    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
 @dataclass(frozen=True)

@@ -240,7 +240,11 @@ class Investigation(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Question.from_dict(content["question"]), content["content"], Result(**content["result"]))
+        return cls(
+            Question.from_dict(content["question"]),
+            content["content"],
+            Result.of(content["result"], "the saved result"),
+        )
 
     def write_results(self, folder: Path) -> list[Path]:
         """discrepancy.json and result.json.

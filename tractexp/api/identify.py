@@ -20,6 +20,7 @@ from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, tell
+from tractexp.wording import epsilon
 
 if TYPE_CHECKING:
     from tractexp.identification.adequacy import Adequacy
@@ -229,8 +230,8 @@ class Identification(Written):
             values = np.array([self.result.parameters[name] for name in self.model.model.names])
             (one,) = dips_of("event", event, least=1)[:1]
             return respond_to(self.model.model, values, one, self.result.base)
-        time, voltage = (np.asarray(values, dtype=float) for values in (t, U))
-        return Response("prediction", time, voltage, *self.result.predict(time, voltage, f, P0, Q0))
+        P, Q = self.result.predict(t, U, f, P0, Q0)
+        return Response("prediction", np.asarray(t, dtype=float), np.asarray(U, dtype=float), P, Q)
 
     def table(self) -> Table:
         """Estimates with intervals and verdicts, the search's end only where it lies outside."""
@@ -280,7 +281,8 @@ class Identification(Written):
         if not (s := self.result.search):
             return ""
         end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
-        end += f" {self.result.objective:.4g}), epsilon_p {s['epsilon_p']:.3%}, epsilon_q {s['epsilon_q']:.3%},"
+        errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
+        end += f" {self.result.objective:.4g}), {errors},"
         return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s"
 
     def to_dict(self) -> dict[str, Any]:
@@ -295,7 +297,7 @@ class Identification(Written):
         if found is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
             found = SearchResult(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-        return cls(Result(**content["result"]), setup and FitSpec.from_dict(setup), found)
+        return cls(Result.of(content["result"], "the saved result"), setup and FitSpec.from_dict(setup), found)
 
     def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history

@@ -1,9 +1,9 @@
 """Read a saved result back."""
 
 import importlib.util
-import json
 from pathlib import Path
 
+from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.errors import UserError, among
 from tractexp.outcome import MARK, Outcome, saved
@@ -16,7 +16,7 @@ def load(path: str | Path) -> Outcome:
     The latter holds no records: it predicts, simulates and exports, but cannot be judged again. Raises `UserError`
     where the file is missing, damaged or of no kind known.
     """
-    if _bare(Path(path)):
+    if _bare(path):
         from tractexp.api.identify import Identification
         from tractexp.identification.result import load as read_result
 
@@ -29,11 +29,11 @@ def load(path: str | Path) -> Outcome:
     return known[content["kind"]].revived(content)
 
 
-def _bare(path: Path) -> bool:
+def _bare(path: str | Path) -> bool:
     """Whether a file is a result.json rather than a saved result."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = files.read_json(path)
+    except (FileNotFoundError, UserError):
         return False
     return isinstance(content, dict) and MARK not in content and "parameters" in content
 

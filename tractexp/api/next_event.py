@@ -1,7 +1,6 @@
 """What to record next, so that explanations which fit equally well are told apart."""
 
 import functools
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -87,12 +86,14 @@ def sets_of(rivals: Any) -> list[list[str]]:
     if not isinstance(rivals, str):
         return [name.split("+") if isinstance(name, str) else list(name) for name in rivals]
     path = Path(rivals)
-    if not path.is_file():
+    if not files.there(path):
         raise UserError(
             f"task.rivals={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
             " discrepancy.json of an investigation that ended tied"
         )
-    investigation = json.loads(path.read_text(encoding="utf-8"))
+    investigation = files.read_json(path)
+    if not isinstance(investigation, dict) or "verdict" not in investigation:
+        raise UserError(f"task.rivals={rivals}: this is not the discrepancy.json of an investigation")
     if investigation.get("verdict") != "tied":
         raise UserError(
             f"task.rivals={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that there is"

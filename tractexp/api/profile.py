@@ -79,7 +79,7 @@ class Profiled(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        fit, result = Identification.from_dict(content["fit"]), Result(**content["result"])
+        fit, result = Identification.from_dict(content["fit"]), Result.of(content["result"], "the saved result")
         return cls(fit, content["points"], content["content"], result, content["curvature"])
 
     def write_results(self, folder: Path) -> list[Path]:

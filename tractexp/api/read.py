@@ -14,6 +14,7 @@ from tractexp.composition import choices
 from tractexp.errors import UserError, among
 from tractexp.outcome import Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
+from tractexp.record.dips import around
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -35,7 +36,7 @@ class Dips(Tabulated, list[Event]):
         """One row for each event."""
         rows = [
             [e.record.name, e.t_start, f"{e.depth:.0%}", round(1000 * e.duration), round(e.rate), e.P0, e.Q0,
-             f"{e.noise_P / max(abs(e.P0), 1e-9):.2%}", " ".join(e.record.channels)]
+             "" if e.noise_share is None else f"{e.noise_share:.2%}", " ".join(e.record.channels)]
             for e in self
         ]  # fmt: skip
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
@@ -99,7 +100,7 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
 def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
     """Events fitted and held out, as `dips_of`, all on the base of the load in the first one."""
     train, held = dips_of("records", records, least=1), dips_of("validate", validate)
-    events = on_own_base([*train, *held])
+    events = on_own_base([around(event) for event in (*train, *held)])
     return Dips(events[: len(train)]), Dips(events[len(train) :])
 
 

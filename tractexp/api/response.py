@@ -11,6 +11,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.record import Event, OwnBase
+from tractexp.wording import epsilon
 
 if TYPE_CHECKING:
     from tractexp.identification.result import Fit
@@ -41,14 +42,14 @@ class Response:
     @property
     def row(self) -> list[str]:
         """Title, lowest U, lowest and highest P and Q, and both errors, as a table shows them."""
-        errors = [f"{e:.3%}" for e in self.epsilon] if self.epsilon else ["", ""]
-        errors += [] if self.epsilon_i is None else [f"{self.epsilon_i:.3%}"]
+        errors = [*map(epsilon, self.epsilon)] if self.epsilon else ["", ""]
+        errors += [] if self.epsilon_i is None else [f"{epsilon(self.epsilon_i)}"]
         ends = self.U.min(), self.P.min(), self.P.max(), self.Q.min(), self.Q.max()
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
     def __repr__(self) -> str:
-        errors = ", epsilon_p {:.3%}, epsilon_q {:.3%}".format(*self.epsilon) if self.epsilon else ""
-        errors += "" if self.epsilon_i is None else f", epsilon_i {self.epsilon_i:.3%}"
+        errors = ", epsilon_p {}, epsilon_q {}".format(*map(epsilon, self.epsilon)) if self.epsilon else ""
+        errors += "" if self.epsilon_i is None else f", epsilon_i {epsilon(self.epsilon_i)}"
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
     def _repr_html_(self) -> str:

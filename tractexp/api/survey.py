@@ -145,8 +145,8 @@ def survey(
     fresh = [name for name in names if name not in rows]
     with counting("files", len(fresh), progress) as count:
         for name, made in looked(place, fresh, cores or _cores()):
-            rows[name] = made
-            store.write(names[name] if keep else "", json.dumps(files.plain(made), ensure_ascii=False).encode())
+            rows[name] = files.plain(made)
+            store.write(names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode())
             count()
     content = {
         "folder": str(folder), "files": len(names), "looked_at": len(fresh), "about": ABOUT,

@@ -68,11 +68,11 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) ->
     told = event_row(seen)
     begun = view.recording.start if view.recording else None
     event = seen.event
-    noise = event.noise_P / max(abs(event.P0), 1e-9) if event is not None else None
     return {
         **_common(view), **{key: value for key, value in told.items() if key in COLUMNS},
         "event": archive.event_name(file, number, seen), "load": shown.name, "unit": "pu" if shown.per_unit else "MW",
-        "when": (begun + timedelta(seconds=told["start"])).isoformat() if begun else None, "noise": noise,
+        "when": (begun + timedelta(seconds=told["start"])).isoformat() if begun else None,
+        "noise": event and event.noise_share,
         "command": command(view, shown) if seen.worth else "", **_pictures(shown, seen),
     }  # fmt: skip
 

@@ -201,9 +201,10 @@ class Job:
     def events_of_fit(self) -> Any:
         """The events as a fit takes them: on the base of the load in the first (`Events` of `Event`)."""
         from tractexp.record import Events, on_own_base
+        from tractexp.record.dips import around
 
         train, validate = self.events.train, self.events.validate
-        moved = on_own_base([*train, *validate])
+        moved = on_own_base([around(event) for event in (*train, *validate)])
         return Events(moved[: len(train)], moved[len(train) :])
 
     def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":

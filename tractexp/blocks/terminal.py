@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
+from tractexp.wording import one_line, shown
 
 WIDTH = 200  # characters of a line of text that is no terminal's
 
@@ -13,13 +14,13 @@ def show(report: Report, console: Any) -> None:
     """Print a report on a console of rich."""
     for text in (report.title, report.lead):
         if text:
-            console.print(text, markup=False)
+            console.print(shown(text), markup=False)
     for block in report.blocks:
         if isinstance(block, Table):
             _table(block.brief, console)
         else:
             for line in _lines(block):
-                console.print(line, markup=False)
+                console.print(shown(line), markup=False)
 
 
 def _lines(block: Any) -> Sequence[str]:
@@ -51,11 +52,11 @@ def _table(table: Table, console: Any) -> None:
 
     if not table.columns:
         return
-    grid = Grid(title=table.title or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    grid = Grid(title=one_line(table.title) or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
     last = len(table.columns) - 1
     for i, column in enumerate(table.columns):
-        left = i == 0 or i in table.words
-        grid.add_column(str(column), justify="left" if left else "right", no_wrap=i < last and i not in table.words)
+        justify, fixed = "left" if i == 0 or i in table.words else "right", i < last and i not in table.words
+        grid.add_column(one_line(column), justify=justify, no_wrap=fixed)
     for row in table.cells:
-        grid.add_row(*row)
+        grid.add_row(*map(one_line, row))
     console.print(grid, markup=False)

@@ -73,13 +73,17 @@ def versions() -> Iterator[Finding]:
 
 
 def cores() -> Iterator[Finding]:
-    """How many cores a sweep may use, and whether a worker starts."""
+    """How many cores a sweep may use, and whether a worker starts.
+
+    However long it takes, and as often as a sweep tries it: on a machine that is short of time or memory the first may
+    be killed before it begins.
+    """
     from joblib import cpu_count
 
     from tractexp.workers import Workers
 
     try:
-        list(Workers(1, apart=True).completed(abs, [1], 1))
+        list(Workers(1, apart=True).results(abs, [1], trace=lambda item: False))
     except Exception as error:
         yield WRONG, f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot run"
         return

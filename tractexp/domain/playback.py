@@ -49,9 +49,13 @@ class Playback:
 
 
 def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out."""
+    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out.
+
+    nan where nothing was measured but zero.
+    """
     valid = np.isfinite(measured)
-    return float(np.linalg.norm((calculated - measured)[valid]) / np.linalg.norm(measured[valid]))
+    size = float(np.linalg.norm(measured[valid]))
+    return float(np.linalg.norm((calculated - measured)[valid])) / size if size > 0 else float("nan")
 
 
 def current_error(event: WaveEvent, currents: np.ndarray) -> float:

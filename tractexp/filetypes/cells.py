@@ -67,12 +67,17 @@ def numbers(cells: Sequence[Any], decimal: str = ".", gaps: bool = False) -> np.
             values[row] = _number(cell, decimal)
         except ValueError:
             if not is_gap(cell):
-                raise BadCell(row, f"'{cell:.40}' is not a number{_comma(str(cell), decimal)}") from None
+                raise BadCell(row, f"{_quoted(cell)} is not a number{_comma(str(cell), decimal)}") from None
             if not gaps:
-                what = f"'{cell}' stands for no value" if cell and str(cell).strip() else "the cell is empty"
+                what = f"{_quoted(cell)} stands for no value" if cell and str(cell).strip() else "the cell is empty"
                 raise BadCell(row, f"{what}; only P and Q may have gaps") from None
             values[row] = np.nan
     return values
+
+
+def _quoted(cell: Any) -> str:
+    """A cell in a message: of a list, of bytes or of a long text its beginning."""
+    return f"'{cell!s:.40}'"
 
 
 def _number(cell: Any, decimal: str) -> float:
@@ -109,7 +114,7 @@ def times(cells: Sequence[Any]) -> tuple[np.ndarray, dt.datetime | None]:
         day, seconds = _moment(cell, row)
         seconds_of_rows[row] = seconds
         if (day is None) != (first is None):
-            raise BadCell(row, f"'{cell}' {'lacks' if day is None else 'has'} a date, unlike the first row")
+            raise BadCell(row, f"{_quoted(cell)} {'lacks' if day is None else 'has'} a date, unlike the first row")
         if day is not None and first is not None:
             seconds_of_rows[row] += (day - first).days * DAY
     if first is not None:
@@ -129,13 +134,13 @@ def _moment(cell: Any, row: int) -> tuple[dt.date | None, float]:
         return cell, 0.0  # a sheet's midnight
     match = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
     if match is None:
-        raise BadCell(row, f"'{cell}' is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
+        raise BadCell(row, f"{_quoted(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
     day = _day(match["day"]) if match["day"] else None
     if match["day"] and day is None:
-        raise BadCell(row, f"'{match['day']}' is no date; write it as 2024-03-31")
+        raise BadCell(row, f"{_quoted(match['day'])} is no date; write it as 2024-03-31")
     hours, minutes, seconds = int(match["h"] or 0), int(match["m"]), float(match["s"].replace(",", "."))
     if hours > 24 or minutes > 59 or seconds >= 61:
-        raise BadCell(row, f"'{cell}' is no time of a day")
+        raise BadCell(row, f"{_quoted(cell)} is no time of a day")
     if match["half"]:
         hours = hours % 12 + 12 * (match["half"] in "Pp")
     return day, hours * 3600 + minutes * 60 + seconds - _offset(match["zone"])

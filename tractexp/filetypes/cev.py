@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_header import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
@@ -43,14 +44,11 @@ class EventReport:
 def load(path: Path, encoding: str | None = None) -> Recording:
     """Read a compressed event report; raises `UserError` naming line, column and value of what is wrong."""
     path = Path(path)
-    if not path.is_file():
-        raise UserError(f"{path}: there is no such file")
+    if not files.there(path):
+        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
+    content = files.read(path)
     text, encoding = decode(content, str(path), encoding)
     remarks = Remarks(str(path))
     report = _report(path, text, remarks)

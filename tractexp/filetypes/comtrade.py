@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError, nearest
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import Analog, Digital, Header, parse
@@ -72,7 +73,7 @@ def _combined(path: Path, encoding: str | None) -> Recording:
 
 def _sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
-    content = path.read_bytes()
+    content = files.read(path)
     sections: dict[str, ByteRange] = {}
     at = 0
     while (match := _SECTION.search(content, at)) is not None:
@@ -220,7 +221,7 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
 
 
 def _existing(path: Path) -> Path:
-    if not path.is_file():
+    if not files.there(path):
         names = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
         raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
     return path
@@ -249,7 +250,7 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
 
 def _beside(path: Path, ending: str) -> Path | None:
     for one in (ending, ending.upper(), ending.capitalize()):
-        if path.with_suffix(one).is_file():
+        if files.there(path.with_suffix(one)):
             return path.with_suffix(one)
     wanted = path.with_suffix(ending).name.casefold()
     return next(

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.files import located
 from tractexp.record.record import DECLARATION, LOAD, SIZES, Base
@@ -29,19 +30,12 @@ class Sidecar:
 def beside(path: str) -> Sidecar:
     """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
     own = located(path)
-    file = own.with_name(f"{own.stem}.json")
-    if own.suffix.lower() == ".json" or not file.is_file():
+    if own.suffix.lower() == ".json" or not files.there(own):
         return Sidecar()
-    try:
-        content = json.loads(file.read_bytes().decode("utf-8-sig"))
-    except json.JSONDecodeError as error:
-        raise UserError(f"{file}: line {error.lineno}: not valid JSON ({error.msg})") from error
-    except UnicodeDecodeError as error:
-        raise UserError(f"{file}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
-    except RecursionError as error:
-        raise UserError(f"{file}: its brackets lie deeper within one another than can be read") from error
-    except ValueError as error:  # what Python's reader of whole numbers refuses
-        raise UserError(f"{file}: a whole number in it has more digits than can be read") from error
+    file = own.with_name(f"{own.stem}.json")
+    if not files.there(file):
+        return Sidecar()
+    content = files.read_json(file)
     if not isinstance(content, dict):
         return Sidecar()
     notes = [content["note"]] if isinstance(content.get("note"), str) else []

@@ -1,6 +1,5 @@
 """Tables of any shape: text, Parquet, Excel. What columns they have, and the numbers in those that are wanted."""
 
-import io
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError, among, check_choice, nearest
 from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
+from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
+MOST = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
     b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV",
@@ -141,20 +143,14 @@ def content(path: str, limit: int | None = None) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
     file = located(path)
     folder = file.parent
-    if not file.is_file():
+    if not files.there(file):
         if file.is_dir():
             raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
         names = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
         hint = "; that folder does not exist" if names is None else nearest(file.name, names)
         raise UserError(f"{path}: there is no such file in {folder}{hint}")
-    try:
-        if limit is None:
-            return file.read_bytes()
-        with file.open("rb") as opened:
-            data = opened.read(limit)
-        return data if len(data) < limit else data[: data.rfind(b"\n") + 1] or data
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or 'it is no ordinary file'}") from error
+    data = files.read(file, limit)
+    return data if limit is None or len(data) < limit else data[: data.rfind(b"\n") + 1] or data
 
 
 def _parquet(path: str, data: bytes) -> TableFile:
@@ -162,7 +158,10 @@ def _parquet(path: str, data: bytes) -> TableFile:
     from pyarrow import parquet
 
     try:
-        parsed = parquet.read_table(pyarrow.BufferReader(data))
+        file = parquet.ParquetFile(pyarrow.BufferReader(data))
+        if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST:
+            raise UserError(f"{path}: {values:,} values are more than the {MOST:,} that can be read; give a part of it")
+        parsed = file.read()
         names = [str(name) for name in parsed.column_names]
         columns = [_arrow(parsed.column(k)) for k in range(len(names))]
     except (pyarrow.ArrowException, OSError, ValueError) as error:
@@ -196,13 +195,16 @@ def _utc(chunked: Any) -> Any:
 
 def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:
     """One sheet of a workbook: the chosen one, else the first with rows of numbers."""
-    import python_calamine
-
     try:
-        book = python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
-        names = list(book.sheet_names)
-    except (python_calamine.CalamineError, OSError, ValueError) as error:
-        raise UserError(f"{path}: not a workbook that can be read; save it as .xlsx, or the sheet as CSV") from error
+        with Workbook(data) as book:
+            return _sheet_of(path, book, form)
+    except BadWorkbook as bad:
+        why = str(bad) or "not a workbook that can be read; save it as .xlsx"
+        raise UserError(f"{path}: {why}, or the sheet as CSV") from bad
+
+
+def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
+    names = book.names
     if form.sheet is not None:
         return _rows_of(path, book, _sheet_name(path, names, form.sheet), form)
     refused: list[UserError] = []
@@ -226,13 +228,13 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
     raise UserError(f"data.sheet={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
 
 
-def _rows_of(path: str, book: Any, name: str, form: TableForm) -> Rows:
-    import python_calamine
-
+def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
     try:
-        rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-    except (python_calamine.CalamineError, OSError, ValueError) as error:
-        raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from error
+        rows = book.rows(name)
+    except BadWorkbook as bad:
+        if str(bad):
+            raise
+        raise UserError(f"{path}: sheet '{name}' cannot be read; save it as CSV") from bad
     source = f"{path}: sheet '{name}'"
     filled = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
     if not filled:

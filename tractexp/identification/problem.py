@@ -17,6 +17,7 @@ from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
 from tractexp.parameter import Box, Parameter, even
 from tractexp.record import Event
+from tractexp.record.own_base import SMALLEST
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 
@@ -53,6 +54,17 @@ def _check_channels(model: Model, events: Sequence[Event]) -> None:
         raise UserError(
             f"the {what} reads {channel}, which {event.record.where} does not have; record {channel}, or {mend}"
         )
+
+
+def _check_power(events: Sequence[Event]) -> None:
+    """Raise `UserError` for an event in which nothing draws power: every model fits it, and none is told."""
+    for event in events:
+        drawn = float(np.nanmax(np.hypot(event.record.P, event.record.Q)))
+        if not drawn > SMALLEST:
+            raise UserError(
+                f"{event.record.where}: P and Q reach {drawn:.3g} pu at most: there is no load in this record; "
+                "give one of a feeder that draws power"
+            )
 
 
 @dataclass(frozen=True)
@@ -105,6 +117,7 @@ class Problem:
         self.model = model
         self.events = self.domain.events(events)
         _check_channels(model, self.events)
+        _check_power(events)
         self.parameters = narrowed(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:

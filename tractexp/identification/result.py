@@ -1,6 +1,8 @@
 """What an identification found: the estimate, how well it fits each event, and its file `result.json`."""
 
 import json
+import math
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
@@ -12,6 +14,7 @@ from tractexp import files, provenance
 from tractexp.domain import DOMAINS, Playback, domain_of
 from tractexp.domain.playback import relative_error
 from tractexp.errors import UserError
+from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.model_error import ModelError, in_percent, model_error
 from tractexp.identification.problem import Problem
@@ -23,6 +26,7 @@ from tractexp.record import Event, OwnBase, Record, find_dips
 from tractexp.record.own_base import scaled
 
 TRAIN, VALIDATE = "train", "validate"
+BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady state stands on
 SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
 
 
@@ -116,6 +120,31 @@ class Result:
     tractexp_version: str = ""
     commit: str = ""  # of the package's repository; "" for a wheel
 
+    @classmethod
+    def of(cls, content: Any, where: str) -> "Result":
+        """The result that a file holds; `where` names it. Values outside their bounds are warned of.
+
+        Raises `UserError` for what no identification writes: other keys or kinds, a model that is none, parameters that
+        are missing or no finite numbers.
+        """
+        stored.check_fields(cls, content, where)
+        made = cls(**stored.without_nulls(cls, content))
+        for name in ("parameters", "per_event", "before", "bounds"):
+            stored.check_numbers(f"{where}: {name}", getattr(made, name))
+        try:
+            motor, static, effects, *_ = parts(made.model)
+            ratio = made.base.ratio
+        except (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError) as error:
+            raise UserError(f"{where}: its model or own_base is none that an identification writes") from error
+        if missing := [key for key in BEFORE if key not in made.before]:
+            raise UserError(f"{where}: before lacks {missing[0]}; identify again")
+        if not (math.isfinite(ratio) and ratio > 0):
+            raise UserError(f"{where}: own_base has powers that are no finite numbers above zero; identify again")
+        stored.check_parameters(where, made.parameters, (motor, static, *effects))
+        for sentence in stored.outside(by_event(made.parameters, made.per_event), made.bounds):
+            warnings.warn(f"{where}: {sentence}", UserWarning, stacklevel=2)
+        return made
+
     @property
     def base(self) -> OwnBase:
         """The base of power that the parameters are on, and that of the file."""
@@ -162,35 +191,35 @@ class Result:
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
-        return files.write(path, json.dumps(asdict(self), indent=2, ensure_ascii=False) + "\n")
+        return files.write(path, json.dumps(files.plain(asdict(self)), indent=2, ensure_ascii=False) + "\n")
 
     def predict(
-        self,
-        t: np.ndarray,
-        U: np.ndarray,
-        f: np.ndarray | None = None,
-        P0: float | None = None,
-        Q0: float | None = None,
+        self, t: Any, U: Any, f: Any = None, P0: float | None = None, Q0: float | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
 
         Powers, given and calculated, are on the file's base. The voltage before the first dip (all of it where there is
         none) gives the steady state. P0 and Q0 are the power drawn there; by default that of the event the model was
         identified on. Of a model identified in waveforms the voltage is taken as balanced, and the power is
-        instantaneous.
+        instantaneous. Raises `UserError` for what is no finite number, and where there is no steady state.
         """
         model = compose(*parts(self.model))
-        t, U = np.asarray(t, dtype=float), np.asarray(U, dtype=float)
+        drawn = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
+        stored.check_numbers("predict()", drawn)
+        signals = stored.signals({"t": t, "U": U, "f": f})
+        t, U, f = signals["t"], signals["U"], signals.get("f")
         dips = find_dips(t, U)
         steady = slice(0, max(dips[0][0], 1) if dips else None)
         nominal = 2 * np.pi * self.before["frequency"]
-        omega_s = None if f is None else 2 * np.pi * np.asarray(f, dtype=float) - nominal
+        omega_s = None if f is None else 2 * np.pi * f - nominal
         ratio = self.base.ratio
-        powers = {key: value / ratio for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
+        powers = {key: value / ratio for key, value in drawn.items()}
         before = self.before | powers | {"U0": float(U[steady].mean())}
         values = np.array([self.parameters[name] for name in model.names])
         omega_s0 = 0.0 if omega_s is None else float(omega_s[steady].mean())
         P, Q = domain_of(model).play(model, values, t, U, before, omega_s, omega_s0)
+        if not (np.isfinite(P).all() and np.isfinite(Q).all()):
+            raise UserError("the response to this voltage grows beyond all bounds: the parameters suit no such event")
         return ratio * P, ratio * Q
 
 
@@ -204,12 +233,9 @@ def write_history(path: Path, history: History) -> Path:
 def load(path: Path) -> Result:
     """Read a `result.json`. Raises `UserError` where it is missing or not one of ours."""
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
-        return Result(**content)
+        return Result.of(files.read_json(path), str(path))
     except FileNotFoundError:
         raise UserError(f"there is no result file {path}; run an identification first, it writes result.json") from None
-    except (json.JSONDecodeError, TypeError) as error:
-        raise UserError(f"{path} is not a result.json of an identification: {error}") from None
 
 
 def conclude(

@@ -6,10 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.provenance import digest
 from tractexp.record.direction import OUTWARD, direction
-from tractexp.record.event import detect, find_dips, steady
+from tractexp.record.event import Event, detect, find_dips, steady
 from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
+
+REACH = 60.0  # s of a record that are used before its dip and after
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,21 @@ def numbered(wholes: Sequence[Record], where: str, pre: float, post: float) -> l
             record = _refused(replace(whole.part(window), name=name, source=source))
             file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), record))
     return file_dips
+
+
+def around(event: Event) -> Event:
+    """The event in the part of its record about its dip; itself where the record is hardly longer.
+
+    Every simulation goes through all of it, and a load has answered long before an hour is over.
+    """
+    record, t = event.record, event.record.t
+    end = t[min(event.end, record.samples - 1)]
+    first, stop = np.searchsorted(t, [event.t_start - REACH, end + REACH]).tolist()
+    if record.waves is not None or stop - first == record.samples:
+        return event
+    note = f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about the first dip"
+    part = record.part(slice(first, stop))
+    return detect(replace(part, digest=digest(record), notes=(*record.notes, note)))
 
 
 def _refused(record: Record) -> Record | UserError:

@@ -25,6 +25,7 @@ SAME_CURRENT = 0.1  # of a current that stays: how far it moves, and for how muc
 STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
 COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
+NO_POWER = 1e-9  # pu: nothing is a share of less
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
 
 
@@ -74,6 +75,11 @@ class Event:
         """Deviations of P and Q from their means before the dip, (2, n) [pu]; nan in a gap."""
         quiet = np.stack([self.record.P[self.steady], self.record.Q[self.steady]])
         return np.stack([row - row[np.isfinite(row)].mean() for row in quiet])
+
+    @property
+    def noise_share(self) -> float | None:
+        """The noise of P as a share of P before the dip; None where there is none."""
+        return self.noise_P / abs(self.P0) if abs(self.P0) > NO_POWER else None
 
     @property
     def t_start(self) -> float:
@@ -352,6 +358,8 @@ def _unfinished(record: Record, start: int, before: float) -> str:
 def _no_dip(record: Record) -> str:
     U, t = record.U, record.t
     reference, margin = float(np.median(U[:FEWEST_BEFORE])), _margin(U)
+    if reference <= 0:
+        return f"{record.where}: there is no dip: the voltage starts at zero; give a record of a live line"
     low, high = int(np.argmin(U)), int(np.argmax(U))
     fall, rise = 1 - U[low] / reference, U[high] / reference - 1
     start = f"{record.where}: there is no dip: the voltage starts at {reference:.4g} and falls"
@@ -373,12 +381,10 @@ def _no_dip(record: Record) -> str:
 def describe(event: Event) -> str:
     """The line that a run prints about its record; a second sentence notes anything unusual."""
     record = event.record
-    P = max(abs(event.P0), 1e-9)
     sentence = (
         f"{record.name}: dip of {100 * event.depth:.0f} % lasting {1000 * event.duration:.0f} ms "
         f"at t = {event.t_start:.3f} s, "
-        f"{event.start} samples before it, {event.rate:.0f} Hz, noise {100 * event.noise_P / P:.2f} % in P "
-        f"and {100 * event.noise_Q / P:.2f} % in Q, of P"
+        f"{event.start} samples before it, {event.rate:.0f} Hz, noise {_noise(event)}"
     )
     odd = []
     if event.dips > 1:
@@ -392,3 +398,10 @@ def describe(event: Event) -> str:
     if gaps:
         odd.append(f"{gaps} samples lack P or Q and are not used")
     return sentence + (f". Note: {'; '.join(odd)}." if odd else "")
+
+
+def _noise(event: Event) -> str:
+    """The noise of P and Q as shares of P, per unit where no P is drawn."""
+    if event.noise_share is None:
+        return f"{event.noise_P:.2g} pu in P and {event.noise_Q:.2g} pu in Q"
+    return f"{100 * event.noise_share:.2f} % in P and {100 * event.noise_Q / abs(event.P0):.2f} % in Q, of P"

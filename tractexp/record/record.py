@@ -242,6 +242,12 @@ class Record:
                 f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is {100 * off[i]:.2g} % of "
                 f"a step off the uniform grid; at most {100 * JITTER:g} % is allowed"
             )
+        span = self.samples * self.step
+        if span < 1 / self.base.frequency:
+            raise UserError(
+                f"{self.where}: the record lasts {span:.3g} s, less than one cycle of {self.base.frequency:g} Hz; t "
+                "must be in seconds (data.units={t: ms} says else)"
+            )
         if self.step > LONGEST_STEP:
             raise UserError(
                 f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to "

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from tractexp.errors import UserError, nearest
+from tractexp.files import read
 from tractexp.record import Record, endings, reader_of
 from tractexp.record.foreign import is_record
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
@@ -15,6 +16,7 @@ from tractexp.recording.reader import WaveformReader
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
 BEGINNING = 65536  # bytes
 CELL = re.compile(rb"[\s,;\"]+")
+BINARY = (b"PAR1", b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how Parquet files and workbooks begin
 NUMBERS = 3  # in a row of a table, at least
 RUN = ".hydra"  # a folder that holds it is that of a run: what lies there was written by us
 
@@ -51,12 +53,13 @@ def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> b
 
 
 def _prose(path: Path) -> bool:
-    """Whether a file that would be read as a table holds words: not one row of numbers at its beginning."""
+    """Whether a text that would be read as a table holds words: not one row of numbers at its beginning."""
     try:
-        with path.open("rb") as file:
-            head = file.read(BEGINNING)
-    except OSError:
+        head = read(path, BEGINNING)
+    except (UserError, FileNotFoundError):
         return False  # its reader will say why it cannot be read
+    if head.startswith(BINARY):
+        return False
     return not any(_numbers(line) >= NUMBERS for line in head.replace(b"\0", b"").splitlines())
 
 

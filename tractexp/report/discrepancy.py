@@ -33,7 +33,7 @@ from tractexp.model.sites import KINDS
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import headlines, proposed
-from tractexp.wording import as_sentence, in_words, joined, percent, with_error
+from tractexp.wording import as_sentence, epsilon, in_words, joined, percent, with_error
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
@@ -181,7 +181,7 @@ def _size(error: float | None) -> str:
 def _off(misfit: Mapping[str, Any]) -> list[str]:
     """How far off curves are, as a table has it."""
     errors = [misfit["epsilon_p"], misfit["epsilon_q"], *[misfit.get("epsilon_i")]]
-    return [*(f"{e:.3%}" for e in errors if e is not None), f"{misfit['chi2_per_sample']:.3f}"]
+    return [*(epsilon(e) for e in errors if e is not None), f"{misfit['chi2_per_sample']:.3f}"]
 
 
 def _left(page: Report, findings: Findings) -> None:

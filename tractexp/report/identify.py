@@ -21,7 +21,7 @@ from tractexp.provenance import in_words as identity_in_words
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
-from tractexp.wording import as_sentence, in_words
+from tractexp.wording import as_sentence, epsilon, in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
@@ -142,14 +142,15 @@ def _event(page: Report, fit: Any, noise: np.ndarray | None) -> None:
     if fit.waves is not None:
         page.chart(
             wave_chart(fit.waves, [Drawn("estimate", fit.currents, style.PALETTE[0])]),
-            " ".join([f"{about}: epsilon_i {fit.epsilon_i:.3%}.", WAVE_CAPTION, *notes]),
+            " ".join([f"{about}: epsilon_i {epsilon(fit.epsilon_i)}.", WAVE_CAPTION, *notes]),
         )
         page.chart(*spectrum_chart(fit.waves, fit.currents))
         noise, notes = None, ["Measured and calculated are phasors of the currents above, by the same estimator."]
     chart = event_chart(
         fit.event, [CalculatedCurve("estimate", power, style.PALETTE[0])], deviation=noise, around=power
     )
-    page.chart(chart, " ".join([f"{about}: epsilon_p {fit.epsilon_p:.3%}, epsilon_q {fit.epsilon_q:.3%}.", *notes]))
+    errors = f"epsilon_p {epsilon(fit.epsilon_p)}, epsilon_q {epsilon(fit.epsilon_q)}"
+    page.chart(chart, " ".join([f"{about}: {errors}.", *notes]))
 
 
 def parameters(fit: "Identification") -> Table:
@@ -189,7 +190,7 @@ def errors(fit: "Identification") -> Table:
     of_events = result.model_error.get("events") or [unknown] * len(result.events)
     rows = [
         [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
-         in_percent(m["of_S"]), *(f"{e[key]:.3%}" for key in result.epsilons)]
+         in_percent(m["of_S"]), *(epsilon(e[key]) for key in result.epsilons)]
         for e, m in zip(result.events, of_events, strict=True)
     ]  # fmt: skip
     return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))

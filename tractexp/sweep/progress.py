@@ -92,7 +92,7 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
         TextColumn("  jobs"),
         BarColumn(bar_width=30),
         MofNCompleteColumn(),
-        TextColumn("{task.fields[note]}"),
+        TextColumn("{task.fields[note]}", markup=False),
         TimeElapsedColumn(),
     ]
     bar = Progress(*columns, console=console())
@@ -115,8 +115,9 @@ def _live(tally: Tally) -> Iterator[Callable[[SweepJob, Status], None]]:
 def _table(tally: Tally) -> Any:
     """The best objective of each variant so far, best first."""
     from rich.table import Table
+    from rich.text import Text
 
     grid = Table.grid(padding=(0, 2))
     for name, value in tally.ranked():
-        grid.add_row(f"  {name}", f"best {value:.4e}", f"{tally.jobs[name]} jobs")
+        grid.add_row(Text(f"  {name}"), f"best {value:.4e}", f"{tally.jobs[name]} jobs")
     return grid

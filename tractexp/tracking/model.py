@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tractexp import files
+from tractexp.errors import UserError
 from tractexp.tracking.store import light_import
 
 if TYPE_CHECKING:
@@ -79,7 +80,8 @@ class Predictor:
     def predict(self, frame: "pd.DataFrame", params: dict[str, Any] | None = None) -> "pd.DataFrame":
         import pandas as pd
 
-        t, U = (frame[name].to_numpy(dtype=float) for name in ("t", "U"))
-        f = frame["f"].to_numpy(dtype=float) if "f" in frame else None
-        P, Q = self.model.predict(t, U, f)
+        for name in ("t", "U"):
+            if name not in frame:
+                raise UserError(f"the data lack a column {name}; t [s] and U [pu] are needed, f [Hz] may be there too")
+        P, Q = self.model.predict(frame["t"], frame["U"], frame.get("f"))
         return pd.DataFrame({"P": P, "Q": Q}, index=frame.index)

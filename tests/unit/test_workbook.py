@@ -1,0 +1,47 @@
+"""Workbooks whose cells reach further than memory does end their reader, not the process that asked."""
+
+import hostile
+import pytest
+
+import tractexp
+from tractexp.errors import UserError
+from tractexp.filetypes import workbook
+
+resource = pytest.importorskip("resource")
+
+
+@pytest.mark.parametrize("name", ["far_cell.xlsx", "far_cell_of_a_table.xlsx"])
+def test_a_cell_in_the_last_row_and_column_is_a_sentence(name, tmp_path):
+    path = hostile.INPUTS[name](tmp_path / name)
+    with pytest.raises(UserError, match=r"xlsx: it takes more than 2 GB .* save the workbook without it"):
+        tractexp.look(str(path))
+
+
+def test_a_sound_table_is_read_and_its_reader_has_ended(tmp_path):
+    path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES))
+    with workbook.Workbook(path.read_bytes()) as book:
+        rows = book.rows("a")
+        with pytest.raises(workbook.BadWorkbook):
+            book.rows("another")
+    assert book._reader.returncode is not None
+    assert (rows[0], len(rows)) == (["t", "U", "P", "Q"], 1 + hostile.ROWS)
+    (event,) = tractexp.read(str(path))
+    assert event.depth == pytest.approx(0.4)
+
+
+def test_the_memory_of_the_reader_is_limited_and_not_ours(tmp_path, monkeypatch):
+    before = resource.getrlimit(resource.RLIMIT_AS)
+    far = '<row r="2000"><c r="XFD2000"><v>1</v></c></row>'
+    path = hostile.workbook(tmp_path / "dip.xlsx", hostile.rows_of_cells(hostile.VALUES) + far)
+    monkeypatch.setattr(workbook, "ROOM", 500 << 20)  # of 0.8 GB
+    monkeypatch.setattr(workbook, "PER_BYTE", 0)
+    with pytest.raises(UserError, match="of memory to read"):
+        tractexp.read(str(path))
+    assert resource.getrlimit(resource.RLIMIT_AS) == before
+
+
+@pytest.mark.parametrize("name", ["no_book.xlsx", "no_book.xls", "empty_zip.xlsx", "repeated.ods"])
+def test_what_is_no_workbook_is_said(name, tmp_path):
+    path = hostile.INPUTS[name](tmp_path / name)
+    with pytest.raises(UserError, match=rf"{name}: (not a workbook|byte 5 is zero)"):
+        tractexp.read(str(path))

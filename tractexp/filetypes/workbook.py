@@ -1,0 +1,112 @@
+"""The sheets of a workbook, read in a process of its own that may die.
+
+A file of a few hundred bytes may have one cell in the last row and column: what reads it asks the system for the whole
+rectangle, and ends the process where there is no such memory. So that process is another one, whose memory is limited
+before it opens the file. It runs this file as a script, and needs no other of this package.
+"""
+
+import contextlib
+import io
+import pickle
+import subprocess
+import sys
+from typing import Any, Self
+
+ROOM, PER_BYTE = 2 << 30, 40  # bytes of memory that a workbook may take, and more for each byte of its file
+
+
+class BadWorkbook(Exception):
+    """The file is no workbook, or a sheet of it is none; the message is empty, or says that its reader died."""
+
+
+class Workbook:
+    """An open workbook: the `names` of its sheets, and their rows on demand. Use it in a `with` statement."""
+
+    def __init__(self, data: bytes) -> None:
+        """Raises `BadWorkbook` for what is none."""
+        command = [sys.executable, "-P", __file__, str(ROOM + PER_BYTE * len(data))]
+        pipe = subprocess.PIPE
+        self._reader = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=subprocess.DEVNULL)
+        try:
+            self.names: list[str] = self._answer(data)
+        except BaseException:
+            self.close()
+            raise
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._reader.kill()
+        with contextlib.suppress(BrokenPipeError):  # what it has not read any more
+            self._reader.communicate()
+
+    def rows(self, name: str) -> list[list[Any]]:
+        """The cells of a sheet, from its first row and column on. Raises `BadWorkbook` where it cannot be read."""
+        return self._answer(name)
+
+    def _answer(self, question: object) -> Any:
+        stdin, stdout = self._reader.stdin, self._reader.stdout
+        assert stdin is not None
+        assert stdout is not None
+        try:
+            pickle.dump(question, stdin)
+            stdin.flush()
+            answer = pickle.load(stdout)
+        except (EOFError, OSError, pickle.UnpicklingError):
+            raise BadWorkbook(
+                f"it takes more than {ROOM >> 30} GB of memory to read, or its reader fails: a cell far from the "
+                "table, such as one in the last row, counts as all the cells between; save the workbook without it"
+            ) from None
+        if answer is None:
+            raise BadWorkbook
+        return answer
+
+
+def _serve(limit: int) -> None:
+    """Answer what `Workbook` asks: the names of the sheets of a file, then the rows of each; None for what is none."""
+    with contextlib.suppress(ImportError):  # a system that knows no such limits
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
+        resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
+    book = _opened(_question())
+    _give(book and list(book.sheet_names))
+    with contextlib.suppress(EOFError):
+        while True:
+            _give(_rows(book, _question()))
+
+
+def _opened(data: bytes) -> Any:
+    import python_calamine
+
+    try:
+        return python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
+    except (python_calamine.CalamineError, OSError, ValueError):
+        return None
+
+
+def _rows(book: Any, name: str) -> list[list[Any]] | None:
+    import python_calamine
+
+    try:
+        return book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+    except (python_calamine.CalamineError, OSError, ValueError):
+        return None
+
+
+def _question() -> Any:
+    return pickle.load(sys.stdin.buffer)
+
+
+def _give(answer: Any) -> None:
+    pickle.dump(answer, sys.stdout.buffer)
+    sys.stdout.buffer.flush()
+
+
+if __name__ == "__main__":
+    _serve(int(sys.argv[1]))
