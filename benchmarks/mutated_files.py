@@ -15,12 +15,14 @@ import tempfile
 import time
 import traceback
 import warnings
+from datetime import datetime
 from pathlib import Path
 
 import tractexp  # before NumPy: it keeps BLAS to one thread
 
 tractexp.__version__  # noqa: B018
 
+import made_pqdif  # noqa: E402
 import numpy as np  # noqa: E402
 from memory import peak, reset  # noqa: E402
 
@@ -85,6 +87,34 @@ def event_report(made):
     return "\r\n".join([*lines, row('"SETTINGS"'), '"CTR = 40', '","1234"']) + "\r\n"
 
 
+def quality_files(made, columns):
+    """The record as PQDIF: {name: bytes} of its waveforms, compressed and not, and of a log of its powers."""
+    letters, when = {"voltage": "V", "current": "A"}, datetime(2024, 5, 17, 8, 30)
+    waves = [
+        made_pqdif.definition(c.name, "abc".index(c.phase) + 1, letters[c.quantity], group=c.circuit)
+        for c in made.channels
+    ]
+    rows = [
+        made_pqdif.instance(k, 0 if k else [1, made.samples, 1 / 1600], c.raw, 1e3 * c.gain * c.factor)
+        for k, c in enumerate(made.channels)
+    ]
+    captured = [made_pqdif.source(*waves), made_pqdif.settings(), made_pqdif.observation(when, *rows)]
+    logged = [
+        made_pqdif.definition(name, phase, unit, "log", scaled=False)
+        for name, phase, unit in (("U", 15, "V"), ("P", 13, "W"), ("Q", 13, "var"))
+    ]
+    log = [
+        made_pqdif.instance(k, [1, len(columns["t"]), 1 / 400], scale * columns[name], dtype="<f4")
+        for k, (name, scale) in enumerate((("U", 27.5e3), ("P", 20e6), ("Q", 20e6)))
+    ]
+    powers = made_pqdif.file([made_pqdif.source(*logged), made_pqdif.observation(when, *log)], compressed=False)
+    return {
+        "PQDIF": made_pqdif.file(captured),
+        "PQDIF uncompressed": made_pqdif.file(captured, compressed=False),
+        "PQDIF log": powers,
+    }
+
+
 def tables(made):
     """The record as tables: t, U, P, Q and waveforms."""
     t = np.arange(400) / 400
@@ -109,6 +139,8 @@ def originals(folder):
     formats["COMTRADE 1999"] = comtrade.write(made, folder / "old.cfg", "BINARY", 1999)
     formats["SEL CEV"] = [files.write(folder / "report.cev", event_report(made))]
     columns, texts = tables(made)
+    for name, content in quality_files(made, columns).items():
+        formats[name] = [files.write(folder / f"{name.replace(' ', '_')}.pqd", content)]
     for ending, content in texts.items():
         formats[f"table {ending}"] = [files.write(folder / f"table{ending}", content)]
     for ending, write in ((".parquet", "write_parquet"), (".xlsx", "write_excel")):

@@ -114,7 +114,7 @@ def test_what_no_load_can_be_found_in_is_a_sentence(name, sentence, tmp_path):
     assert sentence in done.stderr
 
 
-@pytest.mark.parametrize("data", ["csv", "waveforms", "comtrade", "sel"])
+@pytest.mark.parametrize("data", ["csv", "waveforms", "comtrade", "sel", "pqdif"])
 @pytest.mark.parametrize("folder", [".", "/"])
 def test_a_folder_in_the_place_of_a_file_is_a_sentence(data, folder, tmp_path):
     done = run_command(f"data={data}", f"data.path={folder}", *SEARCH, cwd=tmp_path)

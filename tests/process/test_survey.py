@@ -43,7 +43,7 @@ def field(tmp_path_factory):
     folder = fill(tmp_path_factory.mktemp("field"))
     (folder / "broken.cfg").write_text("a,b,1999\n3,x\n")
     write(recording(constant(depth=0.0)), folder / "quiet.cfg", "BINARY", 1999)
-    (folder / "recorder.pqd").write_bytes(b"\0\1")
+    (folder / "recorder.rec").write_bytes(b"\0\1")
     for name in ("readme.txt", ".hidden.cfg", "e.hdr", "e.inf", "photo.jpg"):
         (folder / name).write_text("of the 3rd of May\n")
     run = folder / "outputs" / "run"
@@ -74,13 +74,13 @@ def test_no_name_of_a_file_is_a_formula_of_the_table_or_a_program_of_the_page(tm
 
 def test_every_record_is_a_row_and_nothing_else_is(surveyed, field):
     files = [row["file"] for row in surveyed.rows]
-    assert files == ["broken.cfg", "quiet.cfg", "recorder.pqd", *(f"day {k % 2}/e{k}.cfg" for k in (0, 2, 4, 1, 3, 5))]
+    assert files == ["broken.cfg", "quiet.cfg", "recorder.rec", *(f"day {k % 2}/e{k}.cfg" for k in (0, 2, 4, 1, 3, 5))]
     kinds = {row["file"]: row["kind"] for row in surveyed.rows}
-    assert [kinds[name] for name in ("broken.cfg", "quiet.cfg", "recorder.pqd", "day 0/e0.cfg")] == [
+    assert [kinds[name] for name in ("broken.cfg", "quiet.cfg", "recorder.rec", "day 0/e0.cfg")] == [
         "not read", "nothing", "not read", "dip",
     ]  # fmt: skip
     why = {row["file"]: row["why"] for row in surveyed.unread}
-    assert "export it as COMTRADE" in why["recorder.pqd"]
+    assert "export it as COMTRADE" in why["recorder.rec"]
     assert "broken" in why["broken.cfg"]
 
 

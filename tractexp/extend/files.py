@@ -1,7 +1,7 @@
 """Parts of readers and writers: the parsers of the package, tables and their sidecars, dips within a record."""
 
 from tractexp.files import PACKAGE, located
-from tractexp.filetypes import cev, comtrade, tidy
+from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
@@ -36,6 +36,7 @@ __all__ = [
     "located",
     "numbered",
     "powers",
+    "pqdif",
     "recording",
     "records",
     "restored",

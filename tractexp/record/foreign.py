@@ -2,16 +2,12 @@
 
 from pathlib import Path
 
-PQDIF = (
-    "PQDIF (IEEE 1159.3), for which there is no maintained Python reader: export it as COMTRADE or CSV with the "
-    "recorder's software"
-)
 COMPANION = "a companion of a COMTRADE record that holds no samples: give the .cfg beside it"
 ARCHIVE = "an archive: unpack it, and give a file of it, or its folder to task=survey"
 DOCUMENT = "a document: give the record's data"
 RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
 FOREIGN = {
-    ".pqd": PQDIF, ".pqdif": PQDIF, ".hdr": COMPANION, ".inf": COMPANION, ".dmf": COMPANION, ".rio": COMPANION,
+    ".hdr": COMPANION, ".inf": COMPANION, ".dmf": COMPANION, ".rio": COMPANION,
     ".zip": ARCHIVE, ".rar": ARCHIVE, ".7z": ARCHIVE, ".gz": ARCHIVE, ".tar": ARCHIVE,
     ".mat": "a MATLAB file: write its signals as columns with writetable (.csv) or parquetwrite (.parquet)",
     ".eve": "an SEL event report as text for people: get the compressed one with the command CEV R (.cev), or the "

@@ -1,0 +1,260 @@
+"""PQDIF files (IEEE 1159.3) as a recording of their waveforms, or as a table of their logs of RMS values and powers."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.filetypes import timeline
+from tractexp.filetypes.heading import TableHeading
+from tractexp.filetypes.pqdif_channels import (
+    LOG,
+    PHASOR,
+    WAVEFORM,
+    ChannelDefinition,
+    Observed,
+    SeriesDefinition,
+    observed,
+    seconds,
+)  # fmt: skip
+from tractexp.filetypes.pqdif_records import SIGNATURE, tag
+from tractexp.filetypes.remarks import Remarks
+from tractexp.filetypes.table import Rows
+from tractexp.recording.recording import Channel, Recording
+
+ZERO = datetime(1899, 12, 30)
+UNITS = {6: "V", 7: "A", 8: "VA", 9: "W", 10: "var", 15: "Hz", 17: "deg", 19: "%", 20: "pu"}  # of the standard
+QUANTITIES = {"V": "voltage", "A": "current", "Hz": "frequency", "deg": "angle"}
+PHASES = {1: "A", 2: "B", 3: "C", 4: "N", 5: "AB", 6: "BC", 7: "CA", 8: "N", 9: "N"}
+MEANS = {10: "1", 11: "2", 12: "0", 13: "", 14: " LN", 15: " LL"}  # in names of columns: sequences, total, means
+LETTERS = {"V": "U", "A": "I", "W": "P", "var": "Q", "Hz": "f"}
+VALUE, AVERAGE = tag("67f6af97-f753-11cf-9d89-0080c72e70a3"), tag("67f6af9a-f753-11cf-9d89-0080c72e70a3")
+INSTANT = tag("67f6af9b-f753-11cf-9d89-0080c72e70a3")
+ANGLES = (tag("3d786f9d-f76e-11cf-9d89-0080c72e70a3"), tag("dc762342-3c56-11d2-ae44-0060083a2628"))
+# what a logged value is of its quantity: none said, RMS, P, Q, frequency; positive and negative sequence; fundamental
+PLAIN = (b"", *(tag(f"a6b31a{n}-b451-11d1-ae17-0060083a2628") for n in ("df", "e5", "e1", "e4")),
+         tag("07ef68af-9ff5-11d2-b30b-006008b37183"))  # fmt: skip
+SEQUENCES = {tag("a6b31aea-b451-11d1-ae17-0060083a2628"): 10, tag("d71a4b91-3c92-11d4-9f2c-002078e0b723"): 11}
+FUNDAMENTAL = (tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"), tag("672d0310-7810-11d4-a4b3-444553540000"))
+FEWEST = 4  # samples of a waveform
+CLOSE = 1e-6  # s: times that are the same to the resolution of a moment
+GAP = 1.5  # usual steps: after a longer one a log is another one
+ENDINGS = (".pqd", ".pqdif")
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """Values (N,) by column at times (N,) [s] since the file's first observation."""
+
+    t: np.ndarray
+    columns: dict[int, np.ndarray]
+
+
+def is_pqdif(path: Path | str) -> bool:
+    """Whether a file is there and begins as a PQDIF file does."""
+    return files.there(path) and files.read(path, len(SIGNATURE)) == SIGNATURE
+
+
+def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
+    """Whether waveforms of a voltage or a current are in the file; raises `UserError` for what is no such file."""
+    found = observed(path, encoding, [WAVEFORM], Remarks(str(path)))
+    return any(_wave(d) in ("V", "A") for each in found.observations for i in each.instances for d, _ in i.series)
+
+
+def load(path: Path, encoding: str | None = None) -> Recording:
+    """The waveforms: each observation of the channels that most have is a segment.
+
+    Raises `UserError` naming file and record of what is wrong, and for a file without waveforms.
+    """
+    remarks = Remarks(str(path))
+    found = observed(path, encoding, [WAVEFORM], remarks)
+    channels: dict[int, tuple[ChannelDefinition, str]] = {}
+    stretches = _fullest(_waves(found, channels, remarks), remarks)
+    if not stretches:
+        raise UserError(
+            f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read as a table: "
+            f"data=csv data.path={path}"
+        )
+    segments, evened = _segments(str(path), stretches)
+    start, begin = found.observations[0].start, stretches[0].t[0]
+    triggers = [seconds(o.triggered, start) - begin for o in found.observations if o.triggered]
+    last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
+    return Recording(
+        source=str(path),
+        channels=[_channel(*channels[k], values) for k, values in evened.items()],
+        segments=segments,
+        frequency=found.frequency if 10 <= found.frequency <= 100 else 50.0,
+        station=found.station,
+        start=_moment(start, float(begin), remarks),
+        trigger=next((t for t in triggers if 0 < t < last), None),
+        notes=remarks.notes(),
+        extra={"format": "PQDIF"},
+    )
+
+
+def _waves(found: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks) -> list[Stretch]:
+    """The waveforms of each observation by the times of their samples; `channels` learns definition and unit."""
+    made: dict[tuple[float, ...], Stretch] = {}
+    for each in found.observations:
+        begin, own = seconds(each.start, found.observations[0].start), dict[tuple[float, ...], Stretch]()
+        for one in each.instances:
+            definition, values = next(((d, v) for d, v in one.series if _wave(d)), (None, None))
+            if definition is None or values is None or len(one.t) < FEWEST:
+                continue
+            if not (np.isfinite(one.t).all() and (np.diff(one.t) > 0).all()):
+                raise UserError(f"{remarks.where}: {one.channel.name}: its times do not increase: the file is damaged")
+            channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
+            own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[one.channel.number] = values
+        for stretch in _together([*own.values()], remarks):
+            made.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
+    return sorted(made.values(), key=lambda stretch: stretch.t[0])
+
+
+def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
+    """What times (N,) have in common that are the same."""
+    return round(begin + float(t[0]), 6), len(t), round(float(t[-1] - t[0]), 6)
+
+
+def _together(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretch]:
+    """One stretch of channels that one observation samples at several rates: all at the times of the slowest."""
+    first, last = (f(each.t[k] for each in stretches) if stretches else 0.0 for f, k in ((max, 0), (min, -1)))
+    slowest = min(stretches, key=lambda each: (len(each.t) - 1) / (each.t[-1] - each.t[0]), default=None)
+    if slowest is None or len(stretches) == 1:
+        return stretches
+    t = slowest.t[(slowest.t >= first - CLOSE) & (slowest.t <= last + CLOSE)]
+    if len(t) < FEWEST:
+        return stretches
+    from scipy.interpolate import CubicSpline
+
+    remarks.add(f"channels of one observation are sampled at {len(stretches)} rates: all are taken at the lowest")
+    columns = {k: CubicSpline(each.t, v)(t) for each in stretches for k, v in each.columns.items()}
+    return [Stretch(t, columns)]
+
+
+def _wave(definition: SeriesDefinition) -> str:
+    """The unit of a series of samples; "" for another series."""
+    return UNITS.get(definition.unit, "-") if definition.value in (VALUE, INSTANT) else ""
+
+
+def _fullest(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
+    """The stretches of the largest set of channels: what others have is no whole load."""
+    if not stretches:
+        return []
+    sets = [frozenset(each.columns) for each in stretches]
+    full = max(sets, key=lambda one: (len(one), sets.count(one)))
+    if len(sets) > sets.count(full):
+        count = len(sets) - sets.count(full)
+        remarks.add(f"{count} of {len(sets)} observations hold other channels, or fewer, and are not read")
+    return [each for each, own in zip(stretches, sets, strict=True) if own == full]
+
+
+def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.Segment], dict[int, np.ndarray]]:
+    """Segments of even sampling, and the values (N,) of each channel in them; times begin with the first sample."""
+    segments: list[timeline.Segment] = []
+    parts: dict[int, list[np.ndarray]] = {k: [] for k in stretches[0].columns}
+    first = 0
+    for each in stretches:
+        t = each.t - stretches[0].t[0]
+        resolution = float(np.spacing(np.float32(np.abs(t - t[0]).max())))
+        runs = timeline.from_stamps(t, resolution, where)
+        segments += [
+            timeline.Segment(first + s.first, first + s.stop, s.rate, s.start) for s in timeline.laid_out(runs)
+        ]
+        for k, values in each.columns.items():
+            parts[k].append(timeline.evened(values, runs, None))
+        first += len(next(iter(parts.values()))[-1])
+    return segments, {k: np.concatenate(each) for k, each in parts.items()}
+
+
+def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:
+    quantity, phase = QUANTITIES.get(unit, ""), PHASES.get(definition.phase, "")
+    return Channel(definition.name, values, unit, quantity, phase, definition.circuit)
+
+
+def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
+    try:
+        return ZERO + timedelta(days=start[0], seconds=start[1] + more)
+    except OverflowError:
+        remarks.add(f"day {start[0]} since 1900 is no date; not used")
+        return None
+
+
+def table(path: Path, encoding: str | None = None) -> Rows:
+    """The logs of RMS values, powers and phasors, those of the times that most have.
+
+    Columns are named by what they are (UA, P, U1 angle), with the circuit where there are several. Raises `UserError`
+    for a file without logs.
+    """
+    remarks = Remarks(str(path))
+    found = observed(path, encoding, [LOG, PHASOR], remarks)
+    names: dict[int, tuple[str, str]] = {}
+    stretches = _logs(found, names)
+    if not stretches:
+        raise UserError(
+            f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms are read by "
+            f"data=pqdif data.path={path}"
+        )
+    fullest = _fullest(stretches, remarks)
+    t, columns = _longest(fullest, remarks)
+    units = ("s", *(names[k][1] for k in columns))
+    head = TableHeading(("t", *(names[k][0] for k in columns)), units, 0, 0)
+    cells = [t - t[0], *columns.values()]
+    sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
+    return Rows(str(path), head, cells.__getitem__, sample, first=1, word="sample", notes=remarks.notes())
+
+
+def _logs(found: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
+    """The logs of each observation by their times; `names` learns what each column is called, and its unit."""
+    made: dict[tuple[float, ...], Stretch] = {}
+    circuits = {i.channel.circuit for o in found.observations for i in o.instances}
+    numbers: dict[tuple[int, int], int] = {}
+    for each in found.observations:
+        begin = seconds(each.start, found.observations[0].start)
+        for one in each.instances:
+            values = {d.value for d, _ in one.series}
+            for k, (definition, column) in enumerate(one.series):
+                name = _column(one.channel, definition, VALUE in values)
+                if not name or len(one.t) < 2:
+                    continue
+                number = numbers.setdefault((one.channel.number, k), len(numbers))
+                name = f"{one.channel.circuit} {name}" if len(circuits) > 1 and one.channel.circuit else name
+                names[number] = (name, UNITS[definition.unit])
+                made.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[number] = column
+    return sorted(made.values(), key=lambda stretch: stretch.t[0])
+
+
+def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:
+    """What a logged series is called, by quantity and phase; "" for a least or greatest value, and other quantities."""
+    unit = UNITS.get(definition.unit, "")
+    phase = SEQUENCES.get(definition.characteristic, channel.phase)
+    mark = PHASES.get(phase, MEANS.get(phase, ""))
+    if definition.value in ANGLES and unit == "deg" and channel.quantity in ("U", "I"):
+        return f"{channel.quantity}{mark} angle"
+    letter = LETTERS.get(unit, "")
+    if not letter or definition.value not in ((VALUE,) if has_value else (AVERAGE, INSTANT)):
+        return ""
+    mark = mark if letter in "UI" or mark in "ABC" else ""
+    if definition.characteristic in FUNDAMENTAL:
+        return f"{letter}{mark} fundamental"
+    return f"{letter}{mark}" if definition.characteristic in (*PLAIN, *SEQUENCES) else ""
+
+
+def _longest(stretches: Sequence[Stretch], remarks: Remarks) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """The longest of the logs that follow one another without a gap: times (N,), and values (N,) by column."""
+    runs: list[list[Stretch]] = []
+    for each in stretches:
+        before = runs[-1][-1].t if runs else each.t
+        joined = runs and 0 < each.t[0] - before[-1] <= GAP * float(np.median(np.diff(before)))
+        if joined:
+            runs[-1].append(each)
+        else:
+            runs.append([each])
+    run = max(runs, key=lambda one: sum(len(each.t) for each in one))
+    if len(runs) > 1:
+        remarks.add(f"{len(runs)} logs with gaps between them: the longest is read, from {run[0].t[0]:.3f} s")
+    t = np.concatenate([each.t for each in run])
+    return t, {k: np.concatenate([each.columns[k] for each in run]) for k in run[0].columns}

@@ -1,0 +1,201 @@
+"""The physical structure of a PQDIF file: records one after another, each a tree of tagged elements.
+
+A record has a header of 64 bytes, with the place of the next one, and a body, compressed or not, that begins with a
+collection: a count, and for each element its tag (a GUID), its kind, its type, and where in the body it lies.
+
+Source: IEEE Std 1159.3-2019 (and -2003), clause on the physical structure.
+"""
+
+import struct
+import uuid
+import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.filetypes.remarks import Remarks
+from tractexp.filetypes.text import decode
+
+SIGNATURE = uuid.UUID("4a111440-e49f-11cf-9900-505144494600").bytes_le
+HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")
+HEADER_BYTES = 64
+LARGEST = 256 * 2**20  # bytes of all bodies together, decompressed
+MOST_RECORDS = 100_000
+LONGEST = 400  # letters of a text that are read
+BYTE, COUNT = np.dtype("u1"), np.dtype("<i4")
+COLLECTION, SCALAR, VECTOR = 1, 2, 3  # kinds of elements
+MOMENT = np.dtype([("day", "<u4"), ("second", "<f8")])  # since 30 December 1899
+TYPES = {
+    1: "<u1", 2: "<u2", 3: "<u4", 10: "S1", 20: "<i1", 21: "<i2", 22: "<i4", 30: "<u1", 31: "<u2", 32: "<u4",
+    40: "<f4", 41: "<f8", 50: MOMENT, 60: "V16",
+}  # fmt: skip
+ZLIB, PER_RECORD = 1, 2  # of the container's compression: the algorithm, the style
+
+
+def tag(text: str) -> bytes:
+    """A GUID, as files store it, of its usual spelling."""
+    return uuid.UUID(text).bytes_le
+
+
+CONTAINER = tag("89738606-f1c3-11cf-9d89-0080c72e70a3")
+STYLE, ALGORITHM = (tag(f"8973861{digit}-f1c3-11cf-9d89-0080c72e70a3") for digit in "bc")
+
+
+@dataclass(eq=False)
+class Body:
+    """The bytes of a record's body; `where` names file and record, `entries` counts the elements that were read."""
+
+    data: bytes
+    where: str
+    encoding: str | None
+    entries: int = 0
+
+    def part(self, at: int, count: int, dtype: np.dtype = BYTE) -> np.ndarray:
+        """A view of `count` values from a byte on. Raises `UserError` where the body has none there."""
+        if at < 0 or count < 0 or at + count * dtype.itemsize > len(self.data):
+            raise self.damaged(f"an element of {count} values lies at byte {at} of a body of {len(self.data)}")
+        return np.frombuffer(self.data, dtype, count, at) if count else np.empty(0, dtype)
+
+    def damaged(self, why: str) -> UserError:
+        return UserError(f"{self.where}: {why}: the file is damaged; get it from the recorder again")
+
+
+class Collection:
+    """The elements of a collection by their tags; what is not there, or of another kind, is None or empty."""
+
+    def __init__(self, body: Body, at: int) -> None:
+        """Raises `UserError` for what is no collection, and where more elements are read than the body can hold."""
+        count = int(body.part(at, 1, COUNT)[0])
+        body.entries += max(count, 0)
+        if count < 0 or body.entries * ENTRY.size > len(body.data):
+            raise body.damaged(f"a collection at byte {at} has {count} elements, more than fit into the record")
+        self.body = body
+        self.entries = list(ENTRY.iter_unpack(body.part(at + 4, count * ENTRY.size).tobytes()))
+        self.at = at
+
+    def collections(self, name: bytes) -> Iterator["Collection"]:
+        """The collections of one tag, in their order."""
+        for each, kind, _, _, link, _ in self.entries:
+            if each == name and kind == COLLECTION:
+                yield Collection(self.body, link)
+
+    def collection(self, name: bytes) -> "Collection | None":
+        return next(self.collections(name), None)
+
+    def vectors(self, name: bytes) -> Iterator[np.ndarray]:
+        """The vectors (N,) of one tag whose type holds numbers, letters or moments."""
+        for each, kind, type_, _, link, _ in self.entries:
+            if each == name and kind == VECTOR and type_ in TYPES:
+                count = int(self.body.part(link, 1, COUNT)[0])
+                yield self.body.part(link + 4, count, np.dtype(TYPES[type_]))
+
+    def vector(self, name: bytes) -> np.ndarray | None:
+        return next(self.vectors(name), None)
+
+    def texts(self, name: bytes) -> list[str]:
+        """The texts of one tag, without what follows their end."""
+        made = [v[:LONGEST].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
+        return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in made]
+
+    def text(self, name: bytes) -> str:
+        return next(iter(self.texts(name)), "")
+
+    def scalar(self, name: bytes) -> Any:
+        """The value of a scalar, where it is one of the types above."""
+        for k, (each, kind, type_, embedded, link, _) in enumerate(self.entries):
+            if each != name or kind != SCALAR or type_ not in TYPES:
+                continue
+            dtype = np.dtype(TYPES[type_])
+            own = self.at + 4 + ENTRY.size * k + 20  # a value of up to eight bytes stands in place of the link
+            inside = embedded and dtype.itemsize <= 8
+            return self.body.part(own if inside else link, 1, dtype)[0]
+        return None
+
+    def number(self, name: bytes, default: float = 0.0) -> float:
+        """A scalar that is a finite number, else `default`."""
+        value = self.scalar(name)
+        if value is None or value.dtype.kind not in "uif":
+            return default
+        return float(value) if np.isfinite(value) else default
+
+    def identifier(self, name: bytes) -> bytes:
+        """A scalar that is a GUID; b"" where there is none."""
+        value = self.scalar(name)
+        return b"" if value is None or value.dtype.kind != "V" or value.dtype.names else value.tobytes()
+
+    def moment(self, name: bytes) -> tuple[int, float] | None:
+        """A scalar that is a time: the day since 30 December 1899, and the second of it."""
+        value = self.scalar(name)
+        if value is None or value.dtype.names is None or not np.isfinite(value["second"]):
+            return None
+        return int(value["day"]), float(value["second"])
+
+
+def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tuple[bytes, Collection]]:
+    """(tag, body's collection) of each record after the container. Raises `UserError` for what is no PQDIF file."""
+    data = files.read(path)
+    if not data.startswith(SIGNATURE):
+        raise UserError(f"{path}: this is no PQDIF file: it does not begin with the signature of a PQDIF record")
+    at, count, compressed, room, visited = 0, 0, False, LARGEST, set[int]()
+    while at not in visited and count < MOST_RECORDS:
+        visited.add(at)
+        count += 1
+        where = f"{path}: record {count}"
+        if at + HEADER_BYTES > len(data):
+            remarks.add(f"the file ends before record {count}: it is not whole; what comes before is read")
+            return
+        signature, kind, header, size, following, checksum = HEADER.unpack_from(data, at)
+        if signature != SIGNATURE or header < HEADER_BYTES or size < 0:
+            raise UserError(f"{where}: byte {at} is no header of a record: the file is damaged; get it again")
+        content = data[at + header : at + header + size]
+        if len(content) < size:
+            remarks.add(f"the file ends within record {count}: it is not whole; what comes before is read")
+            return
+        if checksum and zlib.adler32(content) != checksum:
+            remarks.add(f"record {count}: the checksum does not fit: it was altered, or damaged on its way")
+        content = _decompressed(content, room, where) if compressed else content
+        room -= len(content)
+        if size:
+            body = Collection(Body(content, where, encoding), 0)
+            if kind == CONTAINER:
+                compressed = _compression(body, where)
+            else:
+                yield kind, body
+        if not 0 < following < len(data):
+            if following > len(data):
+                remarks.add(f"the file ends before record {count + 1}: it is not whole; what comes before is read")
+            return
+        at = following
+
+
+def _compression(container: Collection, where: str) -> bool:
+    """Whether the records after the container are compressed, each by itself."""
+    style, algorithm = container.number(STYLE), container.number(ALGORITHM)
+    if not (style and algorithm):
+        return False
+    if (style, algorithm) != (PER_RECORD, ZLIB):
+        raise UserError(
+            f"{where}: compression style {style:g}, algorithm {algorithm:g}; read are {PER_RECORD} (each record) with "
+            f"{ZLIB} (zlib), and no compression: save the file as PQDIF 1.5 with the recorder's software"
+        )
+    return True
+
+
+def _decompressed(content: bytes, room: int, where: str) -> bytes:
+    inflate = zlib.decompressobj()
+    try:
+        made = inflate.decompress(content, room + 1)
+    except zlib.error as error:
+        raise UserError(f"{where}: its compressed body is damaged; get the file from the recorder again") from error
+    if len(made) > room:
+        raise UserError(
+            f"{where}: the file's records hold more than {LARGEST / 1e6:.0f} MB decompressed; give a part of it"
+        )
+    if not inflate.eof:
+        raise UserError(f"{where}: its compressed body ends too early; get the file from the recorder again")
+    return made
