@@ -62,8 +62,8 @@ def record():
     return Recording("made", channels, [Segment(0, 1280, 1600.0, 0.0)], 50.0, "Station", "device", status=states)
 
 
-def event_report(made):
-    """The record as an SEL relay's compressed event report."""
+def event_report(made, every=1):
+    """The record as an SEL relay's compressed event report; filtered, of 4 samples a cycle, with `every` 8."""
 
     def row(*cells):
         text = "".join(f"{cell}," for cell in cells)
@@ -77,13 +77,13 @@ def event_report(made):
     lines += [
         row(3, 14, 2023, 15, 9, 26, 535),
         row('"FREQ"', '"SAM/CYC_A"', '"SAM/CYC_D"', '"EVENT"'),
-        row(50, 32, 4, '"ER"'),
+        row(50, 32 // every, 4, '"ER"'),
     ]
     lines += [row('"IA"', '"IB"', '"IC"', '"VA(kV)"', '"VB(kV)"', '"VC(kV)"', '"TRIG"', '"51P * TRIP 52A"')]
     values = np.array([made.channels[k].values() * (1e3 if k > 2 else 1) for k in (3, 4, 5, 0, 1, 2)]).T / np.sqrt(2)
-    for i, cells in enumerate(values):
+    for i, cells in enumerate(values[::every]):
         word = "" if i % 8 else '"B0"' if i > 490 else '"80"'
-        lines.append(row(*(f"{x:.2f}" for x in cells), ">" if i == 480 else "", word))
+        lines.append(row(*(f"{x:.2f}" for x in cells), ">" if i == 480 // every else "", word))
     return "\r\n".join([*lines, row('"SETTINGS"'), '"CTR = 40', '","1234"']) + "\r\n"
 
 
@@ -138,6 +138,7 @@ def originals(folder):
         formats[f"COMTRADE {kind} in one file"] = comtrade.write(made, folder / f"{kind.lower()}.cff", kind)
     formats["COMTRADE 1999"] = comtrade.write(made, folder / "old.cfg", "BINARY", 1999)
     formats["SEL CEV"] = [files.write(folder / "report.cev", event_report(made))]
+    formats["SEL CEV filtered"] = [files.write(folder / "filtered.cev", event_report(made, every=8))]
     columns, texts = tables(made)
     for name, content in quality_files(made, columns).items():
         formats[name] = [files.write(folder / f"{name.replace(' ', '_')}.pqd", content)]

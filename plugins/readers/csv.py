@@ -32,7 +32,7 @@ PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 
 @plugin
 class CSV(Tabular, Reader):
-    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel, logs of PQDIF files.
+    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel, logs of instruments.
 
     A file named in `train` or `validate` is one record. With `path` the dips of one long table are numbered from 1 in
     order of time, and `train` and `validate` are numbers: the first is fitted and the others validate unless said
@@ -47,7 +47,7 @@ class CSV(Tabular, Reader):
     Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".pqd", ".pqdif")
+    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".pqd", ".pqdif", ".cev")
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number

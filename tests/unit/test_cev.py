@@ -5,9 +5,11 @@ from datetime import datetime
 import numpy as np
 import pytest
 
+import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import cev
 from tractexp.plugin import build
+from tractexp.record.reader import reader_of
 
 KILOVOLT, AMPERE, LAG, F, PER_CYCLE = 63.5, 200.0, np.deg2rad(30), 49.98, 32
 COLUMNS = ["IA", "IB", "IC", "IG", "VA(kV)", "VB(kV)", "VC(kV)", "*", "VDC", "FREQ"]
@@ -135,6 +137,89 @@ def test_a_filtered_report_is_no_waveform(write):
     assert any("filtered report; get the raw one" in note for note in recording.notes)
     with pytest.raises(UserError, match="no waveform, for which 10 samples per cycle"):
         recording.waveforms()
+
+
+def filtered(f, per_cycle=4, U=None, told=()):
+    """Lines of a filtered report of a relay that samples by f (N,) [Hz]: phasors after its filter, each step a part."""
+    t = np.concatenate([[0.0], np.cumsum(2 / (f[1:] + f[:-1]))]) / per_cycle
+    U = np.where((t >= 0.5) & (t < 0.75), 0.7, 1.0) if U is None else U
+    turn = np.exp(1j * (2 * np.pi * np.arange(len(f)) / per_cycle + 0.3))[:, None]
+    turn = turn * np.exp(-2j * np.pi / 3 * np.arange(3))
+    V, I = KILOVOLT * U[:, None] * turn.real, AMPERE * (U[:, None] * turn * np.exp(-1j * LAG)).real
+    columns = ["IA", "IB", "IC", "VA(kV)", "VB(kV)", "VC(kV)", "FREQ"]
+    told = {"FREQ": f"{f[0]:.2f}", "SAM/CYC_A": per_cycle, "EVENT": '"ER"', **dict(told)}
+    lines = [names("FID"), names("FID=SEL-710-R415"), names("MONTH", "DAY", "YEAR", "HOUR", "MIN", "SEC", "MSEC")]
+    lines += [row(3, 14, 2023, 15, 9, 26, 535), names(*told), row(*told.values()), names(*columns, "TRIG", BITS)]
+    for k in range(len(f)):
+        cells = [*(f"{v:.4f}" for v in (*I[k], *V[k])), f"{f[k]:.2f}"]
+        lines.append(row(*cells, ">" if k == len(f) // 3 else "", '"8480"'))
+    settings = ["FLA1   := 250.0  ", "LRA1 = 6.0", "CTR1 := 80", 'RID := "FEEDER 1"', '","1234"']
+    return t, [*lines, names("SETTINGS"), '"Group 1', *settings]
+
+
+@pytest.mark.parametrize("per_cycle", [4, 8])
+@pytest.mark.parametrize("nominal", [50.0, 60.0])
+def test_two_samples_of_a_filtered_report_are_the_phasor(write, per_cycle, nominal):
+    f = np.full(round(1.5 * nominal * per_cycle), nominal - 0.4)
+    path = write(filtered(f, per_cycle)[1])
+    assert reader_of(str(path)).name == "csv"
+    [event] = tractexp.read(str(path))
+    assert event.record.base.voltage == pytest.approx(KILOVOLT * np.sqrt(3), rel=1e-5)
+    assert event.record.base.power == pytest.approx(3 * KILOVOLT * AMPERE / 1e3, rel=1e-5)
+    assert event.record.base.frequency == nominal
+    assert pytest.approx((np.cos(LAG), np.sin(LAG)), rel=1e-4) == (event.P0, event.Q0)
+    assert pytest.approx(1, rel=1e-5) == event.U0
+    assert event.depth == pytest.approx(0.3, abs=1e-4)
+    assert event.record.rate == pytest.approx(per_cycle * f[0], rel=1e-6)
+    assert event.record.U2.max() < 0.2  # but for the two samples on either side of a jump
+    assert np.median(event.record.U2) < 1e-5
+
+
+def test_times_of_a_relay_that_tracks_follow_its_frequency(write):
+    f = np.round(np.linspace(50, 44, 400), 2)
+    t, lines = filtered(f, U=np.ones(400))
+    table = cev.table(write(lines))
+    np.testing.assert_allclose(table.columns(0), t[1:], atol=1e-9)
+    assert t[-1] == pytest.approx(399 / 4 / 47, rel=2e-3)  # at 50 Hz it would be 0.12 s less
+    np.testing.assert_allclose(table.columns(1), f[1:])
+    for k, name in enumerate(table.heading.names):
+        if name in ("VA", "IA"):
+            np.testing.assert_allclose(table.columns(k), KILOVOLT if name == "VA" else AMPERE, rtol=1e-4)
+    assert any("follow the frequency in FREQ, 44 to 50 Hz" in note for note in table.notes)
+
+
+def test_a_raw_report_of_a_relay_that_tracks_is_evened(write):
+    f = np.round(np.linspace(50, 48, 1920), 2)
+    t = np.concatenate([[0.0], np.cumsum(2 / (f[1:] + f[:-1]))]) / PER_CYCLE
+    values = waves(1920)
+    values[:, 4] = KILOVOLT * np.cos(2 * np.pi * np.arange(1920) / PER_CYCLE)  # as the relay has it: of its own rate
+    lines = report(values=values, summary={"FREQ": 50.0})
+    first = next(k for k, line in enumerate(lines) if "TRIG" in line) + 1
+    for k in range(1920):
+        text = lines[first + k].rpartition(',"')[0].replace("49.98", f"{f[k]:.2f}") + ","
+        lines[first + k] = f'{text}"{cev.checksum(text)}"'
+    recording = cev.load(write(lines))
+    [segment] = recording.segments
+    assert segment.t[-1] == pytest.approx(t[-1], rel=1e-9)
+    whole = np.interp(segment.t, t, np.arange(1920)) / PER_CYCLE
+    np.testing.assert_allclose(
+        recording.channels[4].values() / np.sqrt(2) / KILOVOLT, np.cos(2 * np.pi * whole), atol=2e-3
+    )
+    assert recording.trigger == pytest.approx(t[480], rel=1e-9)
+    [trip] = np.flatnonzero(np.diff(recording.status[2].values()))
+    assert segment.t[trip + 1] == pytest.approx(t[480], abs=1 / segment.rate)
+
+
+def test_ratings_in_the_settings_are_a_note(write):
+    _, lines = filtered(np.full(300, 60.0))
+    assert any(
+        "the relay's settings: FLA1 = 250.0, LRA1 = 6.0, CTR1 = 80" in note for note in cev.table(write(lines)).notes
+    )
+
+
+def test_phasors_of_a_raw_report_are_refused_with_the_way_to_read_it(write):
+    with pytest.raises(UserError, match=r"32 a cycle: phasors are read from filtered reports of 4 or 8; .*data=sel"):
+        cev.table(write(report()))
 
 
 @pytest.mark.parametrize(

@@ -8,25 +8,33 @@ relay word are hexadecimal.
 
 import csv
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError
+from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
+from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.remarks import Remarks
+from tractexp.filetypes.table import Rows
 from tractexp.filetypes.text import decode
-from tractexp.recording.recording import Channel, Recording, Segment, StatusChannel, unit_of
+from tractexp.recording.recording import Channel, Recording, StatusChannel, unit_of
 
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
 HEAD = 2000  # lines: the names of the columns stand among them
 CLOSE = 0.1  # of a current: so well the summary's agrees with the columns
-SLOW = 10  # samples a cycle: fewer are a filtered report, which holds magnitudes only
+SLOW = 10  # samples a cycle: fewer are a filtered report, which holds phasors
+BEGINNING = 1 << 16  # bytes in which a report names the samples in a cycle
+LEAST, MOST = 10.0, 100.0  # Hz
+# what the settings say of the load and of its transformers: full-load and locked-rotor current, service factor, ratios
+RATING = re.compile(r"\b((?:CTRG?|PTR|FLA|LRA|LRTHOT|SF|VNOM|MVA)[A-Z]?\d?)\b\s*:?=\s*(\d+\.?\d*)", re.ASCII)
 _COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
 _WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
 
@@ -41,43 +49,135 @@ class EventReport:
     settings: str = ""
 
 
+def recognizes(path: Path | str) -> bool:
+    """Whether a file is there whose beginning names the samples in a cycle, as such a report does."""
+    return files.there(path) and b'"SAM/CYC_A"' in files.read(path, BEGINNING)
+
+
+def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
+    """Whether it is a raw report; a filtered one, of a few samples a cycle, holds phasors."""
+    opened = _opened(path, encoding)
+    return opened.per_cycle >= SLOW
+
+
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """Read a compressed event report; raises `UserError` naming line, column and value of what is wrong."""
+    """Read a raw report; raises `UserError` naming line, column and value of what is wrong."""
+    opened = _opened(path, encoding)
+    report, remarks, t = opened.report, opened.remarks, opened.t
+    if opened.per_cycle < SLOW:
+        remarks.add(
+            f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay with the command "
+            "CEV R, or its COMTRADE file; its phasors are read by data=csv"
+        )
+    runs = timeline.from_stamps(t, 1e-9, str(path))
+    moment = 0.0 if opened.marked is None else float(t[opened.marked])
+    return Recording(
+        source=str(path),
+        channels=[
+            _channel(report, k, timeline.evened(opened.values[:, k], runs, None), opened.gain, remarks)
+            for k in range(opened.values.shape[1]) if _named(report, k)
+        ],
+        segments=timeline.laid_out(runs),
+        frequency=opened.nominal,
+        device=report.about.get("FID", "").removeprefix("FID=").strip(),
+        start=_start(report, moment, remarks),
+        trigger=None if opened.marked is None else moment,
+        status=[replace(each, raw=timeline.nearest(each.raw, runs)) for each in _states(report, opened.words)],
+        notes=remarks.notes(),
+        extra={
+            "format": "SEL CEV", "encoding": opened.encoding, "about": report.about, "settings": report.settings
+        },
+    )  # fmt: skip
+
+
+def table(path: Path, encoding: str | None = None) -> Rows:
+    """The phasors of a filtered report, RMS and angles in a frame that turns at the nominal frequency.
+
+    Two samples a quarter of a cycle apart are real and imaginary part: x_k + j x_(k-1), at four samples a cycle. The
+    relay samples by the frequency that it tracks, so that this holds off the nominal one. Raises `UserError` as `load`,
+    and for a raw report.
+    """
+    opened = _opened(path, encoding)
+    report, remarks, quarter = opened.report, opened.remarks, round(opened.per_cycle / 4)
+    if opened.per_cycle >= SLOW or 4 * quarter != opened.per_cycle or len(opened.t) <= quarter:
+        raise UserError(
+            f"{path}: {len(opened.t)} samples, {opened.per_cycle:g} a cycle: phasors are read from filtered reports of "
+            f"4 or 8; waveforms by data=sel data.path={path}"
+        )
+    remarks.add(
+        f"a filtered report, {opened.per_cycle:g} samples a cycle: phasors from samples a quarter of a cycle apart; "
+        "what changes within a cycle, the window of the relay's filter, does not show"
+    )
+    t = opened.t[quarter:]
+    back = np.exp(-2j * np.pi * opened.nominal * t)
+    columns: dict[str, tuple[str, np.ndarray]] = {"t": ("s", t), "f": ("Hz", opened.frequency[quarter:])}
+    for k in range(opened.values.shape[1]):
+        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks) if _named(report, k) else None
+        if channel is not None and channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
+            x = channel.ratio * channel.recorded()
+            X = (x[quarter:] + 1j * x[:-quarter]) * back
+            columns |= {channel.name: (channel.unit, np.abs(X)), f"{channel.name} angle": ("rad", np.angle(X))}
+    cells: list[Any] = [values for _, values in columns.values()]
+    head = TableHeading(tuple(columns), tuple(unit for unit, _ in columns.values()), 0, 0)
+    sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
+    return Rows(str(path), head, cells.__getitem__, sample, first=1 + quarter, word="sample", notes=remarks.notes())
+
+
+@dataclass(frozen=True, eq=False)
+class _Opened:
+    """A report with its samples: values (N, columns), times (N,) [s] and the frequency (N,) [Hz] sampled by."""
+
+    report: EventReport
+    values: np.ndarray
+    words: list[str]
+    t: np.ndarray
+    frequency: np.ndarray
+    per_cycle: float
+    nominal: float  # Hz
+    marked: int | None  # the row of the trigger
+    gain: float
+    remarks: Remarks
+    encoding: str
+
+
+def _opened(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
     if not files.there(path):
         raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
-    content = files.read(path)
-    text, encoding = decode(content, str(path), encoding)
+    text, encoding = decode(files.read(path), str(path), encoding)
     remarks = Remarks(str(path))
     report = _report(path, text, remarks)
     values, marks, words = _samples(path, report, remarks)
     per_cycle, frequency = _rate(path, report)
-    rate = per_cycle * frequency
     marked = next((i for sign in (">", "*") for i, mark in enumerate(marks) if sign in mark), None)
     if marked is None:
         remarks.add("no row is marked as the trigger's ('>'); the report's time is taken as that of the first sample")
-    if per_cycle < SLOW:
-        remarks.add(
-            f"{per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay with the command CEV R, "
-            "or its COMTRADE file"
-        )
-    gain = _gain(report, values, marks, per_cycle, remarks)
-    return Recording(
-        source=str(path),
-        channels=[
-            _channel(report, k, values[:, k], gain, remarks) for k in range(values.shape[1]) if _named(report, k)
-        ],
-        segments=[Segment(0, len(values), rate, 0.0)],
-        frequency=50.0 if abs(frequency - 50) < abs(frequency - 60) else 60.0,
-        device=report.about.get("FID", "").removeprefix("FID=").strip(),
-        start=_start(report, (marked or 0) / rate, remarks),
-        trigger=None if marked is None else marked / rate,
-        status=_states(report, words),
-        notes=remarks.notes(),
-        extra={"format": "SEL CEV", "encoding": encoding, "about": report.about, "settings": report.settings},
-    )
+    if rated := ", ".join(f"{name} = {value}" for name, value in RATING.findall(report.settings)):
+        remarks.add(f"the relay's settings: {rated}")
+    gain, tracked = _gain(report, values, marks, per_cycle, remarks), _tracked(report, values, frequency, remarks)
+    t = np.concatenate([[0.0], np.cumsum(2 / (tracked[1:] + tracked[:-1]))]) / per_cycle
+    nominal = 50.0 if abs(frequency - 50) < abs(frequency - 60) else 60.0
+    return _Opened(report, values, words, t, tracked, per_cycle, nominal, marked, gain, remarks, encoding)
+
+
+def _tracked(report: EventReport, values: np.ndarray, frequency: float, remarks: Remarks) -> np.ndarray:
+    """The frequency (N,) [Hz] that the relay sampled by: its column's, where that is one, else the summary's."""
+    names = [column.upper() for column in report.columns[: values.shape[1]]]
+    k = next((names.index(name) for name in ("FREQ", "FREQ(HZ)") if name in names), None)
+    if k is None:
+        return np.full(len(values), frequency)
+    column = values[:, k]
+    good = np.flatnonzero((column >= LEAST) & (column <= MOST))
+    if not len(good):
+        return np.full(len(values), frequency)
+    if len(good) < len(values):
+        remarks.add("FREQ has gaps or is no frequency in some rows: that of the rows beside them holds")
+    last = np.maximum.accumulate(np.where(np.isin(np.arange(len(values)), good), np.arange(len(values)), good[0]))
+    if np.ptp(column[good]) > 0:
+        remarks.add(f"times follow the frequency in FREQ, {column[good].min():g} to {column[good].max():g} Hz")
+    return column[last]
 
 
 def checksum(text: str) -> str:
@@ -180,7 +280,7 @@ def _rate(path: Path, report: EventReport) -> tuple[float, float]:
             f"{path}: SAM/CYC_A, the samples in a cycle, is {quoted(report.about.get('SAM/CYC_A', ''))}, not a number "
             "from 1 to 10000; correct it in the summary row"
         )
-    if frequency is None or not 10 <= frequency <= 100:
+    if frequency is None or not LEAST <= frequency <= MOST:
         raise UserError(
             f"{path}: FREQ, the frequency of the summary row, is {quoted(report.about.get('FREQ', ''))}, not a number "
             "from 10 to 100 Hz; correct it there"

@@ -54,7 +54,7 @@ class Stretch:
     columns: dict[int, np.ndarray]
 
 
-def is_pqdif(path: Path | str) -> bool:
+def recognizes(path: Path | str) -> bool:
     """Whether a file is there and begins as a PQDIF file does."""
     return files.there(path) and files.read(path, len(SIGNATURE)) == SIGNATURE
 

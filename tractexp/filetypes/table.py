@@ -124,11 +124,11 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
     """
-    from tractexp.filetypes import pqdif
+    from tractexp.filetypes.instrument import instrument_of
     from tractexp.filetypes.table_text import HEAD, open_text
 
-    if pqdif.is_pqdif(located(path)):
-        return pqdif.table(located(path), form.encoding)
+    if instrument := instrument_of(located(path)):
+        return instrument.table(located(path), form.encoding)
     data = content(path, None if whole else HEAD)
     if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
         data = content(path)

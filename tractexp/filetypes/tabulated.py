@@ -11,8 +11,8 @@ from tractexp.errors import UserError
 from tractexp.files import located
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import PER_UNIT, factor, role
+from tractexp.filetypes.instrument import instrument_of
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
-from tractexp.filetypes.pqdif import holds_waveforms, is_pqdif
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, open_table
 from tractexp.record.phasor import sequences
@@ -68,8 +68,8 @@ class Tabular:
 def kind_of(path: str) -> str:
     """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is ambiguous."""
     try:
-        sidecar = beside(path)
-        if sidecar.recording is not None or (is_pqdif(located(path)) and holds_waveforms(located(path))):
+        sidecar, instrument = beside(path), instrument_of(located(path))
+        if sidecar.recording is not None or (instrument and instrument.holds_waveforms(located(path))):
             return "waves"
         return mapped(open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units).kind
     except UserError:
