@@ -391,6 +391,38 @@ def test_a_combined_file_without_a_section(tmp_path):
         comtrade.load(tmp_path / "a.cff")
 
 
+@pytest.mark.parametrize(
+    ("cfg", "dat"),
+    [
+        ("--- file type CFG ---", "--- file type DAT ASCII ---"),
+        ("--- File Type CFG", "--- File Type DAT ASCII"),
+        ("---file type:CFG---", "---file type:DAT ASCII: 0---"),
+        ("------ filetype CFG ------", "------ filetype DAT ASCII ------"),
+    ],
+)
+def test_headings_of_a_combined_file_in_other_spellings(tmp_path, cfg, dat):
+    wanted = f"{tmp_path / 'a.cff'}"
+    (tmp_path / "a.cff").write_text(f"--- file type: CFG ---\n{CFG}--- file type: DAT ASCII ---\n{rows()}")
+    usual = [c.values() for c in comtrade.load(wanted).channels]
+    (tmp_path / "a.cff").write_text(f"{cfg}\n{CFG}{dat}\n{rows()}")
+    np.testing.assert_array_equal([c.values() for c in comtrade.load(wanted).channels], usual)
+
+
+@pytest.mark.parametrize("heading", ["file type DAT BINARY {}", "file type: DAT BINARY {}", "file type DAT BINARY: {}"])
+def test_the_length_of_binary_data_is_found_without_colons(pair, tmp_path, heading):
+    made = comtrade.load(pair())
+    comtrade.write(made, tmp_path / "a.cff", "BINARY")
+    content = (tmp_path / "a.cff").read_bytes()
+    length = re.search(rb"DAT BINARY: ?(\d+) ---", content)
+    changed = content.replace(length[0].replace(b" ---", b""), b"")
+    changed = re.sub(rb"file type: (?= ---)", heading.format(length[1].decode()).encode(), changed)
+    assert changed != content
+    (tmp_path / "b.cff").write_bytes(changed)
+    again = comtrade.load(tmp_path / "b.cff")
+    whole = comtrade.load(tmp_path / "a.cff")
+    np.testing.assert_array_equal([c.values() for c in again.channels], [c.values() for c in whole.channels])
+
+
 def test_what_cannot_be_written_is_refused(pair, tmp_path):
     made = comtrade.load(pair())
     for path, kind, revision, says in [

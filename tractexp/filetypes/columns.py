@@ -45,10 +45,10 @@ UNMISTAKABLE = frozenset((  # as units after a space or an underscore, where V a
 
 # {word: quantity}; longer ones match within a name too, in scripts that do not part words
 WORDS: Mapping[str, str] = {
-    **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "uhrzeit", "zeitstempel", "clock", "temps", "tiempo",
-                     "tempo", "tnow", "utc", "время", "时间", "时刻"), "t"),
+    **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "zeitpunkt", "uhrzeit", "zeitstempel", "clock",
+                     "temps", "tiempo", "tempo", "tnow", "utc", "время", "时间", "时刻"), "t"),
     **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
-    **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l",
+    **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l", "ul",
                      "spannung", "напряжение", "电压", "tension", "tensión"), "U"),
     **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente"),
                     "I"),
@@ -73,7 +73,7 @@ PHASES: Mapping[str, str] = {
     **dict.fromkeys(("0", "zero", "zs", "零序"), "0"),
     "3": "3", "n": "n",
 }  # fmt: skip
-LINE = frozenset(("ll", "line", "l-l", "pp", "ph-ph", "verkettet", "线电压"))
+LINE = frozenset(("ll", "ul", "u1l", "line", "l-l", "pp", "ph-ph", "verkettet", "线电压"))
 GROUND = frozenset(("ln", "phase-to-ground", "ph", "lg", "l-n", "ph-g", "strang", "相电压"))
 COMPOUND = re.compile(
     r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns|a|b|c"

@@ -25,7 +25,9 @@ LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
 MISSING_TEXT = (99999.0, 999999.0)  # of 1999 and of 1991
 _SECTION = re.compile(
-    rb"^-+[ \t]*file type:[ \t]*(\w+)[ \t]*(\w*)[ \t]*(?::[ \t]*(\d+))?[ \t]*-+[ \t]*\r?\n?", re.I | re.M
+    rb"^-+[ \t]*file[ \t]*type\b[ \t]*:?[ \t]*(\w+)[ \t]*((?:[a-z]\w*)?)[ \t]*:?[ \t]*(\d+)?[ \t]*"
+    rb"(?:-+[ \t]*\r?\n?|\r?(?:\n|\Z))",
+    re.I | re.M,
 )
 
 
