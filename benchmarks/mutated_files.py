@@ -142,6 +142,11 @@ def originals(folder):
     columns, texts = tables(made)
     for name, content in quality_files(made, columns).items():
         formats[name] = [files.write(folder / f"{name.replace(' ', '_')}.pqd", content)]
+    rows = "".join("".join(f" {x:.8E}" for x in row) + "\n" for row in zip(*columns.values(), strict=True))
+    named = "".join(f'PGB({k}) Output Desc="{n}" Group="" Units="pu"\n' for k, n in enumerate("UPQ", 1))
+    formats["PSCAD"] = [
+        files.write(folder / "case_01.out", f" title\n{rows}"), files.write(folder / "case.inf", named)
+    ]  # fmt: skip
     for ending, content in texts.items():
         formats[f"table {ending}"] = [files.write(folder / f"table{ending}", content)]
     for ending, write in ((".parquet", "write_parquet"), (".xlsx", "write_excel")):

@@ -47,7 +47,21 @@ class CSV(Tabular, Reader):
     Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".pqd", ".pqdif", ".cev")
+    endings = (
+        ".csv",
+        ".txt",
+        ".tsv",
+        ".parquet",
+        ".pq",
+        ".xlsx",
+        ".xls",
+        ".xlsb",
+        ".ods",
+        ".out",
+        ".pqd",
+        ".pqdif",
+        ".cev",
+    )
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number

@@ -18,7 +18,7 @@ class Waveforms(Tabular, WaveformReader):
     """
 
     quantities = QUANTITIES
-    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods")
+    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
 
     frequency: float = 50.0  # Hz, nominal
 

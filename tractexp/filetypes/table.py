@@ -4,6 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -124,11 +125,14 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
     """
+    from tractexp.filetypes import pscad
     from tractexp.filetypes.instrument import instrument_of
     from tractexp.filetypes.table_text import HEAD, open_text
 
     if instrument := instrument_of(located(path)):
         return instrument.table(located(path), form.encoding)
+    if Path(path).suffix.lower() == pscad.ENDING:
+        return pscad.table(located(path), form)
     data = content(path, None if whole else HEAD)
     if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
         data = content(path)
