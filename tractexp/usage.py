@@ -83,7 +83,8 @@ def listed(arguments: list[str]) -> int:
     parser.add_argument("group", nargs="*", metavar="GROUP")
     options = choices()
     short = {group.rpartition("/")[2]: group for group in options}  # `static`, as `tractexp new static` has it
-    chosen = [short.get(group.rstrip("/="), group.rstrip("/=")) for group in parser.parse_args(arguments).group]
+    names: list[str] = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
+    chosen = [short.get(name) or name for name in names]
     for group in chosen:
         if group not in options:
             holders = [f"'tractexp list {holder}'" for holder in _ordered(options) if group in options[holder]]
