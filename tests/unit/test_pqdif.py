@@ -9,7 +9,7 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.filetypes import pqdif
+from tractexp.filetypes import pqdif, pqdif_channels, pqdif_records
 from tractexp.record.reader import reader_of
 
 START = datetime(2024, 5, 17, 8, 30, 12, 250000)
@@ -205,6 +205,19 @@ def test_damaged_files_are_refused_with_a_sentence(write, content, says):
     path = write(content())
     with pytest.raises(UserError, match=says):
         (pqdif.table if "values" in says or "how many" in says else pqdif.load)(path)
+
+
+@pytest.mark.parametrize(
+    ("module", "name", "limit", "says"),
+    [
+        (pqdif_records, "LARGEST", 50_000, "hold more than 0 MB decompressed"),
+        (pqdif_channels, "MOST", 30_000, "stand for more than 30,000 values"),
+    ],
+)
+def test_what_is_unpacked_is_bounded(write, monkeypatch, module, name, limit, says):
+    monkeypatch.setattr(module, name, limit)
+    with pytest.raises(UserError, match=says):
+        pqdif.load(write(waveform_file()))
 
 
 def test_a_collection_that_holds_itself_ends(write):

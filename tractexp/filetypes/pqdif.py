@@ -60,9 +60,8 @@ def recognizes(path: Path | str) -> bool:
 
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
-    """Whether waveforms of a voltage or a current are in the file; raises `UserError` for what is no such file."""
-    found = observed(path, encoding, [WAVEFORM], Remarks(str(path)))
-    return any(_wave(d) in ("V", "A") for each in found.observations for i in each.instances for d, _ in i.series)
+    """Whether waveforms are in the file; raises `UserError` for what is no such file."""
+    return bool(observed(path, encoding, [WAVEFORM], Remarks(str(path)), most=1).observations)
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:

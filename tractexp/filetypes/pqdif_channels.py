@@ -6,6 +6,7 @@ instances of channels, whose series are stored as they are, scaled, as counts of
 Source: IEEE Std 1159.3-2019 (and -2003), clause on the logical structure; the GUIDs are the standard's.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,8 +109,10 @@ def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
     return DAY * (moment[0] - since[0]) + moment[1] - since[1]
 
 
-def observed(path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: Remarks) -> Observed:
-    """The channels of some kinds, as far as they have times.
+def observed(
+    path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: Remarks, most: float = math.inf
+) -> Observed:
+    """The channels of some kinds, as far as they have times, of the first `most` observations that have any.
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
@@ -123,7 +126,9 @@ def observed(path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: 
             reading.settings(body)
         elif kind == OBSERVATION:
             reading.observation(body)
-    return Observed(tuple(each for each in reading.observations if each.instances), reading.station, reading.frequency)
+            if len(reading.observations) >= most:
+                break
+    return Observed(tuple(reading.observations), reading.station, reading.frequency)
 
 
 class _Reading:
@@ -177,7 +182,8 @@ class _Reading:
             channel = self.definitions[one.number]
             if channel.kind in self.kinds and (made := self._instance(channel, one.owners(every), start, times)):
                 instances.append(made)
-        self.observations.append(Observation(start, body.moment(TRIGGERED), tuple(instances)))
+        if instances:
+            self.observations.append(Observation(start, body.moment(TRIGGERED), tuple(instances)))
 
     def _instance(
         self,

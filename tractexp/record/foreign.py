@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-COMPANION = "a companion of a COMTRADE record that holds no samples: give the .cfg beside it"
+COMPANION = "a companion of a record that holds no samples: give the .cfg beside it, or the .out of PSCAD"
 ARCHIVE = "an archive: unpack it, and give a file of it, or its folder to task=survey"
 DOCUMENT = "a document: give the record's data"
 RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
