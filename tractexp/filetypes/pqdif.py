@@ -166,7 +166,7 @@ def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.S
         for k, values in each.columns.items():
             parts[k].append(timeline.evened(values, runs, None))
         first += len(next(iter(parts.values()))[-1])
-    return segments, {k: np.concatenate(each) for k, each in parts.items()}
+    return segments, {k: each[0] if len(each) == 1 else np.concatenate(each) for k, each in parts.items()}
 
 
 def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:

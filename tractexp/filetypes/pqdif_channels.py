@@ -207,7 +207,7 @@ class _Reading:
         for definition, one in pairs:
             values = None if definition.value == TIME else self._values(definition, one, longest)
             if values is not None and len(values) == len(t):
-                series.append((definition, values * self.ratios.get(self.definitions.index(channel), 1.0)))
+                series.append((definition, values * self.ratios.get(channel.number - self.definitions[0].number, 1.0)))
             elif values is not None:
                 counts = f"{len(values)} values at {len(t)} times"
                 self.remarks.add(f"{_record(one.own)}: {channel.name} has {counts}: not read")
