@@ -3,6 +3,7 @@
 import json
 import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pandas
@@ -67,6 +68,46 @@ def test_a_file_as_the_only_argument_is_looked_at(station, tmp_path):
     done = run_command("missing.cfg", cwd=tmp_path)
     assert done.returncode == 2
     assert "there is no such file" in done.stderr
+
+
+def test_the_first_line_is_the_answer_and_each_load_has_one(looked):
+    first, *others = str(looked).splitlines()
+    (command,) = looked.commands
+    assert first == f"dip 1 at 0.492 s (40.0%, 220 ms) of Q1 is worth fitting; to fit it: {command}"
+    (bus,) = (line for line in others if "UA, UB, UC" in line)
+    assert "110 kV; dip 1 at 0.492 s (40.0%, 220 ms)" in bus
+    rows = [line.split() for line in others if line.lstrip().startswith("Q")]
+    assert [(row[0], row[1], row[7]) for row in rows] == [("Q1", "1", "yes:"), ("Q2", "1", "no:")]
+    assert " ".join(rows[1][8:]) == "P is negative before it"
+
+
+def test_eighty_channels_are_one_screen(tmp_path):
+    """24 feeders with and 2 without load on one bus: a table by feeder."""
+    first = constant()
+    loads = [first[3:] * 0.97**k * (1e-6 if k > 23 else 1.0) for k in range(26)]
+    names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in range(26) for p in "ABC")]
+    made = tractexp.look(saved(tmp_path / "many.cfg", np.concatenate([first, *loads])[[0, 1, 2, *range(6, 84)]],
+                               names=names))  # fmt: skip
+    lines = str(made).splitlines()
+    assert sum(line.strip().startswith("Q") for line in lines) == 24
+    assert len(lines) <= 36
+    assert lines[-1].endswith("listed with the loads of its bus: Q24, Q25")
+    assert "Q0 is worth fitting" in lines[0]
+
+
+def test_records_that_one_command_fits_are_named_by_what_it_fits():
+    first = str(tractexp.look("tibet")).splitlines()[0]
+    assert first.startswith("dip at 0.304 s (50.1%, 340 ms) of tibet_50pct is worth fitting; to fit it: tractexp")
+
+
+@pytest.mark.parametrize("name", ["dfr220kv-shandong/xtz.cfg", "async110kv-wisp/async110.cfg"])
+def test_a_recorder_of_a_station_is_one_screen(name, tmp_path):
+    path = Path(__file__).parents[3] / "shared" / "data" / name
+    if not path.exists():
+        pytest.skip(f"{path} is not there")
+    done = run_command("look", str(path), "--folder", "x", cwd=tmp_path)
+    assert len(done.stdout.splitlines()) <= 24
+    assert ("is worth fitting; to fit it: tractexp" in done.stdout.splitlines()[0]) == ("xtz" in name)
 
 
 def test_a_load_may_be_named_and_is_then_the_only_one(station):
@@ -224,6 +265,9 @@ def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     assert done.returncode == 0, done.stderr
     for part in ("North", "3200 Hz", "UA", "Q2", "dip", "fit it?", "yes: ", "to fit it:", "data=comtrade", "look.html"):
         assert part in done.stdout, part
+    every = run_command("look", str(station), "--all", "--folder", "all", cwd=tmp_path).stdout
+    for part in ("primary RMS", "fit for what", "Q1 IA", "their names differ in the phase alone", "jump [°]"):
+        assert (part in every, part in done.stdout) == (True, False), part
     (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
     assert str(page.relative_to(tmp_path)) in done.stdout
     named = run_command(

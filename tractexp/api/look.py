@@ -144,9 +144,16 @@ class Look(Written):
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
-        from tractexp.report import look
+        """One screen: which load and dip to fit by which command, then a line for each file, bus and load."""
+        from tractexp.report import look_console
 
-        return look.summary(self.content)
+        return look_console.summary(self.content)
+
+    def everything(self) -> Report:
+        """Notes, channels, why the loads are such, all events and all commands."""
+        from tractexp.report import look_console
+
+        return look_console.everything(self.content)
 
     def report(self) -> Report:
         from tractexp.report import look

@@ -37,30 +37,6 @@ CAPTION = (
 )
 
 
-def summary(content: Mapping[str, Any]) -> Report:
-    """What files hold: channels, loads, events, commands."""
-    page = Report()
-    for entry in content["files"]:
-        rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
-        about = [entry["station"], entry["device"], str(entry["start"] or ""), f"{entry['seconds']:.3f} s at {rates}",
-                 _frequency(entry)]  # fmt: skip
-        page.text(f"{entry['file']}: {'; '.join(filter(None, about))}", *(f"  note: {n}" for n in entry["notes"]))
-        page.add(*[channels(entry)] * bool(entry["channels"]))
-        for feeder in entry["feeders"]:
-            numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
-            wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
-            page.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
-            page.items([*feeder["why"], *feeder["said"]])
-            page.add(*[events(feeder)] * bool(feeder["events"])).items([_quiet(feeder)] * (not feeder["events"]))
-            if feeder["command"]:
-                page.text("  to fit it:").code(feeder["command"])
-        if not entry["feeders"]:
-            page.text(
-                "  no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
-            )
-    return page
-
-
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
     """The page."""
     files = content["files"]
@@ -131,16 +107,16 @@ def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
     segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in entry["segments"]]
     rows = [["path", entry["file"]], ["read by", entry["reader"]], ["station", entry["station"]],
             ["recorder", entry["device"]], ["starts", str(entry["start"] or "")], ["sampled", "; ".join(segments)],
-            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", _frequency(entry)]]  # fmt: skip
+            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", frequency(entry)]]  # fmt: skip
     return [row for row in rows if row[1]]
 
 
-def _frequency(entry: Mapping[str, Any]) -> str:
+def frequency(entry: Mapping[str, Any]) -> str:
     measured = entry["measured_frequency"]
     return f"{entry['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
 
 
-def _size(entry: Mapping[str, Any]) -> str:
+def size(entry: Mapping[str, Any]) -> str:
     """U, P and Q of a load at the beginning; "" where they are not known."""
     if entry["U"] is None:
         return ""
@@ -157,10 +133,10 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
 
 def _summary(entry: Mapping[str, Any]) -> list[str]:
     """A load in one row."""
-    size = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
+    sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
-    return [entry["name"], entry["connection"], channels, *size, str(len(entry["events"])), str(len(worth))]
+    return [entry["name"], entry["connection"], channels, *sizes, str(len(entry["events"])), str(len(worth))]
 
 
 def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], folded: bool) -> None:
@@ -170,7 +146,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     if entry["events"]:
         page.add(events(entry))
     else:
-        page.text(as_sentence(_quiet(entry)))
+        page.text(as_sentence(quiet(entry)))
     if folded:
         with page.folded(f"Charts of {entry['name']}"):
             _charts(page, view, shown)
@@ -198,16 +174,16 @@ def _described(entry: Mapping[str, Any]) -> list[str]:
         named = ", ".join(f"{n} {c}" for n, c in zip(numbers, entry["channels"], strict=True))
         reverse = ", current reversed" * entry["reverse_current"]
         sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
-    if size := _size(entry):
+    if text := size(entry):
         when = "Before the dip" if any(e["worth"] for e in entry["events"]) else "At first"
-        sentences.append(f"{when} {size}.")
+        sentences.append(f"{when} {text}.")
     if entry["sum_V"] is not None:
         current = "" if entry["sum_I"] is None else f", the currents to {entry['sum_I']:.2%}"
         sentences.append(f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}.")
     return sentences
 
 
-def _quiet(entry: Mapping[str, Any]) -> str:
+def quiet(entry: Mapping[str, Any]) -> str:
     """What is said of a load without events."""
     return NOTHING if entry["loaded"] else NO_LOAD
 
