@@ -282,7 +282,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
 
 
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
-    feeder, told = shown.feeder, shown.powers()
+    feeder, told = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
     made: dict[str, Any] = {"name": shown.name}
     if feeder is not None:

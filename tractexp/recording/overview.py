@@ -112,6 +112,19 @@ class View:
         segment = max(recording.segments, key=lambda s: s.rate)
         return [quality(recording, number, segment) for number in range(len(recording.channels))]
 
+    def powers(self, shown: Sight) -> tuple[float, float, float] | None:
+        """As `Sight.powers`, with the voltage that all loads of a bus have: that of the first that can be fitted.
+
+        Where none can, it is that of the first with events: only they tell what was before anything happened.
+        """
+        own = shown.powers()
+        if shown.feeder is None or own is None:
+            return own
+        wired = (shown.feeder.voltages, shown.feeder.connection)
+        bus = [s for s in self.sights if s.feeder is not None and (s.feeder.voltages, s.feeder.connection) == wired]
+        telling = next((s for s in bus if s.dips), next((s for s in bus if s.events), bus[0])).powers()
+        return own if telling is None else (telling[0], *own[1:])
+
     @property
     def frequency(self) -> float | None:
         """Measured [Hz] while the voltage of the first load is alive; None where nothing turns."""
