@@ -8,14 +8,17 @@ from pathlib import Path
 import numpy as np
 import pandas
 import pytest
+from browser import BROWSER, Worked, drawn
 from command_line import run_command
 from made_recordings import BASE, RATE, constant, recording, waves
 
 import tractexp
 import tractexp.progress
+from tractexp.blocks import style
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.overrides import assigned, override
+from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.look import envelope
@@ -246,6 +249,58 @@ def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
     }
     for command in looked.commands:
         assert shlex.split(command)[2] in page
+
+
+def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tmp_path):
+    values = constant()
+    trip = (np.arange(values.shape[1]) >= 0.55 * RATE).astype(np.uint8)
+    status = [StatusChannel("Q1 <trip>", trip), StatusChannel("idle", 0 * trip)]
+    page = tractexp.look(saved(tmp_path / "trip.cfg", values, trigger=0.49, status=status)).report().html
+    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    (mark,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "line"]
+    assert mark["x0"] == pytest.approx(0.49, abs=1e-6)
+    assert "trigger" in [note["text"] for note in whole["layout"]["annotations"]]
+    (course,) = [trace["course"] for trace in whole["data"] if "course" in trace]
+    assert course["at"] == pytest.approx([0, 0.55, 1], abs=1e-3)
+    assert course["states"] == [0, 1, 1]
+    assert "idle" not in json.dumps(whole["data"])
+    waves = [trace for trace in whole["data"] if trace.get("frequency")]
+    assert [trace["line"]["color"] for trace in waves] == [*style.PHASES, *style.PHASES]
+    assert [trace["label"] for trace in waves][::3] == ["a (UA)", "a (IA)"]
+    assert 0.49 < whole["cursor"] < 0.6
+    assert "Status channels that change are below." in page
+
+
+def test_a_page_without_status_channels_or_trigger_says_nothing_of_them(looked):
+    page = looked.report().html
+    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    assert "status" not in {axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")}
+    assert "Status channels" not in page
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_nothing_of_the_page_is_cut_off_on_a_screen_of_1280_pixels(tmp_path):
+    """Channels and status channels with names of one long word."""
+    first = constant()
+    trip = (np.arange(first.shape[1]) >= 0.55 * RATE).astype(np.uint8)
+    names = [f"{quantity}{phase}_110kV_bus_section_2_bay_62" for quantity in ("U", "I") for phase in "ABC"]
+    status = [StatusChannel("protection_2_bay_62_single_pole_trip_phase_A", trip)]
+    page = tractexp.look(saved(tmp_path / "long.cfg", first, names=names, status=status)).report()
+    script = """setTimeout(() => {
+      const cut = [...document.querySelectorAll("body, div, figure, table, td, pre")].filter(part =>
+        part.clientWidth && part.scrollWidth > part.clientWidth + 1).map(part => part.className);
+      charts.forEach(chart => {
+        const box = chart.getBoundingClientRect();
+        chart.querySelectorAll("text").forEach(text => {
+          const {left, right, width} = text.getBoundingClientRect();
+          if (width && (left < box.left - 1 || right > box.right + 1)) cut.push(text.textContent);
+        });
+      });
+      document.getElementById("told").textContent = JSON.stringify(cut);
+    }, 1000);"""
+    dom, complaints = drawn(Worked(page, script), tmp_path, "--window-size=1280,900", "--virtual-time-budget=4000")
+    assert complaints == []
+    assert json.loads(re.findall(r"<p id=.told.>(.*?)</p>", dom)[0]) == []
 
 
 def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):

@@ -112,6 +112,21 @@ class View:
         segment = max(recording.segments, key=lambda s: s.rate)
         return [quality(recording, number, segment) for number in range(len(recording.channels))]
 
+    @functools.cached_property
+    def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """Status channels that change (trips, breakers), first change first: name, times [s], state from each on."""
+        if self.recording is None:
+            return []
+        t = np.concatenate([segment.t for segment in self.recording.segments])
+        courses = []
+        for channel in self.recording.status:
+            states = channel.values()[: len(t)]
+            changes = np.flatnonzero(np.diff(states.astype(np.int8))) + 1
+            if len(changes):
+                at = np.concatenate([[0], changes, [len(states) - 1]])
+                courses.append((channel.name, t[at], states[at].astype(int)))
+        return sorted(courses, key=lambda course: course[1][1])
+
     def powers(self, shown: Sight) -> tuple[float, float, float] | None:
         """As `Sight.powers`, with the voltage that all loads of a bus have: that of the first that can be fitted.
 

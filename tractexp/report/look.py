@@ -8,8 +8,9 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
-from tractexp.blocks.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-from tractexp.recording import Recording, Segment
+from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
+from tractexp.blocks.style import PHASES as COLORS
+from tractexp.recording import Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
@@ -24,6 +25,9 @@ DETAILED = 12  # events that have a chart of their own where the whole is thinne
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
 LONGEST = 3.0  # s of an event there
 CYCLES = 10  # of a spectrum
+HEIGHTS = (1.3, 1.3, 1, 1, 1, 1.2, 0.7)  # of the panels of a load
+TRACE, TRACES = 0.19, 24  # height of a status channel beside these; so many have room
+CYCLE = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
 PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
@@ -34,6 +38,8 @@ NO_LOAD = "no load here: what happens to the voltage is listed with the loads of
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
     " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
+    " Above the chart are the values at the cursor, and the phasors of the cycle around it, turned so that the first"
+    " voltage lies at 0°: voltages thin, currents thick."
 )
 
 
@@ -160,11 +166,11 @@ def _charts(page: Report, view: View, shown: Sight) -> None:
         page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
         every, coarse = _every(view)
-        page.chart(_of_waves(view.recording, shown, every, coarse), CAPTION)
+        page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
         with page.folded("Spectrum before anything happened"):
             page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
         if max(every, coarse) > 1:
-            _details(page, view.recording, shown)
+            _details(page, view, shown)
 
 
 def _described(entry: Mapping[str, Any]) -> list[str]:
@@ -214,7 +220,7 @@ def _of_record(shown: Sight) -> Chart:
     record = shown.record
     assert record is not None
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
-    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": PALETTE[2]}
+    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": FAINT}
     sizes = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
     panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
     units = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
@@ -225,7 +231,8 @@ def _of_record(shown: Sight) -> Chart:
         for name in panels_of[label]:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
-    return _marked(chart, shown)
+    first = float(record.t[0])
+    return _marked(chart, shown).cursor(next((seen.what.start for seen in shown.events), first))
 
 
 def _every(view: View) -> tuple[int, int]:
@@ -238,14 +245,26 @@ def _every(view: View) -> tuple[int, int]:
 
 
 def _of_waves(
-    recording: Recording, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
+    view: View, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
 ) -> Chart:
     """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
+    recording, states = view.recording, view.operations[:TRACES]
+    assert recording is not None
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
     sequences = "|U| [kV]" if single else "U seq. [kV]"
-    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
-    chart = Chart("t [s]", panels, heights=(1.3, 1.3, 1, 1, 1, 1.2, 0.7), pixels=950)
+    panels = [
+        "u [kV]",
+        "i [kA]",
+        "U RMS [kV]",
+        "I RMS [kA]",
+        sequences,
+        "P, Q [MW]",
+        "f [Hz]",
+        *["status"] * bool(states),
+    ]
+    heights = [*HEIGHTS, *[TRACE * len(states)] * bool(states)]
+    chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
     for segment in recording.waveforms():
         _waves(chart, recording, shown, segment, every, span)
     for p in shown.phasors:
@@ -253,9 +272,21 @@ def _of_waves(
         if len(p.t[part]) > 1:
             _phasors(chart, p, part, recording.frequency, 1 if span else coarse)
     chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
-    if span:
-        chart.limits(None, *span)
-    return _marked(chart, shown)
+    if states:
+        chart.states(states, len(panels) - 1, VOLTAGE)
+    first, last = span or (recording.waveforms()[0].start, float(shown.phasors[-1].t[-1]))
+    chart.limits(None, first, last)
+    if recording.trigger is not None and first <= recording.trigger <= last:
+        chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
+    happened = (seen.what.start for seen in shown.events if first <= seen.what.start <= last)
+    return _marked(chart, shown).cursor(next(happened, first) + CYCLE / recording.frequency)
+
+
+def _further(view: View) -> str:
+    """What is said of status channels below a chart."""
+    count = len(view.operations)
+    most = f", the first {TRACES} of {count}" if count > TRACES else ""
+    return f" Status channels that change are below{most}." if count else ""
 
 
 def _waves(
@@ -269,14 +300,25 @@ def _waves(
     if waves.shape[1] < 2:
         return
     K, step = len(waves) // 2, 1 / segment.rate
+    colors, names = COLORS if K > 1 else (VOLTAGE,), _named(recording, shown.feeder, K)
+    frequency = recording.frequency if every == 1 else None  # an envelope has no phasor
     for k, wave in enumerate(waves):
         y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
-        chart.samples(PHASES[K][k % K], start, dt, y, PALETTE[k % K], panel=k // K, width=1.0)
+        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k],
+                      frequency=frequency)  # fmt: skip
     t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
-            name, color = PHASES[K][k % K], PALETTE[k % K]
+            name, color = PHASES[K][k % K], colors[k % K]
             chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
+
+
+def _named(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
+    """What the waves of a load are called at the cursor: by phase, and by channel where they are its channels."""
+    numbers = (*feeder.voltages, *feeder.currents)
+    if len(numbers) != 2 * phases:  # line voltages, or two current transformers, of which phases are made
+        return [*PHASES[phases]] * 2
+    return [f"{PHASES[phases][k % phases]} ({recording.channels[i].name})" for k, i in enumerate(numbers)]
 
 
 def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
@@ -287,11 +329,11 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     if len(p.V) == 3:
         zero = np.abs(p.V.mean(axis=0))
         lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
-                  ("zero sequence", zero, PALETTE[4], 4)]  # fmt: skip
+                  ("zero sequence", zero, MEASURED, 4)]  # fmt: skip
     else:
         lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
     alive = np.abs(p.f / nominal - 1) < BOUND
-    lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
+    lines.append(("f", np.where(alive, p.f, np.nan), FAINT, 6))
     for name, values, color, panel in lines:
         drawn = values[part] if every == 1 else envelope(values[part], every)
         chart.samples(name, float(t[0]), step * every, drawn, color, panel)
@@ -325,13 +367,13 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     return chart
 
 
-def _details(page: Report, recording: Recording, shown: Sight) -> None:
+def _details(page: Report, view: View, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
     for seen in shown.events[:DETAILED]:
         what = seen.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
         with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
-            page.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
+            page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
         page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
 
