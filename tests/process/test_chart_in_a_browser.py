@@ -78,8 +78,11 @@ def test_the_cursor_reads_every_curve_and_turns_the_phasors(tmp_path):
     t = np.arange(4000) / 4000
     u, i = np.sqrt(2) * 10 * np.cos(2 * np.pi * 50 * t), np.sqrt(2) * np.cos(2 * np.pi * 50 * t - np.pi / 6)
     chart = Chart("t [s]", ["u [kV]", "i [kA]", "status"])
-    chart.samples("a", 0.0, 1 / 4000, u, BLUE, label="a (<b>U1)", frequency=50.0)
-    chart.samples("a", 0.0, 1 / 4000, i, BLUE, 1, label="a (I1)", frequency=50.0)
+    chart.samples("a", 0.0, 1 / 4000, u, BLUE, label="a (<b>U1)").samples(
+        "a", 0.0, 1 / 4000, i, BLUE, 1, label="a (I1)"
+    )
+    turn = np.exp(2j * np.pi * 50 * t)[::4]
+    chart.phasors("a", 0.0, 1e-3, 10 * turn, BLUE, 0).phasors("a", 0.0, 1e-3, np.exp(-1j * np.pi / 6) * turn, BLUE, 1)
     chart.states([("trip", np.array([0.0, 0.3, 1.0]), np.array([0, 1, 1]))], 2, BLUE)
     chart.cursor(0.2).edge(0.3, text="trigger")
     script = """

@@ -264,7 +264,8 @@ def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tm
     assert course["at"] == pytest.approx([0, 0.55, 1], abs=1e-3)
     assert course["states"] == [0, 1, 1]
     assert "idle" not in json.dumps(whole["data"])
-    waves = [trace for trace in whole["data"] if trace.get("frequency")]
+    waves = [trace for trace in whole["data"] if trace.get("samples") and trace["panel"] in ("u [kV]", "i [kA]")]
+    assert [trace["name"] for trace in whole["data"] if trace.get("phasor")] == [*"abcabc"]
     assert [trace["line"]["color"] for trace in waves] == [*style.PHASES, *style.PHASES]
     assert [trace["label"] for trace in waves][::3] == ["a (UA)", "a (IA)"]
     assert 0.49 < whole["cursor"] < 0.6

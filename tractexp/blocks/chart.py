@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp import quoting
 from tractexp.blocks import style
@@ -62,27 +63,17 @@ const seen = (samples, from, to) => {
   if (end < last) add(last);
   return {x, y};
 };
-// Where the cursor is: every curve's value, each panel a row, and the phasors of waveforms, over the cycle around it.
+// Where the cursor is: every curve's value, each panel a row, and the phasors.
+const sampleAt = ({raw, start, step, offset, scale}, t) => {
+  const i = Math.round((t - start) / step);
+  return i < 0 || i >= raw.length || raw[i] === -32768 ? null : offset + scale * raw[i];
+};
 const valueAt = (trace, t) => {
-  if (trace.samples) {
-    const {raw, start, step, offset, scale} = trace.samples, i = Math.round((t - start) / step);
-    return i < 0 || i >= raw.length || raw[i] === -32768 ? null : offset + scale * raw[i];
-  }
+  if (trace.samples) return sampleAt(trace.samples, t);
   const {at, states} = trace.course || {at: [], states: []};
   let last = -1;
   at.forEach((time, i) => { if (time <= t) last = i; });
   return last < 0 || t > at[at.length - 1] ? null : states[last];
-};
-const phasorAt = ({samples, frequency}, t) => {
-  const {raw, start, step, offset, scale} = samples, n = Math.round(1 / (frequency * step));
-  const first = Math.round((t - start) / step - n / 2), part = raw.slice(Math.max(first, 0), first + n);
-  if (first < 0 || part.length < n || part.includes(-32768)) return null;
-  let re = 0, im = 0;
-  part.forEach((value, i) => {
-    const angle = 2 * Math.PI * frequency * (start + (first + i) * step - t), y = offset + scale * value;
-    re += y * Math.cos(angle); im -= y * Math.sin(angle);
-  });
-  return {size: Math.hypot(re, im) * Math.SQRT2 / n, angle: Math.atan2(im, re)};
 };
 const digits = (value, n) => value === 0 ? "0" : Number(value.toPrecision(n)).toString();
 const arrows = phasors => {
@@ -100,7 +91,7 @@ const arrows = phasors => {
 };
 const rows = (chart, t) => {
   const made = new Map();
-  chart.data.filter(trace => trace.panel).forEach(trace => {
+  chart.data.filter(trace => trace.panel && !trace.phasor).forEach(trace => {
     const value = valueAt(trace, t), cells = made.get(trace.panel) || made.set(trace.panel, []).get(trace.panel);
     if (value === null || (trace.course && !value)) return;
     cells.push([trace.label, trace.course ? "" : digits(value, 5), trace.line.color]);
@@ -108,11 +99,13 @@ const rows = (chart, t) => {
   return [...made].filter(([, cells]) => cells.length);
 };
 const phasors = (chart, t) => {
-  const waves = chart.data.filter(trace => trace.frequency && valueAt(trace, t) !== null);
-  const found = waves.map(trace => ({...phasorAt(trace, t), panel: trace.panel, name: trace.name,
-    color: trace.line.color})).filter(p => p.size);
-  const turn = found.length ? found[0].angle : 0;
-  return found.map(p => ({...p, angle: Math.atan2(Math.sin(p.angle - turn), Math.cos(p.angle - turn))}));
+  const turning = chart.data.filter(trace => trace.phasor && sampleAt(trace.phasor.re, t) !== null).map(trace => {
+    const re = sampleAt(trace.phasor.re, t), im = sampleAt(trace.phasor.im, t);
+    const {panel, name, line: {color}} = trace;
+    return {panel, name, color, size: Math.hypot(re, im), angle: Math.atan2(im, re)};
+  });
+  return turning.map(p => ({...p, angle: Math.atan2(
+    Math.sin(p.angle - turning[0].angle), Math.cos(p.angle - turning[0].angle))}));
 };
 const readOut = (chart, t) => {
   const box = chart.previousElementSibling, table = document.createElement("table"), turning = phasors(chart, t);
@@ -121,8 +114,10 @@ const readOut = (chart, t) => {
     row.insertCell().textContent = panel;
     const cell = row.insertCell();
     cells.forEach(([label, value, color]) => {
-      cell.appendChild(document.createElement("i")).style.background = color;
-      cell.appendChild(document.createElement("span")).textContent = `${label} ${value}`;
+      const item = cell.appendChild(document.createElement("span")), mark = document.createElement("i");
+      item.textContent = `${label} ${value}`;
+      mark.style.background = color;
+      item.prepend(mark);
     });
   };
   line("t [s]", [["", t.toFixed(4), "none"]]);
@@ -144,6 +139,7 @@ const draw = chart => {
   const sampled = data.filter(trace => trace.samples);
   const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
   sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });
+  data.filter(trace => trace.phasor).forEach(({phasor}) => { unpack(phasor.re); unpack(phasor.im); });
   Plotly.newPlot(chart, data, layout, SETTINGS);
   const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
   if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));
@@ -247,23 +243,24 @@ class Chart:
 
     def samples(
         self, name: str, start: float, step: float, y: np.ndarray, color: str, panel: int = 0, *,
-        width: float = 1.2, dash: str = "solid", label: str = "", frequency: float | None = None,
+        width: float = 1.2, dash: str = "solid", label: str = "",
     ) -> "Chart":  # fmt: skip
         """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a gap.
 
         Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn. At the
-        cursor it is named `label`; a waveform of that `frequency` [Hz] has a phasor there.
+        cursor it is named `label`.
         """
-        finite = np.isfinite(y)
-        low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
-        offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
-        held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
-        coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
-        coded |= {"offset": offset, "scale": scale}
         line = {"color": color, "width": width, "dash": dash}
         reading: dict[str, Any] = {"panel": self._panels[panel], "label": label or name}
-        reading |= {"frequency": frequency} if frequency else {}
-        return self._add(name, panel, mode="lines", line=line, samples=coded, **reading)
+        return self._add(name, panel, mode="lines", line=line, samples=_coded(start, step, y), **reading)
+
+    def phasors(
+        self, name: str, start: float, step: float, y: NDArray[np.complex128], color: str, panel: int
+    ) -> "Chart":
+        """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as arrows."""
+        coded = {"re": _coded(start, step, y.real), "im": _coded(start, step, y.imag)}
+        return self._add(name, panel, mode="lines", line={"color": color}, silent=True, x=[None], y=[None],
+                         phasor=coded, panel=self._panels[panel])  # fmt: skip
 
     def states(self, courses: Sequence[tuple[str, np.ndarray, np.ndarray]], panel: int, color: str) -> "Chart":
         """States 0 and 1 as (name, times, states), each a trace below the other: the state from each time on."""
@@ -348,8 +345,8 @@ class Chart:
         """A vertical line, in one panel or through all, with a `text` below the panel (the first)."""
         if text:
             self._notes.append(
-                {"text": quoting.html(text), "xref": "x", "x": x, "xanchor": "left", "yref": _height(panel or 0)["yref"],
-                 "y": 0, "yanchor": "top", "showarrow": False, "font": {"size": 11, "color": color}}
+                {"text": quoting.html(text), "xref": "x", "x": x, "xanchor": "left", "y": 0, "yanchor": "top",
+                 "yref": _height(panel or 0)["yref"], "showarrow": False, "font": {"size": 11, "color": color}}
             )  # fmt: skip
         line = {"color": color, "width": 1, "dash": dash}
         self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
@@ -454,6 +451,16 @@ def _key(panel: int) -> str:
 def _height(panel: int | None) -> dict[str, Any]:
     """All of a panel, or of the chart."""
     return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
+
+
+def _coded(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
+    """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan is a gap."""
+    finite = np.isfinite(y)
+    low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
+    offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
+    held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+    coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+    return coded | {"offset": offset, "scale": scale}
 
 
 def _packed(values: np.ndarray, kind: str) -> dict[str, str]:

@@ -62,7 +62,8 @@ figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
 .readout { position: sticky; top: 0; z-index: 2; display: flex; gap: 1rem; align-items: center;
   justify-content: space-between; min-height: 11.5rem; background: #fff; border-bottom: 1px solid var(--line); }
 .readout td { padding: .1rem .5rem; font-size: .78rem; text-align: left; white-space: normal; vertical-align: top; }
-.readout td:first-child { white-space: nowrap; color: var(--faint); } .readout span { margin-right: .9rem; }
+.readout td:first-child { white-space: nowrap; color: var(--faint); }
+.readout span { margin-right: .9rem; display: inline-block; }
 .readout i { display: inline-block; width: .6rem; height: .6rem; margin-right: .25rem; } .readout svg { flex: none; }
 .equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
 pre { margin: .5rem 0; padding: .5rem .7rem; background: #f6f6f6; font-size: .84rem; white-space: pre-wrap;

@@ -19,6 +19,7 @@ from tractexp.wording import as_sentence, change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
+MOST_ARROWS = 30_000  # values of phasors at the cursor that a chart holds
 LINES = 7  # that a load's phasors make
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 DETAILED = 12  # events that have a chart of their own where the whole is thinned
@@ -38,7 +39,7 @@ NO_LOAD = "no load here: what happens to the voltage is listed with the loads of
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
     " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
-    " Above the chart are the values at the cursor, and the phasors of the cycle around it, turned so that the first"
+    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the first"
     " voltage lies at 0°: voltages thin, currents thick."
 )
 
@@ -300,17 +301,19 @@ def _waves(
     if waves.shape[1] < 2:
         return
     K, step = len(waves) // 2, 1 / segment.rate
-    colors, names = COLORS if K > 1 else (VOLTAGE,), _named(recording, shown.feeder, K)
-    frequency = recording.frequency if every == 1 else None  # an envelope has no phasor
+    colors, names = _colors(K), _named(recording, shown.feeder, K)
     for k, wave in enumerate(waves):
         y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
-        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k],
-                      frequency=frequency)  # fmt: skip
+        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
     t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
             name, color = PHASES[K][k % K], colors[k % K]
             chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
+
+
+def _colors(phases: int) -> tuple[str, ...]:
+    return COLORS if phases > 1 else (VOLTAGE,)
 
 
 def _named(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
@@ -325,6 +328,10 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     """Symmetrical components, powers and frequency of one segment."""
     t = p.t[part]
     step = float(t[-1] - t[0]) / (len(t) - 1)
+    sparse = max(1, -(-4 * p.V.shape[0] * len(t) // MOST_ARROWS))
+    for panel, phases in enumerate((p.V, p.I)):
+        for name, color, turning in zip(PHASES[len(phases)], _colors(len(phases)), phases, strict=True):
+            chart.phasors(name, float(t[0]), step * sparse, turning[part][::sparse], color, panel)
     lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
     if len(p.V) == 3:
         zero = np.abs(p.V.mean(axis=0))
