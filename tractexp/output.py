@@ -4,7 +4,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from typing import Any
 
 
@@ -43,9 +43,8 @@ def outlet() -> Iterator[Outlet | None]:
     stream = io.TextIOWrapper(
         io.BufferedWriter(raw), usual.encoding, "backslashreplace", line_buffering=lines, write_through=through
     )
-    sys.stdout = stream
-    try:
-        yield raw
-    finally:
-        stream.flush()
-        sys.stdout = usual
+    with redirect_stdout(stream):
+        try:
+            yield raw
+        finally:
+            stream.flush()

@@ -17,7 +17,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
-from tractexp.report import discrepancy, overlay
+from tractexp.report import candidates, discrepancy, extended, overlay
 from tractexp.report.events import WITHIN
 from tractexp.wording import joined
 
@@ -122,7 +122,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     words, charts = page(named, tmp_path)
     bars = charts[-1]["data"][0]
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
-    assert bars["marker"]["color"][0] == discrepancy.COLORS[CHOSEN]
+    assert bars["marker"]["color"][0] == candidates.COLORS[CHOSEN]
     assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(named)
     assert beside(named) in words
 
@@ -157,9 +157,9 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
 
 def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
     weak = "weakly identified: ± 32 %; trades against q_v (correlation 0.99); C q_v^0.2 is known to ± 1.8 %"
-    assert discrepancy._brief(weak) == "weakly identified: ± 32 %"
-    assert discrepancy._brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
-    assert discrepancy._brief("identified (± 5 %)") == "identified (± 5 %)"
+    assert extended.brief(weak) == "weakly identified: ± 32 %"
+    assert extended.brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
+    assert extended.brief("identified (± 5 %)") == "identified (± 5 %)"
 
 
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):

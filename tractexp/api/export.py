@@ -63,12 +63,14 @@ def export(
     power: float | None = None,  # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
     voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
     base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
+    doubtful: bool = False,  # export also a model that is no physical load
 ) -> Exported:
     """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
 
     The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line to line], by
     default what the record says, else 100 and 110. `base` "own" writes values on the base of the fit, "file" on that of
-    the record's file, where it was another. Raises `UserError` where the format cannot represent a part of the model.
+    the record's file, where it was another. Raises `UserError` where the format cannot represent a part of the model,
+    and for a model that is no physical load unless `doubtful`.
     """
     from tractexp.exchange.format import Identified
 
@@ -76,6 +78,10 @@ def export(
         if value is not None:
             check_range(f"task.{name}", value, least)
     check_choice("task.base", base, BASES)
+    if fit.doubts and not doubtful:
+        raise UserError(
+            f"this model is no physical load: {' and '.join(fit.doubts)}; task.doubtful=true exports it all the same"
+        )
     own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
     file_power = power or (own.file_power if own.in_mva else POWER)
     on_file = base == FILE

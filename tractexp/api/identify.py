@@ -23,6 +23,7 @@ from tractexp.progress import Progress, tell
 from tractexp.wording import epsilon
 
 if TYPE_CHECKING:
+    from tractexp.exchange.operating_point import OperatingPoint
     from tractexp.identification.adequacy import Adequacy
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
@@ -182,8 +183,24 @@ class Identification(Written):
 
     @property
     def headline(self) -> str:
-        """What this identification is good for, in one sentence."""
-        return self.result.adequacy.get("sentence", "")
+        """What this identification is good for, and what speaks against it, in one sentence."""
+        sentence = self.result.adequacy.get("sentence", "")
+        doubt = self.operating_point.doubt if self.operating_point else ""
+        return f"{sentence}; {doubt}" if sentence and doubt else sentence
+
+    @functools.cached_property
+    def operating_point(self) -> "OperatingPoint | None":
+        """How the load divides before the dip, and the motor as a machine; None where the model has no motor."""
+        from tractexp.exchange.operating_point import OperatingPoint
+
+        return OperatingPoint.of(self.result)
+
+    @property
+    def doubts(self) -> list[str]:
+        """What speaks against this model as a physical load, a clause each."""
+        from tractexp.exchange.operating_point import doubts
+
+        return doubts(self.result, self.operating_point)
 
     @property
     def adequate(self) -> bool:

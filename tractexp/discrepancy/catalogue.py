@@ -47,8 +47,8 @@ class Candidate:
 class Catalogue:
     """All candidates that can be tested, and why the others cannot.
 
-    `members` of their families have another place or another law; they are tried where the best textbook effect
-    leaves something, or their own comes near it.
+    `members` of their families have another place or another law; they are tried beside the best textbook
+    effect.
     """
 
     candidates: tuple[Candidate, ...]

@@ -10,6 +10,9 @@ Source: Wu, Fan, Zou 2022, below Eq. (2) for X, X', T0'; Milano 2010, ch. 15 for
 
 from dataclasses import dataclass
 from math import sqrt
+from typing import TypeVar
+
+Number = TypeVar("Number", float, complex)
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,13 @@ class TCircuit:
             return 0.0
         return (self.X_2 + _parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
 
+    def impedance(self, slip: float) -> complex:
+        """Seen from the terminals at a slip."""
+        rotor = complex(self.R_1 / slip, self.X_1)
+        if self.X_2 is not None and self.R_2 is not None:
+            rotor = _parallel(rotor, complex(self.R_2 / slip, self.X_2))
+        return complex(self.R_s, self.X_s) + _parallel(complex(0.0, self.X_m), rotor)
 
-def _parallel(a: float, b: float) -> float:
+
+def _parallel(a: Number, b: Number) -> Number:
     return a * b / (a + b)

@@ -127,7 +127,7 @@ class Effect(Part):
     it does there, of `sites.PLACES` and `sites.KINDS`.
 
     A member of a family names the textbook effect as its `family`: the same kind of effect at another place, or at the
-    same place by another law, tried where textbook effects leave something or theirs comes near. `differs` ends the
+    same place by another law, tried beside a single textbook effect. `differs` ends the
     sentence that begins with the textbook's name; `as_textbook` {own parameter: the textbook's} says where a search
     begins and, where it `nests_textbook`, at which values it is the textbook effect, the other parameters at their
     defaults. `likely` {parameter: standard deviation} holds shapes to their defaults, the textbook law, unless the data

@@ -57,11 +57,16 @@ def summary(fit: "Identification") -> Report:
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
     report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
-    report.text(*fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
+    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
     return report.text(
         *start, result.acceptance, *[headline(result)] * bool(verdicts), *(f"  {sentence}" for sentence in poor),
         *notes, *filter(None, [fit.end_of_search]), *(f"next: {sentence}" for sentence in fit.advice),
     )  # fmt: skip
+
+
+def machine(fit: "Identification") -> list[str]:
+    """How the load divides before the dip, in a sentence; [] where its model has no motor."""
+    return [str(fit.operating_point)] * (fit.operating_point is not None)
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:
@@ -86,7 +91,7 @@ def report(fit: "Identification") -> Report:
     )
     page.heading("Measured and calculated")
     _curves(page, details.fits, uncertainty)
-    page.heading("Parameters").add(parameters(fit))
+    page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
     page.heading("How well it fits").add(errors(fit))
     page.heading("What to do next").items(fit.advice)

@@ -1,0 +1,96 @@
+"""The identified load before its dip: how its power divides, what the motor is as a machine, and whether it could be.
+
+A fit may describe a record by a motor that draws more than the whole load beside a static part that generates: the sum
+is right, the machine is none.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.exchange.format import Identified
+from tractexp.identification.result import Result
+from tractexp.identification.verdict import BOUND
+
+MOST = 1.2  # of the load's active power: what a motor may draw before its model is doubted
+FACTOR = 0.8  # power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent power
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """Powers [MW, Mvar, or pu of the file] before the first event that was fitted, and the motor there.
+
+    `slip` is per unit of the nominal speed, `H` [s] on the motor's own apparent power, `starting` the current at
+    standstill over that before the dip; None where this motor has no such figure.
+    """
+
+    P: float
+    Q: float
+    P_motor: float
+    Q_motor: float
+    slip: float
+    H: float | None
+    starting: float | None
+    units: tuple[str, str]
+
+    @classmethod
+    def of(cls, result: Result) -> "OperatingPoint | None":
+        """None where the model has no motor, or no steady state of its own."""
+        own = result.base
+        load = Identified(result)
+        try:
+            before = load.before
+        except UserError:
+            return None
+        if "P_motor" not in before or "Q_motor" not in before:
+            return None
+        scale = own.power if own.in_mva else own.ratio
+        units = ("MW", "Mvar") if own.in_mva else ("pu", "pu")
+        P, Q = result.before["P0"], result.before["Q0"]
+        P_motor, Q_motor = before["P_motor"], before["Q_motor"]
+        S = float(np.hypot(P_motor, Q_motor))
+        slip = -before.get("omega_before", 0.0) / load.omega_n
+        H = load.inertia / S if "M" in load.values and S else None
+        starting = None
+        if {"T_prime", "X_prime", "C"} <= load.values.keys() and S:
+            starting = result.before["U0"] ** 2 / (S * abs(load.circuit.impedance(1.0)))
+        return cls(scale * P, scale * Q, scale * P_motor, scale * Q_motor, slip, H, starting, units)
+
+    @property
+    def share(self) -> float:
+        """The motor's part of the active power."""
+        return self.P_motor / self.P if self.P else float("nan")
+
+    def __str__(self) -> str:
+        p, q = self.units
+        machine = [f"slip {100 * self.slip:.2g} %"]
+        machine += [f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}"] * (self.H is not None)
+        machine += [f"starting current {self.starting:.2g} times that before the dip"] if self.starting else []
+        return (
+            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}, {self.share:.0%} of P; static "
+            f"load {self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q}; {', '.join(machine)}"
+        )
+
+    @property
+    def doubt(self) -> str:
+        """Why no load is so, in words; "" where one may be."""
+        p, q = self.units
+        S, S_motor = np.hypot(self.P, self.Q), np.hypot(self.P_motor, self.Q_motor)
+        motor, static = (f"{abs(x):.4g} {p}" for x in (self.P_motor, self.P - self.P_motor))
+        reactive, supplied = (f"{abs(x):.4g} {q}" for x in (self.Q_motor, self.Q - self.Q_motor))
+        of_load = f"of a load of {self.P:.4g} {p} and {self.Q:.4g} {q}"
+        if self.P > 0 > self.share:
+            return f"the motor generates {motor} and the static part draws {static} {of_load}"
+        if self.P > 0 and self.share > MOST:
+            return f"the motor draws {motor} {of_load}, and the static part generates {static}"
+        if self.P > 0 and S_motor > MOST / FACTOR * S:
+            return f"the motor draws {reactive} {of_load}, and the static part supplies {supplied}"
+        return ""
+
+
+def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
+    """What speaks against an identified load as a physical one, a clause each."""
+    resting = [name for name, verdict in result.verdicts.items() if verdict.startswith(BOUND)]
+    held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
+    return [*([point.doubt] if point and point.doubt else []), *[held] * bool(resting)]

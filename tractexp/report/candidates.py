@@ -1,0 +1,119 @@
+"""The candidates of an investigation by their evidence, and the sets that were compared."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.discrepancy.chance import by_draws
+from tractexp.discrepancy.evidence import (
+    CHOSEN,
+    FITTED,
+    KEPT,
+    ONE_STEP,
+    Evidence,
+    beside,
+    chance_level,
+    evidence,
+    why_not_the_most_helpful,
+)
+from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.judgement import judgements
+from tractexp.wording import joined
+
+COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
+REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
+BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
+MOST_SETS = 12  # that are compared in a table
+
+
+def candidates(page: Report, findings: Findings) -> None:
+    rows = evidence(findings)
+    labels = _labels(rows)
+    page.heading("Candidates by their evidence")
+    seen = [row for row in rows if np.isfinite(row.drop)]
+    if seen:
+        page.chart(_bars(findings, seen, labels), _bars_caption(findings, seen))
+    for sentence in (why_not_the_most_helpful(findings), beside(findings)):
+        page.text(*[sentence] * bool(sentence))
+    entries = [
+        [
+            f"{labels[r]}: {joined(r.names)}" if len(r.names) > 1 else labels[r],
+            "" if np.isnan(r.drop) else f"{r.drop:.1f}",
+            r.status,
+            "; ".join(map(str, r.sizes)),
+            r.why,
+        ]
+        for r in rows
+    ]
+    chosen = findings.last.fit.names
+    single = f"; that of an effect outside of it is what the events say with {joined(chosen)} in the model"
+    page.table(
+        ["candidate", "deviance lowered by", "status", "size", "why"], entries,
+        f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
+        " standard error where it was reckoned.", words=(0, 2, 3, 4),
+    )  # fmt: skip
+    _sets(page, findings)
+    if chosen:
+        _further(page, findings)
+
+
+def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
+    """A candidate's name; sets of several are numbered, because a chart has no room for all their names."""
+    sets = [row for row in rows if len(row.names) > 1]
+    return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
+
+
+def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+    """How much each candidate explains by itself."""
+    colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
+    entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
+    chance = chance_level(findings)
+    chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
+    chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
+    return chart.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
+
+
+def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
+    colors = ["green: added"] * bool(findings.names)
+    colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
+    colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
+    colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
+    chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
+    return (
+        f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
+        f" {findings.context.criteria.false_alarms:.0%} of cases."
+    )
+
+
+def _sets(page: Report, findings: Findings) -> None:
+    """How the refitted sets of the chosen size compare."""
+    rows = [
+        [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
+         "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
+         "" if r.tests is None else by_draws(r.tests.p_left)]
+        for r in findings.survivors.rivals[:MOST_SETS]
+    ]  # fmt: skip
+    with page.folded("How the refitted sets compare"):
+        page.table(
+            ["set", "deviance", "behind", "distance of the curves", "verdict", "chance leaves as much"], rows,
+            "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
+            " well; it is adequate when chance may leave as much as it does.", words=(4, 5),
+        )  # fmt: skip
+
+
+def _further(page: Report, findings: Findings) -> None:
+    """What the others would add once the chosen effects are in the model."""
+    rows = []
+    for j in judgements(findings):
+        size = ""
+        if j.score is not None:
+            size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
+        rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
+    names = joined(findings.last.fit.names)
+    with page.folded(f"What each effect would add to a model that has {names}"):
+        page.table(
+            ["effect", "status", "deviance lowered by", "one-step size", "why"], rows,
+            "Scores with all nuisances projected out; sizes are departures from the null.", words=(1, 3, 4),
+        )  # fmt: skip

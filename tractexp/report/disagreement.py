@@ -1,0 +1,62 @@
+"""Where the base model disagrees with the records, and the noise by which that is judged."""
+
+from tractexp.blocks import Report
+from tractexp.discrepancy.chance import by_draws
+from tractexp.discrepancy.investigate import Findings
+from tractexp.wording import in_words, joined
+
+NOISE_OF_WAVES = (
+    "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
+    " equation explains count as noise; noise of the voltage is passed on as the model does. Beside it each channel may"
+    " keep a small offset, and how steep the voltage is at the samples of an edge is known no better than two curves"
+    " through them agree."
+)
+
+
+def places(page: Report, findings: Findings) -> None:
+    """Whether and where the base model disagrees with the records."""
+    first = findings.first
+    page.heading("Is there a disagreement, and where?")
+    text = f"What the base model leaves would come about by chance with a probability of {by_draws(first.p_left)}"
+    text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
+    if first.scores:
+        best, alpha = first.scores[0], findings.context.criteria.false_alarms
+        text += (
+            f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
+            f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
+            f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in {alpha:.0%} of cases."
+        )
+    page.text(text)
+    if not findings.places:
+        page.text("No interval holds more energy than chance leaves there.")
+        return
+    page.table(
+        ["event", "channel", "from [s]", "to [s]", "share of the excess"],
+        [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in findings.places],
+        "Intervals in which the base model leaves more than chance does, at a family-wise error of"
+        f" {findings.context.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
+    )  # fmt: skip
+
+
+def noise(page: Report, findings: Findings) -> None:
+    level, free = findings.context.describe(findings.last.noise), joined(findings.catalogue.of_measurement)
+    if findings.context.waves:
+        unjudged = findings.last.noise.loudest_input_mode > findings.context.criteria.blurred
+        how = (
+            "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
+        )
+        faults = f" Faults of the measurement ({free}) are free in every fit, {how}." * bool(free)
+        page.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
+        return
+    page.heading("Noise").text(
+        f"{level}. It is estimated where nothing happens, from what the fit leaves there, and"
+        " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
+        " free in every fit, each held by what is physically likely."
+    )
+    if (window := findings.context.records.window) is not None:
+        model = " The extended configuration does not do so." if findings.names else ""
+        page.text(
+            f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
+            " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
+            f" record, and the current of the model is averaged as the recorder does.{model}"
+        )

@@ -1,0 +1,113 @@
+"""The extended model of an investigation: where each effect acts and by which law, parameters and equations."""
+
+import numpy as np
+
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.discrepancy.discrepancy_json import use_of
+from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
+from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.precision import ParameterEstimate
+from tractexp.discrepancy.recommended import held
+from tractexp.model.sites import KINDS
+from tractexp.wording import joined, with_error
+
+CURVE, TEXTBOOK = "#0072B2", "#D55E00"
+
+
+def laws(page: Report, findings: Findings) -> None:
+    """Where each effect named acts, what it does there and by which law; curves that were found."""
+    if not findings.names:
+        return
+    entries = forms(findings)
+    page.heading("Where it acts, and by which law")
+    rows = [
+        [f.name, joined(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
+         f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs, f.effect.name]
+        for f in entries
+    ]  # fmt: skip
+    page.table(
+        ["effect", "where", "what it does there", "law", "effect in the model"], rows,
+        "The catalogue's laws are tried first, then other laws and places of every family: a wrong formula may leave"
+        " nothing where the right one is of another law.",
+        words=(1, 2, 3, 4),
+    )  # fmt: skip
+    for form in entries:
+        if form.law_fit is not None:
+            page.chart(
+                _curve(form.law_fit),
+                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
+            )
+
+
+def _curve(fitted: FittedLaw) -> Chart:
+    """A law with its band, and the textbook's."""
+    law = fitted.curve
+    chart = Chart(law.x_label, [law.y_label], pixels=320)
+    chart.band("", law.x, fitted.band[0], fitted.band[1], CURVE)
+    chart.line("the law found", law.x, law.y, CURVE, width=2.2)
+    chart.line("the catalogue's law", law.x, fitted.textbook, TEXTBOOK, dash="dash")
+    shown = np.concatenate([law.y, fitted.textbook])
+    room = 0.25 * max(float(np.ptp(shown)), 1e-6)
+    return chart.limits(0, float(shown.min()) - room, float(shown.max()) + room)
+
+
+def parameters(page: Report, findings: Findings) -> None:
+    """The base model's parameters before and after, and those that came in."""
+    page.heading("Parameters before and after" if findings.names else "Parameters of the base model")
+    before = {e.parameter.name: e for e in findings.before}
+    rows, parameter_estimates = [], findings.after if findings.names else findings.before
+    for e in parameter_estimates:
+        p, was = e.parameter, before.get(e.parameter.name)
+        entries = [value(was) if was else "not in it"] if findings.names else []
+        rows.append([p.name, p.about, p.unit, *entries, value(e), interval(e), brief(e.verdict)])
+    stages = ["before", "after"] if findings.names else ["value"]
+    columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
+    page.table(
+        columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
+        words=(1, 2, len(columns) - 1),
+    )  # fmt: skip
+    if retained := held(findings):
+        page.text(f"These events cannot tell {joined(list(retained))}: the extended model holds what was found.")
+    if why := [f"{e.parameter.name} is {e.verdict}." for e in parameter_estimates if brief(e.verdict) != e.verdict]:
+        with page.folded("Why some are known badly, and what of them is known"):
+            page.items(why)
+
+
+def equations(page: Report, findings: Findings) -> None:
+    """The equations that changed or came in, and how the extended model is used."""
+    from tractexp.model.model import compose
+    from tractexp.model.printed import changed
+
+    page.heading("The extended model")
+    if others := [joined(names) for names in findings.verdict.sets[1:]]:
+        page.text(f"It has {joined(findings.names)}; {joined(others, 'or')} instead would fit these events as well.")
+    page.text(
+        f"conf/model/extended.yaml beside this page: {use_of(findings.context.load.domain, 'conf')}. Its equations"
+        " that changed or came in:"
+    )
+    base = findings.context.load
+    effects = [findings.catalogue[n].effect for n in findings.names]
+    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
+    for was, line in changed(base.latex(), extended.latex()):
+        if was is not None:
+            page.text("before").equation(was).text("after")
+        page.equation(line)
+    with page.folded("All equations of the extended model"):
+        for line in extended.latex():
+            page.equation(line)
+
+
+def brief(verdict: str) -> str:
+    """The first clause of a verdict that has several: 'weakly identified: ± 32 %'."""
+    return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
+
+
+def value(estimate: ParameterEstimate) -> str:
+    bound = "" if np.isfinite(estimate.error) else ", at its bound"
+    return f"{with_error(estimate.value, estimate.error)}{bound}"
+
+
+def interval(estimate: ParameterEstimate) -> str:
+    low, high = estimate.interval
+    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
