@@ -272,6 +272,15 @@ def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tm
     assert "Status channels that change are below." in page
 
 
+def test_channels_of_no_load_have_a_chart_of_their_own(tmp_path):
+    values = np.concatenate([constant(), 0.01 * constant()[:1], 0.02 * constant()[3:4]])
+    names = ("UA", "UB", "UC", "IA", "IB", "IC", "3U0", "3I0")
+    page = tractexp.look(saved(tmp_path / "rest.cfg", values, names=names)).report().html
+    charts = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', page)]
+    assert "The 2 channels of no load" in page
+    assert [(trace["label"], trace["panel"]) for trace in charts[-1]["data"]] == [("3U0", "u [kV]"), ("3I0", "i [kA]")]
+
+
 def test_a_page_without_status_channels_or_trigger_says_nothing_of_them(looked):
     page = looked.report().html
     whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])

@@ -35,7 +35,6 @@ GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
 SHOWN = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
-READ_OUT = '<div class="readout"></div>'
 TICK = 28  # letters of a trace's name beside its axis
 HELD = 32767  # the greatest of 16 bits; the least stands for a gap
 DRAW = """
@@ -96,7 +95,7 @@ const rows = (chart, t) => {
     if (value === null || (trace.course && !value)) return;
     cells.push([trace.label, trace.course ? "" : digits(value, 5), trace.line.color]);
   });
-  return [...made].filter(([, cells]) => cells.length);
+  return [...made];  // rows stay, so that nothing moves under the cursor
 };
 const phasors = (chart, t) => {
   const turning = chart.data.filter(trace => trace.phasor && sampleAt(trace.phasor.re, t) !== null).map(trace => {
@@ -123,7 +122,7 @@ const readOut = (chart, t) => {
   line("t [s]", [["", t.toFixed(4), "none"]]);
   rows(chart, t).forEach(([panel, cells]) => line(panel, cells));
   const polar = p => [p.name, `${digits(p.size, 4)} ∠ ${(p.angle * 180 / Math.PI).toFixed(1)}°`, p.color];
-  [...new Set(turning.map(p => p.panel))].forEach(panel =>
+  [...new Set(chart.data.filter(trace => trace.phasor).map(trace => trace.panel))].forEach(panel =>
     line(`phasors of ${panel}`, turning.filter(p => p.panel === panel).map(polar)));
   box.replaceChildren(table);
   if (turning.length) box.insertAdjacentHTML("beforeend", arrows(turning));
@@ -413,7 +412,8 @@ class Chart:
     def element(self, label: str) -> str:
         """The chart as an element of a page."""
         data = quoting.script(self.plain())
-        above = "" if self._cursor is None else READ_OUT
+        kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
+        above = "" if self._cursor is None else f'<div class="{kind}"></div>'
         return (
             f'{above}<div class="chart" role="img" aria-label="{quoting.html(label)}" style="height:{self._pixels}px">'
             "</div>"

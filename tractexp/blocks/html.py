@@ -60,7 +60,8 @@ figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
   grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
 .charts figure { margin: .3rem 0; min-width: 0; }
 .readout { position: sticky; top: 0; z-index: 2; display: flex; gap: 1rem; align-items: center;
-  justify-content: space-between; min-height: 11.5rem; background: #fff; border-bottom: 1px solid var(--line); }
+  justify-content: space-between; background: #fff; border-bottom: 1px solid var(--line); }
+.arrows { min-height: 11.5rem; }
 .readout td { padding: .1rem .5rem; font-size: .78rem; text-align: left; white-space: normal; vertical-align: top; }
 .readout td:first-child { white-space: nowrap; color: var(--faint); }
 .readout span { margin-right: .9rem; display: inline-block; }

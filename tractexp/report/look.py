@@ -10,15 +10,17 @@ from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
 from tractexp.blocks.style import PHASES as COLORS
-from tractexp.recording import Feeder, Recording, Segment
+from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
+from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.wording import as_sentence, change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
+MOST_OTHERS = 50_000  # samples of channels of no load
 MOST_ARROWS = 30_000  # values of phasors at the cursor that a chart holds
 LINES = 7  # that a load's phasors make
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
@@ -64,6 +66,7 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
             page.heading("Channels").add(channels(entry))
+            _unassigned(page, view)
     return page
 
 
@@ -172,6 +175,34 @@ def _charts(page: Report, view: View, shown: Sight) -> None:
             page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
         if max(every, coarse) > 1:
             _details(page, view, shown)
+
+
+def _unassigned(page: Report, view: View) -> None:
+    """The channels of no load, a panel for each unit."""
+    recording = view.recording
+    assert recording is not None
+    taken = {i for s in view.sights if s.feeder for i in (*s.feeder.voltages, *s.feeder.currents)}
+    panels: dict[str, list[Channel]] = {}
+    for number in sorted({*range(len(recording.channels))} - taken):
+        channel = recording.channels[number]
+        quantity = unit_of(channel.unit)[0]
+        unit = {"voltage": "u [kV]", "current": "i [kA]"}.get(quantity, channel.unit or "value")
+        panels.setdefault(unit, []).append(channel)
+    if not panels:
+        return
+    count = sum(map(len, panels.values()))
+    chart, every = (
+        Chart("t [s]", [*panels], pixels=150 + 200 * len(panels)),
+        -(-count * recording.samples // MOST_OTHERS),
+    )
+    for panel, group in enumerate(panels.values()):
+        for k, channel in enumerate(group):
+            for segment in (s for s in recording.segments if s.stop > s.first + 1):
+                y = channel.values(segment.first, segment.stop)
+                y, step = (y, 1) if every == 1 else (envelope(y, every), every)
+                chart.samples(channel.name, segment.start, step / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
+    with page.folded(f"The {_count(count, 'channel')} of no load"):
+        page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
 
 
 def _described(entry: Mapping[str, Any]) -> list[str]:
