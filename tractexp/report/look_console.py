@@ -23,7 +23,8 @@ def summary(content: Entry) -> Report:
         page.text("; ".join([_about(entry), *held]))
         buses = _buses(entry["feeders"])
         page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
-        page.add(*[_loads(entry, buses)] * bool(buses))
+        if buses:
+            page.add(_loads(entry, buses))
         unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
         if unloaded and len(unloaded) < len(entry["feeders"]):
             page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
