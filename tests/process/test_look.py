@@ -22,6 +22,7 @@ from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.look import envelope
+from tractexp.report.look_console import summary
 
 
 def saved(path, values=None, **more):
@@ -96,6 +97,17 @@ def test_eighty_channels_are_one_screen(tmp_path):
     assert len(lines) <= 36
     assert lines[-1].endswith("listed with the loads of its bus: Q24, Q25")
     assert "Q0 is worth fitting" in lines[0]
+
+
+def test_a_note_of_the_reader_is_on_the_screen_and_of_many_three(tmp_path):
+    path = saved(tmp_path / "five.cfg")
+    path.write_text(path.read_text().replace("\n50\n", "\n0\n"))
+    made = tractexp.look(path)
+    (note,) = made.content["files"][0]["notes"]
+    assert f"  note: {note}" in str(made)
+    many = {**made.content["files"][0], "notes": [f"line {k} was mended" for k in range(9)]}
+    lines = str(summary({"files": [many]})).splitlines()
+    assert [line for line in lines if line.startswith("  note")][2:] == ["  note: line 2 was mended", "  note: 6 more"]
 
 
 def test_records_that_one_command_fits_are_named_by_what_it_fits():

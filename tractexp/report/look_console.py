@@ -10,6 +10,7 @@ from tractexp.blocks import Report, Table
 from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size
 from tractexp.wording import counted, figure, joined
 
+NOTES = 3  # of a file that have room
 LISTED = 4  # events of a bus that its line has room for
 UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
@@ -19,8 +20,9 @@ def summary(content: Entry) -> Report:
     """One screen: which load and which dip to fit by which command, then a line for each file, bus and load."""
     page = Report().text(_answer(content["files"]))
     for entry in content["files"]:
-        held = [counted(len(entry[key]), key[:-1]) for key in ("channels", "notes") if entry[key]]
-        page.text("; ".join([_about(entry), *held]))
+        held = [counted(len(entry["channels"]), "channel")] * bool(entry["channels"])
+        page.text("; ".join([_about(entry), *held]), *(f"  note: {note}" for note in entry["notes"][:NOTES]))
+        page.text(*[f"  note: {len(entry['notes']) - NOTES} more"] * (len(entry["notes"]) > NOTES))
         buses = _buses(entry["feeders"])
         page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
         if buses:
