@@ -65,9 +65,11 @@ def _explained(arguments: list[str]) -> int:
     except Exception as error:
         if traceback:
             raise
-        kind = type(error).__name__
-        why = f"the program failed, which is its own mistake: {kind}: {error}; {FULL_ERROR}=1 shows where"
-        return _refused(why, 1)
+        from tractexp.plugin import place_in_plugin
+
+        place = place_in_plugin(error)
+        whose = f"the plugin fails in {place}" if place else "the program failed, which is its own mistake"
+        return _refused(f"{whose}: {type(error).__name__}: {error}; {FULL_ERROR}=1 shows where", 1)
 
 
 def _refused(sentence: str, code: int = 2) -> int:

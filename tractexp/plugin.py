@@ -15,6 +15,7 @@ import functools
 import importlib
 import inspect
 import sys
+import traceback
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -130,6 +131,14 @@ def schema(cls: type[Plugin]) -> type:
 def packages() -> tuple[Any, ...]:
     """The packages behind the entry points, imported, in order of name."""
     return tuple(dict.fromkeys(map(_package, entry_points())))
+
+
+def place_in_plugin(error: BaseException) -> str:
+    """File and line of the innermost frame of an exception that is in a plugin; "" where none is."""
+    folders = [Path(path) for package in packages() for path in package.__path__]
+    frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
+    inside = [(name, line) for name, line in frames if any(Path(name).is_relative_to(folder) for folder in folders)]
+    return f"{inside[-1][0]}, line {inside[-1][1]}" if inside else ""
 
 
 @functools.cache

@@ -2,8 +2,9 @@
 
 import functools
 import hashlib
+import re
 import subprocess
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -109,6 +110,27 @@ _started: list[str] = []
 def started(arguments: list[str]) -> None:
     """Remember the command line that this process was started by."""
     _started[:] = ["tractexp", *arguments]
+
+
+def again(*settings: str, of: Collection[str] = ("data", "model", "domain")) -> str:
+    """The command that does something else with the settings of this run in some groups: its records and its load.
+
+    The command line of a sweep has several of each, so that its jobs repeat none.
+    """
+    arguments, others = _started[1:], {setting.partition("=")[0] for setting in settings}
+    if {"-m", "--multirun"} & {*arguments}:
+        arguments = []
+    keys = [(argument, argument.partition("=")[0]) for argument in arguments if "=" in argument]
+    repeated = [argument for argument, key in keys if group_of(key) in of and key not in others]
+    if "--config-dir" in arguments and "--config-dir" not in settings:
+        at = arguments.index("--config-dir")
+        repeated = [*arguments[at : at + 2], *repeated]
+    return quoting.shell("tractexp", *settings, *repeated)
+
+
+def group_of(key: str) -> str:
+    """The group of a setting's key: `data` of data.train."""
+    return re.split(r"[./@]", key.lstrip("+~"), maxsplit=1)[0]
 
 
 def command() -> str:

@@ -81,8 +81,10 @@ def listed(arguments: list[str]) -> int:
     about = "Show what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
     parser = argparse.ArgumentParser(prog="tractexp list", description=about)
     parser.add_argument("group", nargs="*", metavar="GROUP")
-    chosen = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
     options = choices()
+    short = {group.rpartition("/")[2]: group for group in options}  # `static`, as `tractexp new static` has it
+    names: list[str] = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
+    chosen = [short.get(name) or name for name in names]
     for group in chosen:
         if group not in options:
             holders = [f"'tractexp list {holder}'" for holder in _ordered(options) if group in options[holder]]

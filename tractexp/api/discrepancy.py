@@ -390,7 +390,8 @@ class Discrepancy(Task, call=investigate):
         show(result.summary(), console())
         if page := paths.get(result.page):
             say(f"page: {page}")
-        say(f"beside it: {', '.join(sorted(paths.keys() - {result.page}))}")
+        beside = sorted(str(path.relative_to(job.folder)) for name, path in paths.items() if name != result.page)
+        say(f"beside it: {', '.join(beside)}")
         conf = job.folder / "conf"
         if model := paths.get("extended.yaml"):
             which = f", which has {joined(result.names)}" * (result.verdict == "tied")

@@ -19,6 +19,7 @@ from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.model_error import ModelError, in_percent
+from tractexp.provenance import again
 from tractexp.wording import joined
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
@@ -211,9 +212,8 @@ def _number(value: float) -> float | None:
 
 
 def use_of(domain: str, conf: str) -> str:
-    """The command that runs the extended model, to be found in the folder `conf`."""
-    setting = DOMAINS[domain].setting.split()
-    return quoting.shell("python", "-m", "tractexp", "--config-dir", conf, *setting, "model=extended")
+    """The command that fits the extended model, to be found in the folder `conf`, to the records of this run."""
+    return again("--config-dir", conf, *DOMAINS[domain].setting.split(), "model=extended", of=("data",))
 
 
 def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Path:

@@ -12,6 +12,7 @@ from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
 from tractexp.noise.color import runs
+from tractexp.provenance import again
 
 
 def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
@@ -22,7 +23,7 @@ def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()
     """
     better = better_domain(uncertainty.likelihood.problem)
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
-    search = f"task=discrepancy data={data}" if data else "task=discrepancy"
+    search = again("task=discrepancy", *[f"data={data}"] * bool(data))
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*better, missing, *sentences]

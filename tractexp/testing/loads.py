@@ -176,7 +176,11 @@ def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
     response = of.simulate(drives.drive(0.3, 0.65, domain=of.domain), rows, 16)
     good = (response.miss == 0).all(axis=0)
     power = response.outputs[:, good]
-    assert np.isfinite(power).all(), f"{of.title} is not finite in a corner of the bounds of '{cls.name}'"
+    finite = np.isfinite(power).all(axis=(0, 2))
+    if not finite.all():
+        corner = zip((p.name for p in cls.parameters), np.array(corners)[good][np.argmin(finite)], strict=True)
+        at = ", ".join(f"{name}={value:g}" for name, value in corner)
+        raise AssertionError(f"{of.title} is not finite in a corner of the bounds of '{cls.name}', at {at}")
     assert np.abs(power).max(initial=0.0) < LARGEST, f"{of.title} draws more than {LARGEST:g} pu in a corner"
 
 

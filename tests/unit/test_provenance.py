@@ -1,0 +1,41 @@
+"""The command that goes on with what a run was told: a line to be pasted."""
+
+from pathlib import Path
+
+import pytest
+
+from tractexp import plugin, provenance
+
+
+@pytest.mark.parametrize(
+    ("arguments", "settings", "expected"),
+    [
+        ([], ["task=discrepancy"], "tractexp task=discrepancy"),
+        (["data=tibet", "seed=3"], ["task=plan"], "tractexp task=plan data=tibet"),
+        (["data=a", "data.train=[b c]"], ["task=plan", "data=d"], "tractexp task=plan data=d 'data.train=[b c]'"),
+        (["model/static=zip", "domain=waves", "optimizer=pso"], ["task=plan"],
+         "tractexp task=plan model/static=zip domain=waves"),
+        (["--config-dir", "conf", "model=own"], ["task=plan"], "tractexp task=plan --config-dir conf model=own"),
+        (["-m", "data=a,b"], ["task=plan"], "tractexp task=plan"),  # several in one line
+    ],
+)  # fmt: skip
+def test_records_and_load_of_a_run_are_repeated(monkeypatch, arguments, settings, expected):
+    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
+    assert provenance.again(*settings) == expected
+
+
+def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
+    arguments = ["--config-dir", "old", "data=archive", "data.path=my records", "model=old", "model.fixed.C=0.8"]
+    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
+    command = provenance.again("--config-dir", "conf", "model=extended", of=("data",))
+    assert command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
+
+
+@pytest.mark.parametrize(("inside", "line"), [(True, 2), (False, 0)])
+def test_a_plugin_that_fails_is_named_by_file_and_line(tmp_path, inside, line):
+    folder = Path(plugin.packages()[0].__path__[0]) if inside else tmp_path
+    file, scope = folder / "breakaway_load.py", {}
+    exec(compile("def edit():\n    return sympy.tanh(1)\n", str(file), "exec"), scope)
+    with pytest.raises(NameError) as failed:
+        scope["edit"]()
+    assert plugin.place_in_plugin(failed.value) == (f"{file}, line {line}" if line else "")
