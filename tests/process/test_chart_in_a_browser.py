@@ -70,3 +70,39 @@ def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_pat
     assert near[0] < 520
     assert near[4:] == [0, pytest.approx(99.999)]  # both ends keep the axis of the whole
     assert again == whole
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_the_cursor_reads_every_curve_and_turns_the_phasors(tmp_path):
+    """A quarter of a cycle later voltage and current have turned alike: their angles stay, values do not."""
+    t = np.arange(4000) / 4000
+    u, i = np.sqrt(2) * 10 * np.cos(2 * np.pi * 50 * t), np.sqrt(2) * np.cos(2 * np.pi * 50 * t - np.pi / 6)
+    chart = Chart("t [s]", ["u [kV]", "i [kA]", "status"])
+    chart.samples("a", 0.0, 1 / 4000, u, BLUE, label="a (<b>U1)").samples(
+        "a", 0.0, 1 / 4000, i, BLUE, 1, label="a (I1)"
+    )
+    turn = np.exp(2j * np.pi * 50 * t)[::4]
+    chart.phasors("a", 0.0, 1e-3, 10 * turn, BLUE, 0).phasors("a", 0.0, 1e-3, np.exp(-1j * np.pi / 6) * turn, BLUE, 1)
+    chart.states([("trip", np.array([0.0, 0.3, 1.0]), np.array([0, 1, 1]))], 2, BLUE)
+    chart.cursor(0.2).edge(0.3, text="trigger")
+    script = """
+    const told = [], box = charts[0].previousElementSibling;
+    const texts = () => [...box.querySelectorAll("tr")].map(row => row.textContent);
+    const tell = () => told.push(texts(), box.querySelectorAll("line").length);
+    tell();
+    charts[0].emit("plotly_hover", {xvals: [0.405], points: []}); tell();
+    document.getElementById("told").textContent = JSON.stringify(told);"""
+    dom, complaints = drawn(
+        Worked(Report("waves").chart(chart, "waves"), script), tmp_path, "--virtual-time-budget=3000"
+    )
+    assert complaints == []
+    first, arrows, later, _ = json.loads(
+        re.search(r"<p id=.told.>(.*?)</p>", dom)[1].replace("&lt;", "<").replace("&gt;", ">")
+    )
+    assert arrows == 2
+    phasors = ["phasors of u [kV]a 10 ∠ 0.0°", "phasors of i [kA]a 1 ∠ -30.0°"]
+    assert first[:2] == ["t [s] 0.2000", "u [kV]a (<b>U1) 14.142"]
+    assert first[3:] == ["status", *phasors]  # not tripped
+    assert later[1].startswith("u [kV]a (<b>U1) ")
+    assert abs(float(later[1].split()[-1])) < 1e-3
+    assert later[3:] == ["statustrip ", *phasors]

@@ -3,21 +3,26 @@
 import json
 import re
 import shlex
+from pathlib import Path
 
 import numpy as np
 import pandas
 import pytest
+from browser import BROWSER, Worked, drawn
 from command_line import run_command
 from made_recordings import BASE, RATE, constant, recording, waves
 
 import tractexp
 import tractexp.progress
+from tractexp.blocks import style
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
 from tractexp.overrides import assigned, override
+from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.report.look import envelope
+from tractexp.report.look_console import summary
 
 
 def saved(path, values=None, **more):
@@ -67,6 +72,57 @@ def test_a_file_as_the_only_argument_is_looked_at(station, tmp_path):
     done = run_command("missing.cfg", cwd=tmp_path)
     assert done.returncode == 2
     assert "there is no such file" in done.stderr
+
+
+def test_the_first_line_is_the_answer_and_each_load_has_one(looked):
+    first, *others = str(looked).splitlines()
+    (command,) = looked.commands
+    assert first == f"dip 1 at 0.492 s (40.0%, 220 ms) of Q1 is worth fitting; to fit it: {command}"
+    (bus,) = (line for line in others if "UA, UB, UC" in line)
+    assert "110 kV; dip 1 at 0.492 s (40.0%, 220 ms)" in bus
+    rows = [line.split() for line in others if line.lstrip().startswith("Q")]
+    assert [(row[0], row[1], row[7]) for row in rows] == [("Q1", "1", "yes:"), ("Q2", "1", "no:")]
+    assert " ".join(rows[1][8:]) == "P is negative before it"
+
+
+def test_eighty_channels_are_one_screen(tmp_path):
+    """24 feeders with and 2 without load on one bus: a table by feeder."""
+    first = constant()
+    loads = [first[3:] * 0.97**k * (1e-6 if k > 23 else 1.0) for k in range(26)]
+    names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in range(26) for p in "ABC")]
+    made = tractexp.look(saved(tmp_path / "many.cfg", np.concatenate([first, *loads])[[0, 1, 2, *range(6, 84)]],
+                               names=names))  # fmt: skip
+    lines = str(made).splitlines()
+    assert sum(line.strip().startswith("Q") for line in lines) == 24
+    assert len(lines) <= 36
+    assert lines[-1].endswith("listed with the loads of its bus: Q24, Q25")
+    assert "Q0 is worth fitting" in lines[0]
+
+
+def test_a_note_of_the_reader_is_on_the_screen_and_of_many_three(tmp_path):
+    path = saved(tmp_path / "five.cfg")
+    path.write_text(path.read_text().replace("\n50\n", "\n0\n"))
+    made = tractexp.look(path)
+    (note,) = made.content["files"][0]["notes"]
+    assert f"  note: {note}" in str(made)
+    many = {**made.content["files"][0], "notes": [f"line {k} was mended" for k in range(9)]}
+    lines = str(summary({"files": [many]})).splitlines()
+    assert [line for line in lines if line.startswith("  note")][2:] == ["  note: line 2 was mended", "  note: 6 more"]
+
+
+def test_records_that_one_command_fits_are_named_by_what_it_fits():
+    first = str(tractexp.look("tibet")).splitlines()[0]
+    assert first.startswith("dip at 0.304 s (50.1%, 340 ms) of tibet_50pct is worth fitting; to fit it: tractexp")
+
+
+@pytest.mark.parametrize("name", ["dfr220kv-shandong/xtz.cfg", "async110kv-wisp/async110.cfg"])
+def test_a_recorder_of_a_station_is_one_screen(name, tmp_path):
+    path = Path(__file__).parents[3] / "shared" / "data" / name
+    if not path.exists():
+        pytest.skip(f"{path} is not there")
+    done = run_command("look", str(path), "--folder", "x", cwd=tmp_path)
+    assert len(done.stdout.splitlines()) <= 24
+    assert ("is worth fitting; to fit it: tractexp" in done.stdout.splitlines()[0]) == ("xtz" in name)
 
 
 def test_a_load_may_be_named_and_is_then_the_only_one(station):
@@ -130,6 +186,8 @@ def test_a_file_without_events_or_loads_is_told_and_is_no_error(tmp_path):
     write(volts, tmp_path / "volts.cfg", "BINARY", 1999)
     alone = tractexp.look(tmp_path / "volts.cfg")
     assert (len(alone.channels), len(alone.feeders)) == (3, 0)
+    assert str(alone).startswith("nothing is worth fitting: no voltages and currents of one load were recognised")
+    assert str(quiet).startswith("nothing is worth fitting: nothing happened")
     for made in (quiet, alone):
         assert [p.name for p in made.write(tmp_path / "page")] == ["look.json", "look.html"]
 
@@ -207,6 +265,68 @@ def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
         assert shlex.split(command)[2] in page
 
 
+def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tmp_path):
+    values = constant()
+    trip = (np.arange(values.shape[1]) >= 0.55 * RATE).astype(np.uint8)
+    status = [StatusChannel("Q1 <trip>", trip), StatusChannel("idle", 0 * trip)]
+    page = tractexp.look(saved(tmp_path / "trip.cfg", values, trigger=0.49, status=status)).report().html
+    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    (mark,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "line"]
+    assert mark["x0"] == pytest.approx(0.49, abs=1e-6)
+    assert "trigger" in [note["text"] for note in whole["layout"]["annotations"]]
+    (course,) = [trace["course"] for trace in whole["data"] if "course" in trace]
+    assert course["at"] == pytest.approx([0, 0.55, 1], abs=1e-3)
+    assert course["states"] == [0, 1, 1]
+    assert "idle" not in json.dumps(whole["data"])
+    waves = [trace for trace in whole["data"] if trace.get("samples") and trace["panel"] in ("u [kV]", "i [kA]")]
+    assert [trace["name"] for trace in whole["data"] if trace.get("phasor")] == [*"abcabc"]
+    assert [trace["line"]["color"] for trace in waves] == [*style.PHASES, *style.PHASES]
+    assert [trace["label"] for trace in waves][::3] == ["a (UA)", "a (IA)"]
+    assert 0.49 < whole["cursor"] < 0.6
+    assert "Status channels that change are below." in page
+
+
+def test_channels_of_no_load_have_a_chart_of_their_own(tmp_path):
+    values = np.concatenate([constant(), 0.01 * constant()[:1], 0.02 * constant()[3:4]])
+    names = ("UA", "UB", "UC", "IA", "IB", "IC", "3U0", "3I0")
+    page = tractexp.look(saved(tmp_path / "rest.cfg", values, names=names)).report().html
+    charts = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', page)]
+    assert "The 2 channels of no load" in page
+    assert [(trace["label"], trace["panel"]) for trace in charts[-1]["data"]] == [("3U0", "u [kV]"), ("3I0", "i [kA]")]
+
+
+def test_a_page_without_status_channels_or_trigger_says_nothing_of_them(looked):
+    page = looked.report().html
+    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    assert "status" not in {axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")}
+    assert "Status channels" not in page
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_nothing_of_the_page_is_cut_off_on_a_screen_of_1280_pixels(tmp_path):
+    """Channels and status channels with names of one long word."""
+    first = constant()
+    trip = (np.arange(first.shape[1]) >= 0.55 * RATE).astype(np.uint8)
+    names = [f"{quantity}{phase}_110kV_bus_section_2_bay_62" for quantity in ("U", "I") for phase in "ABC"]
+    status = [StatusChannel("protection_2_bay_62_single_pole_trip_phase_A", trip)]
+    page = tractexp.look(saved(tmp_path / "long.cfg", first, names=names, status=status)).report()
+    script = """setTimeout(() => {
+      const cut = [...document.querySelectorAll("body, div, figure, table, td, pre")].filter(part =>
+        part.clientWidth && part.scrollWidth > part.clientWidth + 1).map(part => part.className);
+      charts.forEach(chart => {
+        const box = chart.getBoundingClientRect();
+        chart.querySelectorAll("text").forEach(text => {
+          const {left, right, width} = text.getBoundingClientRect();
+          if (width && (left < box.left - 1 || right > box.right + 1)) cut.push(text.textContent);
+        });
+      });
+      document.getElementById("told").textContent = JSON.stringify(cut);
+    }, 1000);"""
+    dom, complaints = drawn(Worked(page, script), tmp_path, "--window-size=1280,900", "--virtual-time-budget=4000")
+    assert complaints == []
+    assert json.loads(re.findall(r"<p id=.told.>(.*?)</p>", dom)[0]) == []
+
+
 def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
     length, rate = 10, 4000.0
     t = np.arange(length * 4000) / rate
@@ -224,6 +344,9 @@ def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     assert done.returncode == 0, done.stderr
     for part in ("North", "3200 Hz", "UA", "Q2", "dip", "fit it?", "yes: ", "to fit it:", "data=comtrade", "look.html"):
         assert part in done.stdout, part
+    every = run_command("look", str(station), "--all", "--folder", "all", cwd=tmp_path).stdout
+    for part in ("primary RMS", "fit for what", "Q1 IA", "their names differ in the phase alone", "jump [°]"):
+        assert (part in every, part in done.stdout) == (True, False), part
     (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
     assert str(page.relative_to(tmp_path)) in done.stdout
     named = run_command(

@@ -104,3 +104,22 @@ def test_a_load_of_steady_power_has_no_event_of_its_own(tmp_path):
     shown = tractexp.look(saved(tmp_path / "quiet.cfg", constant(0.0, length=3.0)))
     assert len(shown.events) == 0
     assert "nothing happened" in str(shown)
+
+
+def test_all_loads_of_a_bus_have_its_voltage_and_its_events(tmp_path):
+    """A dip of most of the record; the second load doubles before it, the third feeder has no load."""
+    values = constant(start=0.6, end=1.7, length=2.0)
+    double = course(values, (0.3, 2.0))[3:]
+    noise = 1e-6 * np.random.default_rng(0).standard_normal((3, values.shape[1]))
+    names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in (1, 2, 3) for p in "ABC")]
+    shown = tractexp.look(saved(tmp_path / "bus.cfg", np.concatenate([values, double, noise]), names=names))
+    first, second, third = shown.feeders
+    assert first["U"] == second["U"] == third["U"] == pytest.approx(110.0, rel=1e-3)
+    dips = [e for e in shown.events if e["kind"] == "dip"]
+    assert len(dips) == 2
+    assert len({(e["start"], e["end"], e["depth"], e["jump"], e["U2"], e["dip"]) for e in dips}) == 1
+    (bus,) = (line for line in str(shown).splitlines() if "bus 1" in line)
+    assert "110 kV; dip 1 at 0.5" in bus
+    assert "load step" not in bus
+    (row,) = (line for line in str(shown).splitlines() if line.strip().startswith("Q2"))
+    assert "load step at 0.3" in row

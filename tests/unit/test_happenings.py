@@ -112,6 +112,24 @@ def test_a_ramp_takes_its_time(change):
     assert not any(event.worth for event in events)
 
 
+def test_ramps_that_follow_each_other_are_one():
+    """Three of 5 % each, 3 s apart: one, from the first to where the last is nearly over, as deep as it is then."""
+    t = grid(16.0)
+    V = KV * (1 - sum(0.05 * np.clip((t - start) / 1.5, 0, 1) for start in (2, 6.5, 11)))
+    [ramp] = seen(t, phases(V), load(V))
+    assert (ramp.kind, ramp.worth) == ("ramp", False)
+    assert (ramp.start, ramp.end) == (pytest.approx(2.0, abs=1.0), pytest.approx(12.0, abs=0.7))
+    assert ramp.depth == pytest.approx(1 - V[round(ramp.end * 3200)] / KV, abs=0.005)
+    assert ramp.depth > 0.12
+
+
+def test_ramps_on_either_side_of_a_dip_stay_two():
+    t = grid(14.0)
+    V = KV * (1 - sum(0.1 * np.clip((t - start) / 1.5, 0, 1) for start in (1, 10)))
+    V = V * np.where((t >= 7.0) & (t < 7.2), 0.6, 1.0)
+    assert [event.kind for event in seen(t, phases(V), load(V))] == ["ramp", "dip", "ramp"]
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_an_interruption_returns_and_a_dead_line_does_not(seed):
     t = grid(3.0)

@@ -144,9 +144,16 @@ class Look(Written):
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
-        from tractexp.report import look
+        """One screen: which load and dip to fit by which command, then a line for each file, bus and load."""
+        from tractexp.report import look_console
 
-        return look.summary(self.content)
+        return look_console.summary(self.content)
+
+    def everything(self) -> Report:
+        """Notes, channels, why the loads are such, all events and all commands."""
+        from tractexp.report import look_console
+
+        return look_console.everything(self.content)
 
     def report(self) -> Report:
         from tractexp.report import look
@@ -275,7 +282,7 @@ def _channel(view: View, number: int) -> dict[str, Any]:
 
 
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
-    feeder, told = shown.feeder, shown.powers()
+    feeder, told = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
     made: dict[str, Any] = {"name": shown.name}
     if feeder is not None:

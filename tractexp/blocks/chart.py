@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tractexp import quoting
 from tractexp.blocks import style
@@ -34,6 +35,7 @@ GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
 SHOWN = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
+TICK = 28  # letters of a trace's name beside its axis
 HELD = 32767  # the greatest of 16 bits; the least stands for a gap
 DRAW = """
 const charts = [...document.querySelectorAll(".chart")];
@@ -60,6 +62,71 @@ const seen = (samples, from, to) => {
   if (end < last) add(last);
   return {x, y};
 };
+// Where the cursor is: every curve's value, each panel a row, and the phasors.
+const sampleAt = ({raw, start, step, offset, scale}, t) => {
+  const i = Math.round((t - start) / step);
+  return i < 0 || i >= raw.length || raw[i] === -32768 ? null : offset + scale * raw[i];
+};
+const valueAt = (trace, t) => {
+  if (trace.samples) return sampleAt(trace.samples, t);
+  const {at, states} = trace.course || {at: [], states: []};
+  let last = -1;
+  at.forEach((time, i) => { if (time <= t) last = i; });
+  return last < 0 || t > at[at.length - 1] ? null : states[last];
+};
+const digits = (value, n) => value === 0 ? "0" : Number(value.toPrecision(n)).toString();
+const arrows = phasors => {
+  const most = {};
+  phasors.forEach(p => { most[p.panel] = Math.max(most[p.panel] || 1e-300, p.size); });
+  const lines = phasors.map(p => {
+    const reach = (p.panel === phasors[0].panel ? 78 : 52) * p.size / most[p.panel];
+    const x = (reach * Math.cos(p.angle)).toFixed(1), y = (-reach * Math.sin(p.angle)).toFixed(1);
+    const thick = p.panel === phasors[0].panel ? 2 : 4;
+    return `<line x2="${x}" y2="${y}" stroke="${p.color}" stroke-width="${thick}"/>` +
+      `<circle cx="${x}" cy="${y}" r="3.5" fill="${p.color}"/>`;
+  });
+  return `<svg viewBox="-90 -90 180 180" width="180" height="180"><circle r="78" fill="none" stroke="#dcdcdc"/>` +
+    `<path d="M-84 0H84M0 -84V84" stroke="#dcdcdc"/>${lines.join("")}</svg>`;
+};
+const rows = (chart, t) => {
+  const made = new Map();
+  chart.data.filter(trace => trace.panel && !trace.phasor).forEach(trace => {
+    const value = valueAt(trace, t), cells = made.get(trace.panel) || made.set(trace.panel, []).get(trace.panel);
+    if (value === null || (trace.course && !value)) return;
+    cells.push([trace.label, trace.course ? "" : digits(value, 5), trace.line.color]);
+  });
+  return [...made];  // rows stay, so that nothing moves under the cursor
+};
+const phasors = (chart, t) => {
+  const turning = chart.data.filter(trace => trace.phasor && sampleAt(trace.phasor.re, t) !== null).map(trace => {
+    const re = sampleAt(trace.phasor.re, t), im = sampleAt(trace.phasor.im, t);
+    const {panel, name, line: {color}} = trace;
+    return {panel, name, color, size: Math.hypot(re, im), angle: Math.atan2(im, re)};
+  });
+  return turning.map(p => ({...p, angle: Math.atan2(
+    Math.sin(p.angle - turning[0].angle), Math.cos(p.angle - turning[0].angle))}));
+};
+const readOut = (chart, t) => {
+  const box = chart.previousElementSibling, table = document.createElement("table"), turning = phasors(chart, t);
+  const line = (panel, cells) => {
+    const row = table.insertRow();
+    row.insertCell().textContent = panel;
+    const cell = row.insertCell();
+    cells.forEach(([label, value, color]) => {
+      const item = cell.appendChild(document.createElement("span")), mark = document.createElement("i");
+      item.textContent = `${label} ${value}`;
+      mark.style.background = color;
+      item.prepend(mark);
+    });
+  };
+  line("t [s]", [["", t.toFixed(4), "none"]]);
+  rows(chart, t).forEach(([panel, cells]) => line(panel, cells));
+  const polar = p => [p.name, `${digits(p.size, 4)} ∠ ${(p.angle * 180 / Math.PI).toFixed(1)}°`, p.color];
+  [...new Set(chart.data.filter(trace => trace.phasor).map(trace => trace.panel))].forEach(panel =>
+    line(`phasors of ${panel}`, turning.filter(p => p.panel === panel).map(polar)));
+  box.replaceChildren(table);
+  if (turning.length) box.insertAdjacentHTML("beforeend", arrows(turning));
+};
 const zoomed = chart => {
   const picked = chart.data.map((trace, k) => k).filter(k => chart.data[k].samples);
   const [from, to] = chart.layout.xaxis.range.map(Number);
@@ -67,13 +134,17 @@ const zoomed = chart => {
   Plotly.restyle(chart, {x: made.map(m => m.x), y: made.map(m => m.y)}, picked);
 };
 const draw = chart => {
-  const {data, layout} = JSON.parse(chart.nextElementSibling.textContent);
+  const {data, layout, cursor} = JSON.parse(chart.nextElementSibling.textContent);
   const sampled = data.filter(trace => trace.samples);
   const [from, to] = (layout.xaxis.range || [-Infinity, Infinity]).map(Number);
   sampled.forEach(trace => { unpack(trace.samples); Object.assign(trace, seen(trace.samples, from, to)); });
+  data.filter(trace => trace.phasor).forEach(({phasor}) => { unpack(phasor.re); unpack(phasor.im); });
   Plotly.newPlot(chart, data, layout, SETTINGS);
   const told = event => Object.keys(event).some(key => key.startsWith("xaxis"));
   if (sampled.length) chart.on("plotly_relayout", event => told(event) && zoomed(chart));
+  if (cursor === undefined) return;
+  readOut(chart, cursor);
+  chart.on("plotly_hover", event => readOut(chart, Number(event.xvals ? event.xvals[0] : event.points[0].x)));
 };
 const folded = chart => chart.closest("details:not([open])");  // drawn when first opened: many cost seconds
 charts.filter(chart => !folded(chart)).forEach(draw);
@@ -132,6 +203,7 @@ class Chart:
         self._shapes: list[dict[str, Any]] = []
         self._notes: list[dict[str, Any]] = []
         self._told: set[str] = set()
+        self._panels, self._cursor = panels, None
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
         self._x: dict[str, Any] = {"title": {"text": quoting.html(x)}, "anchor": _axis("y", len(panels) - 1)}
         self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
@@ -170,20 +242,42 @@ class Chart:
 
     def samples(
         self, name: str, start: float, step: float, y: np.ndarray, color: str, panel: int = 0, *,
-        width: float = 1.2, dash: str = "solid",
+        width: float = 1.2, dash: str = "solid", label: str = "",
     ) -> "Chart":  # fmt: skip
         """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a gap.
 
-        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn.
+        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn. At the
+        cursor it is named `label`.
         """
-        finite = np.isfinite(y)
-        low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
-        offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
-        held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
-        coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
-        coded |= {"offset": offset, "scale": scale}
         line = {"color": color, "width": width, "dash": dash}
-        return self._add(name, panel, mode="lines", line=line, samples=coded)
+        reading: dict[str, Any] = {"panel": self._panels[panel], "label": label or name}
+        return self._add(name, panel, mode="lines", line=line, samples=_coded(start, step, y), **reading)
+
+    def phasors(
+        self, name: str, start: float, step: float, y: NDArray[np.complex128], color: str, panel: int
+    ) -> "Chart":
+        """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as arrows."""
+        coded = {"re": _coded(start, step, y.real), "im": _coded(start, step, y.imag)}
+        return self._add(name, panel, mode="lines", line={"color": color}, silent=True, x=[None], y=[None],
+                         phasor=coded, panel=self._panels[panel])  # fmt: skip
+
+    def states(self, courses: Sequence[tuple[str, np.ndarray, np.ndarray]], panel: int, color: str) -> "Chart":
+        """States 0 and 1 as (name, times, states), each a trace below the other: the state from each time on."""
+        for row, (name, t, states) in enumerate(courses):
+            course = {"at": t.tolist(), "states": states.tolist()}
+            line = {"color": color, "width": 1.6, "shape": "hv"}
+            self._add(name, panel, mode="lines", line=line, silent=True, x=t.tolist(), y=(0.7 * states - row).tolist(),
+                      course=course, panel=self._panels[panel], label=name)  # fmt: skip
+        self._axes[_key(panel)]["title"] = {"text": ""}  # the traces' names stand there
+        self.ticks(panel, [0.35 - row for row in range(len(courses))], [_short(name) for name, *_ in courses])
+        return self.limits(panel, 0.3 - len(courses), 1.0)
+
+    def cursor(self, x: float) -> "Chart":
+        """Values of all curves beside each other where the cursor is, instead of labels; at first those at `x`."""
+        self._cursor = x
+        self._x |= {"showspikes": True, "spikemode": "across", "spikesnap": "cursor", "spikethickness": 1}
+        self._x |= {"spikecolor": style.FAINT, "spikedash": "solid"}
+        return self
 
     def points(
         self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
@@ -244,8 +338,15 @@ class Chart:
             self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
         return self
 
-    def edge(self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None) -> "Chart":
-        """A vertical line, in one panel or through all."""
+    def edge(
+        self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None, text: str = ""
+    ) -> "Chart":
+        """A vertical line, in one panel or through all, with a `text` below the panel (the first)."""
+        if text:
+            self._notes.append(
+                {"text": quoting.html(text), "xref": "x", "x": x, "xanchor": "left", "y": 0, "yanchor": "top",
+                 "yref": _height(panel or 0)["yref"], "showarrow": False, "font": {"size": 11, "color": color}}
+            )  # fmt: skip
         line = {"color": color, "width": 1, "dash": dash}
         self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
         return self
@@ -303,24 +404,34 @@ class Chart:
             layout["title"] = {"text": quoting.html(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
             if not self._legend:  # just above the panels, below the buttons
                 layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
-        return {"data": self._data, "layout": layout}
+        if self._cursor is None:
+            return {"data": self._data, "layout": layout}
+        data = [{**trace, "hoverinfo": "none", "hovertemplate": None} for trace in self._data]  # read out beside it
+        return {"data": data, "layout": layout, "cursor": self._cursor}
 
     def element(self, label: str) -> str:
         """The chart as an element of a page."""
         data = quoting.script(self.plain())
+        kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
+        above = "" if self._cursor is None else f'<div class="{kind}"></div>'
         return (
-            f'<div class="chart" role="img" aria-label="{quoting.html(label)}" style="height:{self._pixels}px"></div>'
+            f'{above}<div class="chart" role="img" aria-label="{quoting.html(label)}" style="height:{self._pixels}px">'
+            "</div>"
             f'<script type="application/json">{data}</script>'
         )
 
-    def _add(self, name: str, panel: int, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
+    def _add(self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
         shown = bool(name) and name not in self._told and not silent
         if shown:
             self._told.add(name)
         trace = {"type": kind, "name": quoting.html(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
-                 "yaxis": _axis("y", panel), "hovertemplate": HOVER}  # fmt: skip
+                 "yaxis": _axis("y", at), "hovertemplate": HOVER}  # fmt: skip
         self._data.append(trace | more)
         return self
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= TICK else f"{name[: TICK - 1]}…"
 
 
 def _above(names: Sequence[str]) -> dict[str, Any]:
@@ -340,6 +451,16 @@ def _key(panel: int) -> str:
 def _height(panel: int | None) -> dict[str, Any]:
     """All of a panel, or of the chart."""
     return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
+
+
+def _coded(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
+    """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan is a gap."""
+    finite = np.isfinite(y)
+    low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
+    offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
+    held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+    coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
+    return coded | {"offset": offset, "scale": scale}
 
 
 def _packed(values: np.ndarray, kind: str) -> dict[str, str]:

@@ -52,13 +52,20 @@ caption { text-align: left; font-weight: 600; padding: .2rem 0; }
 th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
 th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
 th:first-child, td:first-child, .words, .short { text-align: left; }
-td.words { white-space: normal; min-width: 8rem; } td.words:last-child { min-width: 11rem; }
+td.words { white-space: normal; min-width: 8rem; overflow-wrap: anywhere; } td.words:last-child { min-width: 11rem; }
 figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
 .chart { width: 100%; } .charts { display: grid; gap: .4rem 1rem;
   grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
 .charts figure { margin: .3rem 0; min-width: 0; }
+.readout { position: sticky; top: 0; z-index: 2; display: flex; gap: 1rem; align-items: center;
+  justify-content: space-between; background: #fff; border-bottom: 1px solid var(--line); }
+.arrows { min-height: 11.5rem; }
+.readout td { padding: .1rem .5rem; font-size: .78rem; text-align: left; white-space: normal; vertical-align: top; }
+.readout td:first-child { white-space: nowrap; color: var(--faint); }
+.readout span { margin-right: .9rem; display: inline-block; }
+.readout i { display: inline-block; width: .6rem; height: .6rem; margin-right: .25rem; } .readout svg { flex: none; }
 .equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
 pre { margin: .5rem 0; padding: .5rem .7rem; background: #f6f6f6; font-size: .84rem; white-space: pre-wrap;
   overflow-wrap: anywhere; user-select: all; }

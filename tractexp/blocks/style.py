@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MEASURED = "#9A9A9A"
 ACTIVE, REACTIVE, VOLTAGE = "#D55E00", "#0072B2", "#000000"
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+PHASES = ("#E69F00", "#009E73", "#56B4E9")  # a, b, c: none of them is a model's, nor P's or Q's
 FAINT = "#666666"
 BEHIND = "#CFCFCF"  # what is there to compare with, behind what is shown
 

@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+from tractexp import quoting
 from tractexp.errors import UserError
 from tractexp.progress import console
 
@@ -19,6 +20,7 @@ def look(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="tractexp look", description=DOES)
     parser.add_argument("file", nargs="+", metavar="FILE", help="any file that can be read")
     parser.add_argument("--folder", type=Path, help=f"where the page is written; default: a new one in {FOLDER}")
+    parser.add_argument("--all", action="store_true", help="print channels, reasons, all events and all commands too")
     parser.epilog = "Settings of the reader are given as KEY=VALUE, such as 'voltages=[4,5,6]' or encoding=gbk."
     chosen = parser.parse_args(arguments)
     settings = [s for each in chosen.file if not Path(each).exists() and (s := SETTING.fullmatch(each))]
@@ -30,7 +32,8 @@ def look(arguments: list[str]) -> int:
     from tractexp.blocks.terminal import show
 
     made = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
-    show(made.summary(), console())
+    rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
+    show(made.everything() if chosen.all else made.summary().text(rest), console())
     listed(made.write(chosen.folder or FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
     return 0
 

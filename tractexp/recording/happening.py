@@ -82,7 +82,20 @@ def _happenings(trace: Trace) -> list[Happening]:
     spans += [(_load_kind(c), _beside(trace, c.first + 1, c.stop)) for c in changes if abs(c.ratio - 1) > LISTED]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
-    return [_describe(trace, kind, e, bounds) for kind, e in spans]
+    return [_describe(trace, kind, e, bounds) for kind, e in _merged(spans)]
+
+
+def _merged(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
+    """The same in order of time, with ramps between which nothing else happens as one."""
+    merged: list[tuple[str, Excursion]] = []
+    for kind, e in spans:
+        if kind == "ramp" and merged and merged[-1][0] == "ramp":
+            first = merged.pop()[1]
+            since = (1 + e.worst) * e.reference / first.reference - 1
+            worst = since if e.new_level else max(first.worst, since, key=abs)
+            e = replace(e, start=first.start, worst=worst, reference=first.reference)
+        merged.append((kind, e))
+    return merged
 
 
 def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:

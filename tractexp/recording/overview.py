@@ -112,6 +112,34 @@ class View:
         segment = max(recording.segments, key=lambda s: s.rate)
         return [quality(recording, number, segment) for number in range(len(recording.channels))]
 
+    @functools.cached_property
+    def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
+        """Status channels that change (trips, breakers), first change first: name, times [s], state from each on."""
+        if self.recording is None:
+            return []
+        t = np.concatenate([segment.t for segment in self.recording.segments])
+        courses = []
+        for channel in self.recording.status:
+            states = channel.values()[: len(t)]
+            changes = np.flatnonzero(np.diff(states.astype(np.int8))) + 1
+            if len(changes):
+                at = np.concatenate([[0], changes, [len(states) - 1]])
+                courses.append((channel.name, t[at], states[at].astype(int)))
+        return sorted(courses, key=lambda course: course[1][1])
+
+    def powers(self, shown: Sight) -> tuple[float, float, float] | None:
+        """As `Sight.powers`, with the voltage that all loads of a bus have: that of the first that can be fitted.
+
+        Where none can, it is that of the first with events: only they tell what was before anything happened.
+        """
+        own = shown.powers()
+        if shown.feeder is None or own is None:
+            return own
+        wired = (shown.feeder.voltages, shown.feeder.connection)
+        bus = [s for s in self.sights if s.feeder is not None and (s.feeder.voltages, s.feeder.connection) == wired]
+        telling = next((s for s in bus if s.dips), next((s for s in bus if s.events), bus[0])).powers()
+        return own if telling is None else (telling[0], *own[1:])
+
     @property
     def frequency(self) -> float | None:
         """Measured [Hz] while the voltage of the first load is alive; None where nothing turns."""

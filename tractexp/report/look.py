@@ -8,22 +8,29 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
-from tractexp.blocks.style import ACTIVE, PALETTE, REACTIVE, VOLTAGE
-from tractexp.recording import Recording, Segment
+from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
+from tractexp.blocks.style import PHASES as COLORS
+from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
+from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
 from tractexp.wording import as_sentence, change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
+MOST_OTHERS = 50_000  # samples of channels of no load
+MOST_ARROWS = 30_000  # values of phasors at the cursor that a chart holds
 LINES = 7  # that a load's phasors make
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 DETAILED = 12  # events that have a chart of their own where the whole is thinned
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
 LONGEST = 3.0  # s of an event there
 CYCLES = 10  # of a spectrum
+HEIGHTS = (1.3, 1.3, 1, 1, 1, 1.2, 0.7)  # of the panels of a load
+TRACE, TRACES = 0.19, 24  # height of a status channel beside these; so many have room
+CYCLE = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
 PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
@@ -34,31 +41,9 @@ NO_LOAD = "no load here: what happens to the voltage is listed with the loads of
 CAPTION = (
     "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
     " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
+    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the first"
+    " voltage lies at 0°: voltages thin, currents thick."
 )
-
-
-def summary(content: Mapping[str, Any]) -> Report:
-    """What files hold: channels, loads, events, commands."""
-    page = Report()
-    for entry in content["files"]:
-        rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
-        about = [entry["station"], entry["device"], str(entry["start"] or ""), f"{entry['seconds']:.3f} s at {rates}",
-                 _frequency(entry)]  # fmt: skip
-        page.text(f"{entry['file']}: {'; '.join(filter(None, about))}", *(f"  note: {n}" for n in entry["notes"]))
-        page.add(*[channels(entry)] * bool(entry["channels"]))
-        for feeder in entry["feeders"]:
-            numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
-            wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
-            page.text(f"load {feeder['name']}{wired}: {_size(feeder) or 'nothing measured'}")
-            page.items([*feeder["why"], *feeder["said"]])
-            page.add(*[events(feeder)] * bool(feeder["events"])).items([_quiet(feeder)] * (not feeder["events"]))
-            if feeder["command"]:
-                page.text("  to fit it:").code(feeder["command"])
-        if not entry["feeders"]:
-            page.text(
-                "  no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
-            )
-    return page
 
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
@@ -81,6 +66,7 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
             page.heading("Channels").add(channels(entry))
+            _unassigned(page, view)
     return page
 
 
@@ -131,16 +117,16 @@ def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
     segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in entry["segments"]]
     rows = [["path", entry["file"]], ["read by", entry["reader"]], ["station", entry["station"]],
             ["recorder", entry["device"]], ["starts", str(entry["start"] or "")], ["sampled", "; ".join(segments)],
-            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", _frequency(entry)]]  # fmt: skip
+            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", frequency(entry)]]  # fmt: skip
     return [row for row in rows if row[1]]
 
 
-def _frequency(entry: Mapping[str, Any]) -> str:
+def frequency(entry: Mapping[str, Any]) -> str:
     measured = entry["measured_frequency"]
     return f"{entry['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
 
 
-def _size(entry: Mapping[str, Any]) -> str:
+def size(entry: Mapping[str, Any]) -> str:
     """U, P and Q of a load at the beginning; "" where they are not known."""
     if entry["U"] is None:
         return ""
@@ -157,10 +143,10 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
 
 def _summary(entry: Mapping[str, Any]) -> list[str]:
     """A load in one row."""
-    size = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
+    sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
-    return [entry["name"], entry["connection"], channels, *size, str(len(entry["events"])), str(len(worth))]
+    return [entry["name"], entry["connection"], channels, *sizes, str(len(entry["events"])), str(len(worth))]
 
 
 def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], folded: bool) -> None:
@@ -170,7 +156,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
     if entry["events"]:
         page.add(events(entry))
     else:
-        page.text(as_sentence(_quiet(entry)))
+        page.text(as_sentence(quiet(entry)))
     if folded:
         with page.folded(f"Charts of {entry['name']}"):
             _charts(page, view, shown)
@@ -184,11 +170,39 @@ def _charts(page: Report, view: View, shown: Sight) -> None:
         page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
         every, coarse = _every(view)
-        page.chart(_of_waves(view.recording, shown, every, coarse), CAPTION)
+        page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
         with page.folded("Spectrum before anything happened"):
             page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
         if max(every, coarse) > 1:
-            _details(page, view.recording, shown)
+            _details(page, view, shown)
+
+
+def _unassigned(page: Report, view: View) -> None:
+    """The channels of no load, a panel for each unit."""
+    recording = view.recording
+    assert recording is not None
+    taken = {i for s in view.sights if s.feeder for i in (*s.feeder.voltages, *s.feeder.currents)}
+    panels: dict[str, list[Channel]] = {}
+    for number in sorted({*range(len(recording.channels))} - taken):
+        channel = recording.channels[number]
+        quantity = unit_of(channel.unit)[0]
+        unit = {"voltage": "u [kV]", "current": "i [kA]"}.get(quantity, channel.unit or "value")
+        panels.setdefault(unit, []).append(channel)
+    if not panels:
+        return
+    count = sum(map(len, panels.values()))
+    chart, every = (
+        Chart("t [s]", [*panels], pixels=150 + 200 * len(panels)),
+        -(-count * recording.samples // MOST_OTHERS),
+    )
+    for panel, group in enumerate(panels.values()):
+        for k, channel in enumerate(group):
+            for segment in (s for s in recording.segments if s.stop > s.first + 1):
+                y = channel.values(segment.first, segment.stop)
+                y, step = (y, 1) if every == 1 else (envelope(y, every), every)
+                chart.samples(channel.name, segment.start, step / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
+    with page.folded(f"The {_count(count, 'channel')} of no load"):
+        page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
 
 
 def _described(entry: Mapping[str, Any]) -> list[str]:
@@ -198,16 +212,16 @@ def _described(entry: Mapping[str, Any]) -> list[str]:
         named = ", ".join(f"{n} {c}" for n, c in zip(numbers, entry["channels"], strict=True))
         reverse = ", current reversed" * entry["reverse_current"]
         sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
-    if size := _size(entry):
+    if text := size(entry):
         when = "Before the dip" if any(e["worth"] for e in entry["events"]) else "At first"
-        sentences.append(f"{when} {size}.")
+        sentences.append(f"{when} {text}.")
     if entry["sum_V"] is not None:
         current = "" if entry["sum_I"] is None else f", the currents to {entry['sum_I']:.2%}"
         sentences.append(f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}.")
     return sentences
 
 
-def _quiet(entry: Mapping[str, Any]) -> str:
+def quiet(entry: Mapping[str, Any]) -> str:
     """What is said of a load without events."""
     return NOTHING if entry["loaded"] else NO_LOAD
 
@@ -238,7 +252,7 @@ def _of_record(shown: Sight) -> Chart:
     record = shown.record
     assert record is not None
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
-    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": PALETTE[2]}
+    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": FAINT}
     sizes = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
     panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
     units = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
@@ -249,7 +263,8 @@ def _of_record(shown: Sight) -> Chart:
         for name in panels_of[label]:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
-    return _marked(chart, shown)
+    first = float(record.t[0])
+    return _marked(chart, shown).cursor(next((seen.what.start for seen in shown.events), first))
 
 
 def _every(view: View) -> tuple[int, int]:
@@ -262,14 +277,26 @@ def _every(view: View) -> tuple[int, int]:
 
 
 def _of_waves(
-    recording: Recording, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
+    view: View, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
 ) -> Chart:
     """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
+    recording, states = view.recording, view.operations[:TRACES]
+    assert recording is not None
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
     sequences = "|U| [kV]" if single else "U seq. [kV]"
-    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
-    chart = Chart("t [s]", panels, heights=(1.3, 1.3, 1, 1, 1, 1.2, 0.7), pixels=950)
+    panels = [
+        "u [kV]",
+        "i [kA]",
+        "U RMS [kV]",
+        "I RMS [kA]",
+        sequences,
+        "P, Q [MW]",
+        "f [Hz]",
+        *["status"] * bool(states),
+    ]
+    heights = [*HEIGHTS, *[TRACE * len(states)] * bool(states)]
+    chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
     for segment in recording.waveforms():
         _waves(chart, recording, shown, segment, every, span)
     for p in shown.phasors:
@@ -277,9 +304,21 @@ def _of_waves(
         if len(p.t[part]) > 1:
             _phasors(chart, p, part, recording.frequency, 1 if span else coarse)
     chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
-    if span:
-        chart.limits(None, *span)
-    return _marked(chart, shown)
+    if states:
+        chart.states(states, len(panels) - 1, VOLTAGE)
+    first, last = span or (recording.waveforms()[0].start, float(shown.phasors[-1].t[-1]))
+    chart.limits(None, first, last)
+    if recording.trigger is not None and first <= recording.trigger <= last:
+        chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
+    happened = (seen.what.start for seen in shown.events if first <= seen.what.start <= last)
+    return _marked(chart, shown).cursor(next(happened, first) + CYCLE / recording.frequency)
+
+
+def _further(view: View) -> str:
+    """What is said of status channels below a chart."""
+    count = len(view.operations)
+    most = f", the first {TRACES} of {count}" if count > TRACES else ""
+    return f" Status channels that change are below{most}." if count else ""
 
 
 def _waves(
@@ -293,29 +332,46 @@ def _waves(
     if waves.shape[1] < 2:
         return
     K, step = len(waves) // 2, 1 / segment.rate
+    colors, names = _colors(K), _named(recording, shown.feeder, K)
     for k, wave in enumerate(waves):
         y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
-        chart.samples(PHASES[K][k % K], start, dt, y, PALETTE[k % K], panel=k // K, width=1.0)
+        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
     t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
-            name, color = PHASES[K][k % K], PALETTE[k % K]
+            name, color = PHASES[K][k % K], colors[k % K]
             chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
+
+
+def _colors(phases: int) -> tuple[str, ...]:
+    return COLORS if phases > 1 else (VOLTAGE,)
+
+
+def _named(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
+    """What the waves of a load are called at the cursor: by phase, and by channel where they are its channels."""
+    numbers = (*feeder.voltages, *feeder.currents)
+    if len(numbers) != 2 * phases:  # line voltages, or two current transformers, of which phases are made
+        return [*PHASES[phases]] * 2
+    return [f"{PHASES[phases][k % phases]} ({recording.channels[i].name})" for k, i in enumerate(numbers)]
 
 
 def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
     """Symmetrical components, powers and frequency of one segment."""
     t = p.t[part]
     step = float(t[-1] - t[0]) / (len(t) - 1)
+    sparse = max(1, -(-4 * p.V.shape[0] * len(t) // MOST_ARROWS))
+    for panel, phases in enumerate((p.V, p.I)):
+        for name, color, turning in zip(PHASES[len(phases)], _colors(len(phases)), phases, strict=True):
+            chart.phasors(name, float(t[0]), step * sparse, turning[part][::sparse], color, panel)
     lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
     if len(p.V) == 3:
         zero = np.abs(p.V.mean(axis=0))
         lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
-                  ("zero sequence", zero, PALETTE[4], 4)]  # fmt: skip
+                  ("zero sequence", zero, MEASURED, 4)]  # fmt: skip
     else:
         lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
     alive = np.abs(p.f / nominal - 1) < BOUND
-    lines.append(("f", np.where(alive, p.f, np.nan), PALETTE[2], 6))
+    lines.append(("f", np.where(alive, p.f, np.nan), FAINT, 6))
     for name, values, color, panel in lines:
         drawn = values[part] if every == 1 else envelope(values[part], every)
         chart.samples(name, float(t[0]), step * every, drawn, color, panel)
@@ -349,13 +405,13 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     return chart
 
 
-def _details(page: Report, recording: Recording, shown: Sight) -> None:
+def _details(page: Report, view: View, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
     for seen in shown.events[:DETAILED]:
         what = seen.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
         with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
-            page.chart(_of_waves(recording, shown, span=span), "As above, not thinned.")
+            page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
         page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
 

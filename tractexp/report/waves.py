@@ -14,7 +14,6 @@ from tractexp.record import WaveEvent
 from tractexp.report.events import FOUND, WITHIN
 
 PHASES = ("a", "b", "c")
-COLORS = ("#E69F00", "#009E73", "#56B4E9")  # of phases a, b, c: none of them is a model's
 CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
 FASTEST = 1300.0  # Hz: what a spectrum shows
@@ -69,7 +68,7 @@ def wave_chart(
     start, step = float(event.record.t[event.lead]), event.record.step
     panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
     made = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
-    colors = COLORS if event.phases > 1 else (style.VOLTAGE,)
+    colors = style.PHASES if event.phases > 1 else (style.VOLTAGE,)
     for name, u, color in zip(names, event.of_phases(_voltage(event))[:, part], colors, strict=False):
         made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
@@ -160,7 +159,7 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     highest = min(FASTEST, event.rate / 2)
     for panel, (frequencies, amplitudes, _) in enumerate((after, before)):
         shown = frequencies <= highest
-        for name, row, color in zip(names, amplitudes, COLORS, strict=False):
+        for name, row, color in zip(names, amplitudes, style.PHASES, strict=False):
             made.line(name, frequencies[shown], 100 * row[shown], color, panel)
         made.limits(panel, 0.0, 1.08 * 100 * max(float(amplitudes[:, shown].max()), 1e-4))
     for order in HARMONICS:

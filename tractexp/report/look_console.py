@@ -1,0 +1,164 @@
+"""What a terminal shows of a look: the answer, each bus, each load in one line; everything where it is asked for."""
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from tractexp.blocks import Report, Table
+from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size
+from tractexp.wording import counted, figure, joined
+
+NOTES = 3  # of a file that have room
+LISTED = 4  # events of a bus that its line has room for
+UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
+
+
+def summary(content: Entry) -> Report:
+    """One screen: which load and which dip to fit by which command, then a line for each file, bus and load."""
+    page = Report().text(_answer(content["files"]))
+    for entry in content["files"]:
+        held = [counted(len(entry["channels"]), "channel")] * bool(entry["channels"])
+        page.text("; ".join([_about(entry), *held]), *(f"  note: {note}" for note in entry["notes"][:NOTES]))
+        page.text(*[f"  note: {len(entry['notes']) - NOTES} more"] * (len(entry["notes"]) > NOTES))
+        buses = _buses(entry["feeders"])
+        page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
+        if buses:
+            page.add(_loads(entry, buses))
+        unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
+        if unloaded and len(unloaded) < len(entry["feeders"]):
+            page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
+        page.items(list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"])))
+        page.text(*[f"  {UNNAMED}"] * (not buses and len(content["files"]) > 1))
+    return page
+
+
+def everything(content: Entry) -> Report:
+    """What files hold: notes, channels, loads and why they are such, all events, all commands."""
+    page = Report().text(_answer(content["files"]))
+    for entry in content["files"]:
+        page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
+        page.add(*[channels(entry)] * bool(entry["channels"]))
+        for feeder in entry["feeders"]:
+            numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
+            wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
+            page.text(f"load {feeder['name']}{wired}: {size(feeder) or 'nothing measured'}")
+            page.items([*feeder["why"], *feeder["said"]])
+            page.add(*[events(feeder)] * bool(feeder["events"])).items([quiet(feeder)] * (not feeder["events"]))
+            if feeder["command"]:
+                page.text("  to fit it:").code(feeder["command"])
+        page.text(*([f"  {UNNAMED}"] * (not entry["feeders"])))
+    return page
+
+
+def _answer(files: Sequence[Entry]) -> str:
+    """Which load and which dip are worth fitting, and the command; or why nothing is."""
+    feeders = [feeder for entry in files for feeder in entry["feeders"]]
+    promising = [feeder for feeder in feeders if _worth(feeder)]
+    if promising:
+        best = max(promising, key=lambda feeder: _answered(_worth(feeder)[0]))
+        best = next(feeder for feeder in promising if feeder["command"] == best["command"])  # the one fitted by it
+        first = _worth(best)[0]
+        command = f"; to fit it: {best['command']}" if best["command"] else ""
+        return f"{_event(first)} of {best['name']} is worth fitting{_reservation(first['why'])}{command}"
+    happened = [(feeder, event) for feeder in feeders for event in feeder["events"]]
+    if not happened:
+        return f"nothing is worth fitting: {next(map(quiet, feeders), UNNAMED)}"
+    feeder, event = max(happened, key=lambda each: _answered(each[1]))
+    return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
+
+
+def _answered(event: Entry) -> float:
+    """How much of a load answers an event and stays: the depth times the apparent power after it."""
+    powers = (event["P_after"], event["Q_after"])
+    return abs(event["depth"]) * float(np.hypot(*powers)) if None not in powers else 0.0
+
+
+def _worth(feeder: Entry) -> list[Entry]:
+    return [event for event in feeder["events"] if event["worth"]]
+
+
+def _label(event: Entry) -> str:
+    return event["kind"] if event["dip"] is None else f"{event['kind']} {event['dip']}"
+
+
+def _event(event: Entry) -> str:
+    return f"{_label(event)} at {event['start']:.3f} s ({event['depth']:.1%}, {1000 * event['duration']:.0f} ms)"
+
+
+def _reservation(why: str) -> str:
+    """What is to be known of an event that is worth fitting nevertheless: the first clause after its size."""
+    return f", but {_clause(why, '; ')}" if "; " in why else ""
+
+
+def _clause(why: str, after: str) -> str:
+    """What decides, of a sentence such as 'the voltage falls by 30 %, but P is negative before it: ...'."""
+    return re.split(r"[:(]", why.split(after, 1)[-1])[0].strip()
+
+
+def _about(entry: Entry) -> str:
+    rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
+    about = [entry["station"], entry["device"], str(entry["start"] or ""), f"{entry['seconds']:.3f} s at {rates}"]
+    return f"{entry['file']}: {'; '.join(filter(None, [*about, frequency(entry)]))}"
+
+
+def _buses(feeders: Sequence[Entry]) -> list[list[Entry]]:
+    """The loads by the voltages that they have; a load without channels is alone."""
+    buses: dict[Any, list[Entry]] = {}
+    for k, feeder in enumerate(feeders):
+        buses.setdefault(tuple(feeder["voltages"]) or f"load {k}", []).append(feeder)
+    return list(buses.values())
+
+
+def _same(event: Entry) -> tuple[Any, ...]:
+    return event["kind"], event["start"], event["end"]
+
+
+def _common(bus: Sequence[Entry]) -> list[Entry]:
+    """What happened to the voltage: the events that all loads of a bus have."""
+    each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [feeder["events"] for feeder in bus]
+    shared = set.intersection(*({_same(event) for event in events} for events in each))
+    return [event for event in each[0] if _same(event) in shared]
+
+
+def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
+    """The voltages of a bus, their size, and what happened to them, in one line."""
+    names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
+    happened = [_event(event) for event in _common(bus)]
+    more = [f"{len(happened) - LISTED} more"] * (len(happened) > LISTED)
+    told = joined([*happened[:LISTED], *more]) or (NOTHING if any(feeder["loaded"] for feeder in bus) else "")
+    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), told])
+    return f"bus {number}: {'; '.join(parts)}"
+
+
+def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
+    """A load in each row: those without load are left out where there are others."""
+    loaded = any(feeder["loaded"] for feeder in entry["feeders"])
+    rows = [
+        [feeder["name"], number, ", ".join(map(str, feeder["currents"])), *(figure(feeder[key]) for key in "PQ"),
+         _own(feeder, _common(bus)), _fit(feeder)]
+        for number, bus in enumerate(buses, 1) for feeder in bus if feeder["loaded"] or not loaded
+    ]  # fmt: skip
+    P, Q = entry["feeders"][0]["units"][1:]
+    columns = ["load", "bus", "currents", f"P [{P}]", f"Q [{Q}]", "beside", "fit it?"]
+    empty = {k for k in range(len(columns)) if not any(row[k] for row in rows)}
+    return Table(columns, rows, words=(2, 5, 6), detail=empty)
+
+
+def _own(feeder: Entry, common: Sequence[Entry]) -> str:
+    """What happened to a load and not to its bus."""
+    shared = {_same(event) for event in common}
+    own = (event for event in feeder["events"] if _same(event) not in shared)
+    return ", ".join(f"{_label(event)} at {event['start']:.3f} s" for event in own)
+
+
+def _fit(feeder: Entry) -> str:
+    """Which of a load's dips are worth fitting, with what is to be known of the first; else what decides against it."""
+    if worth := _worth(feeder):
+        return f"yes: {', '.join(map(_label, worth))}{_reservation(worth[0]['why'])}"
+    if feeder["events"]:
+        event = max(feeder["events"], key=_answered)
+        return f"no: {_clause(event['why'], ', but ') if event['kind'] == 'dip' else event['kind']}"
+    return f"no: {_clause(quiet(feeder), ', but ')}" if feeder["U"] is not None else "no: see below"
