@@ -2,7 +2,7 @@
 
 ANDES simulates a dip; our model is driven by ANDES's terminal voltage (magnitude, and speed of its angle) and must
 draw ANDES's P and Q. ANDES is found in this interpreter or in the one named by TRACTEXP_ANDES_PYTHON. Its first run on
-a machine generates code for about 30 s.
+a machine generates code for about 30 s into a folder of the user's, so that one runs at a time.
 """
 
 import argparse
@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tractexp import files
 from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 from tractexp.model.drive import Drive, Excitation
@@ -42,6 +43,7 @@ STATICS = {
 }  # fmt: skip
 FREQUENCY = 50.0
 OMEGA = 2 * np.pi * FREQUENCY
+GENERATED = Path.home() / ".andes"  # the folder of that code
 
 
 def interpreter() -> str | None:
@@ -68,7 +70,9 @@ def andes(tables: dict, voltage: np.ndarray, step: float) -> dict[str, np.ndarra
         load.write_text(json.dumps(tables))
         played.write_text(json.dumps({"step": step, "frequency": FREQUENCY, "voltage": voltage.tolist()}))
         program = Path(__file__).with_name("andes_run.py")
-        done = subprocess.run([python, program, load, played, target], capture_output=True, text=True)
+        GENERATED.mkdir(exist_ok=True)
+        with files.held(GENERATED / "tractexp.lock", 300):
+            done = subprocess.run([python, program, load, played, target], capture_output=True, text=True)
         if done.returncode:
             raise RuntimeError(f"ANDES: {done.stderr[-2000:]}{done.stdout[-2000:]}")
         with np.load(target) as content:

@@ -3,7 +3,6 @@
 import functools
 import itertools
 
-import motulator_check
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -309,14 +308,3 @@ def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
     assert gaps[0] > 5e-3
     assert gaps[1] < 0.4 * gaps[0]
     assert gaps[2] < 0.4 * gaps[1]
-
-
-def test_our_motor_draws_what_motulators_machine_draws():
-    """Against a machine that nobody here wrote, where a Python that has it is named (benchmarks/motulator_check.py)."""
-    if motulator_check.interpreter() is None:
-        pytest.skip(
-            "motulator is not installed; install the extra 'crosscheck' or name a Python in TRACTEXP_MOTULATOR_PYTHON"
-        )
-    found = motulator_check.check()
-    assert found["largest"] > 3.0
-    assert found["difference"] < 1e-4

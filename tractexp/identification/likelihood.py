@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.identification.descent import SeparableColumns
+from tractexp.identification.descent import SeparableColumns, central_differences
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
 
 POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
-CENTRAL = 1e-5  # of a parameter's range: truncation and rounding both stay below 1e-7 of a column
 
 
 def before_the_event(event: Event) -> Pair:
@@ -126,20 +125,9 @@ class Likelihood:
         return self.whiten(self.residuals(unit))
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened rows (R,) and their central differences (R, D) at one point (D,): one batch of 2 D + 1.
-
-        Next to a wall, or where one side cannot be simulated, the difference is one-sided.
-        """
-        d = len(unit)
-        up = np.minimum(unit + CENTRAL, 1.0) - unit
-        down = unit - np.maximum(unit - CENTRAL, 0.0)
-        batch = np.concatenate((unit[None], unit + np.diag(up), unit - np.diag(down)))
-        rows = self.rows(batch)
-        above, below = rows[1 : d + 1], rows[d + 1 :]
-        lost_up, lost_down = np.isnan(above).any(axis=1), np.isnan(below).any(axis=1)
-        above[lost_up], below[lost_down] = rows[0], rows[0]
-        span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
-        return rows[0], ((above - below) / np.where(span > 0, span, 1.0)[:, None]).T
+        """Whitened rows (R,) and their central differences (R, D) at one point (D,) of the unit cube."""
+        rows, J = central_differences(self.rows, unit[None], np.zeros(1, dtype=int))
+        return rows[0], J[0].T
 
     @property
     def apart(self) -> list[SeparableColumns]:
