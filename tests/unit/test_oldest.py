@@ -1,0 +1,28 @@
+"""CI's oldest versions are the lower bounds that the project declares."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+def release(version: str) -> list[int]:
+    """The numbers of a version, without zeros at its end: 2.0 is 2.0.0."""
+    numbers = list(map(int, version.split(".")))
+    while numbers and not numbers[-1]:
+        numbers.pop()
+    return numbers
+
+
+def test_what_is_installed_is_each_lower_bound():
+    if not (ROOT / ".ci").is_dir():
+        pytest.skip("no checkout: .ci is not in the package")
+    lines = (ROOT / ".ci" / "oldest.txt").read_text(encoding="utf-8").splitlines()
+    pins = {name.lower(): version for name, _, version in (line.partition("==") for line in lines) if version}
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    bounds = dict(re.findall(r"^([\w-]+)>=([\d.]+)", "\n".join(declared), re.MULTILINE))
+    assert len(bounds) == len(declared)
+    assert {name: release(pins[name]) for name in bounds} == {name: release(bound) for name, bound in bounds.items()}
