@@ -35,6 +35,7 @@ from tractexp import files  # noqa: E402
 STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
 SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2")
+WRITTEN, RESULT = 8, 4  # files of a search; which of them is the result, after the three of its configuration
 WORKERS, MACHINES, DISKS = 5, 5, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
@@ -207,7 +208,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
 
         return act
 
-    for n in range(1, 6):
+    for n in range(1, 1 + WRITTEN):
         folder = fresh(f"killed{n}")
         code, said = forked(failing(n, killed, folder))
         kept = sorted(p.name for p in (folder / "run").iterdir() if not p.name.startswith("."))
@@ -215,20 +216,21 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
         had = same(folder, found) if "result.json" in kept else ""
         again, more = forked(job(folder))
         yield told(
-            f"kill -9 of a search at its file {n} of 5",
+            f"kill -9 of a search at its file {n} of {WRITTEN}",
             f"left whole: {', '.join(kept) or 'nothing'}; repeated, the same result",
             wrong, had, same(folder, found), trace(more), "" if code < 0 and again == 0 else f"EXIT {code}, {again}",
         )  # fmt: skip
-    for n in range(1, 6):
+    for n in range(1, 1 + WRITTEN):
         folder = fresh(f"full{n}")
         code, said = forked(failing(n, full, folder))
         kept = sorted(p.name for p in (folder / "run").glob("*")) if (folder / "run").is_dir() else []
-        lost = "" if n == 1 or "result.json" in kept else "THE RESULT IS LOST"
+        lost = "" if n <= RESULT or "result.json" in kept else "THE RESULT IS LOST"
         sentence = next((s for s in said.splitlines() if "No space left" in s), "").strip()
-        expected = 2 if n <= 2 else 0  # the result, the history; what is drawn from them is no reason to fail
+        expected = 2 if n <= RESULT + 1 else 0  # the history; what is drawn is no reason to fail
         again, more = forked(job(folder))
         yield told(
-            f"disk full from file {n} of 5 on", f"exit {code}, {len(kept)} files kept, '{shorter(sentence, folder)}'",
+            f"disk full from file {n} of {WRITTEN} on",
+            f"exit {code}, {len(kept)} files kept, '{shorter(sentence, folder)}'",
             halves(folder), lost, trace(said), "" if code == expected else f"NOT EXIT {expected}",
             "" if sentence else "NO SENTENCE", same(folder, found), "" if again == 0 else f"THEN EXIT {again}: {more}",
         )  # fmt: skip

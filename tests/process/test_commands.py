@@ -176,7 +176,7 @@ def test_scripts_and_their_options_are_there():
     for c in ALL:
         for before, word in pairwise(["", *c.words]):
             if before.endswith("python") and word.endswith(".py") and c.page.name not in TUTORIALS:
-                path = ROOT / word if word.startswith("benchmarks") else ROOT / "benchmarks" / word
+                path = ROOT / word if word.startswith(("benchmarks", "tests")) else ROOT / "benchmarks" / word
                 script = (path if path.is_file() else ROOT / "tests" / word).read_text(encoding="utf-8")
                 for option in (w for w in c.words if w.startswith("--")):
                     assert f'"{option}"' in script, c.line

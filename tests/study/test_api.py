@@ -21,10 +21,10 @@ QUICK = {"name": "multistart_least_squares", "starts": 2}
 
 
 def same(one, other):
-    """Whether two identifications are the same in all but the time they took."""
+    """Whether two identifications are the same in all but the time they took, and the commands that they advise."""
 
     def timeless(result):
-        return dataclasses.replace(result, seconds=0.0, search=result.search | {"seconds": 0.0})
+        return dataclasses.replace(result, seconds=0.0, search=result.search | {"seconds": 0.0}, advice=[])
 
     return timeless(one.result) == timeless(other.result)
 

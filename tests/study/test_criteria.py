@@ -183,7 +183,7 @@ def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
 
 def test_loose_criteria_name_what_is_not_there():
     """A step of the load is in no catalogue: by default that is said, by loose criteria something is named for it."""
-    made = events("load_step", size=3.0, count=3)[:2]
+    made = events("load_step", size=2.0, count=3)[:2]
     assert investigate(base(), made, only=FEW).verdict.word == "unexplained"
     loose = Criteria(adequate_p=0.0, second_name_p=0.5, third_name_p=0.5)
     assert investigate(base(), made, only=FEW, criteria=loose).names != ()

@@ -448,7 +448,7 @@ def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, aske
 
 
 def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_written(tmp_path):
-    found = investigate(base(), events("load_step", size=3.0, count=3)[:2], (), {}, {}, only=FEW)
+    found = investigate(base(), events("load_step", size=2.0, count=3)[:2], (), {}, {}, only=FEW)
     assert found.verdict.word == "unexplained"
     assert found.names == ()
     assert found.verdict.nearest is not None

@@ -35,7 +35,7 @@ def silent():
 
 @pytest.fixture(scope="module")
 def unexplained():
-    made = events("load_step", size=3.0, count=3)
+    made = events("load_step", size=2.0, count=3)
     return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
 
 

@@ -162,12 +162,14 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     assert [r.rejected for r in left.rivals] == [False, False, True]
 
 
-def test_a_saturation_with_a_knee_that_a_compensator_explains_as_well_is_tied_with_it():
-    """The compensator leaves nothing and fits a little better; a saturation by another law leaves nothing, either."""
+def test_a_saturation_with_a_knee_that_a_compensator_explains_as_well_is_told_by_all_events():
+    """The compensator leaves nothing and fits a little better; a saturation by another law leaves nothing, either, and
+    is the only one that is not far behind in a fit to all events."""
     made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD)  # four times its detection limit
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("static_var_compensator", *CORE))
     assert told.explanations.chosen.names == ("static_var_compensator",)
-    assert set(told.verdict.sets) == {("static_var_compensator",), ("saturation_curve",)}
+    assert told.verdict.sets == (("saturation_curve",),)
+    assert told.held_out.assessments["static_var_compensator",].behind
 
 
 def test_a_place_that_the_textbooks_trip_imitates_is_named_where_the_held_out_dip_denies_that():
@@ -277,25 +279,16 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     assert len(turns) == 1 + fitting.MOST_TURNS
 
 
-def test_a_second_stage_that_the_fitted_dips_do_not_show_is_found_in_all_events(monkeypatch):
-    """Among the members of every family: the fitted dips may have named another one's textbook effect."""
-    tried: list[str] = []
-
-    def noted(at, member, refits):
-        tried.extend([member.name] * (at.drive.events == 4))
-        return starts(at, member, refits)
-
-    monkeypatch.setattr(families, "starts", noted)
+def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_dips():
+    """How much the second opens is what the fitted dips show of it, hardly anything."""
     made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
-    assert {"two_stage_trip", "saturation_curve"} <= set(tried)
     assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
     assert not told.held_out.assessments["undervoltage_trip",].helps
     assert told.names == ("two_stage_trip",)
-    assert told.fitted_to_both
     at = told.context.coordinates
-    shares = [at.value(f"stage_{k}_tripped", told.extended.unit) for k in (1, 2)]
-    assert shares == pytest.approx([0.075, 0.075], rel=0.05)
+    assert at.value("stage_1_tripped", told.extended.unit) == pytest.approx(0.075, rel=0.05)
+    assert 0 < at.value("stage_2_tripped", told.extended.unit) < 0.075
 
 
 def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events():

@@ -25,7 +25,7 @@ def some(tmp_path_factory):
     """The first faults of a search and of its logging, at other moments than those that are stored."""
     faults.ready()
     made = {}
-    for part, count in (("jobs", 7), ("logging", 3)):
+    for part, count in (("jobs", 10), ("logging", 3)):
         injected = faults.PARTS[part](tmp_path_factory.mktemp(part), random.Random(7))
         made[part] = [fault for fault, _ in zip(injected, range(count), strict=False)]
     return made
@@ -33,7 +33,7 @@ def some(tmp_path_factory):
 
 def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
     assert {part: [f for f in found if f["lost"]] for part, found in some.items()} == {"jobs": [], "logging": []}
-    assert [len(found) for found in some.values()] == [7, 3]
+    assert [len(found) for found in some.values()] == [10, 3]
 
 
 def test_a_loss_would_be_seen(tmp_path):
