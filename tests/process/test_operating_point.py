@@ -77,3 +77,10 @@ def test_a_parameter_that_a_bound_holds_is_exported_when_asked_for_only():
 
 def test_a_load_without_a_motor_has_no_such_point():
     assert OperatingPoint.of(identified(motor="none").result) is None
+
+
+def test_a_load_without_active_power_has_no_share_of_it():
+    point = OperatingPoint(0.0, 0.6, 0.1, 0.57, 0.6, None, None, ("pu", "pu"))
+    assert "of P" not in str(point)
+    assert "nan" not in str(point)
+    assert point.doubt == ""

@@ -59,17 +59,20 @@ class OperatingPoint:
 
     @property
     def share(self) -> float:
-        """The motor's part of the active power."""
-        return self.P_motor / self.P if self.P else float("nan")
+        """The motor's part of the active power; of use where that is drawn."""
+        return self.P_motor / self.P if self.P else float("inf")
 
     def __str__(self) -> str:
         p, q = self.units
         machine = [f"slip {100 * self.slip:.2g} %"]
-        machine += [f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}"] * (self.H is not None)
-        machine += [f"starting current {self.starting:.2g} times that before the dip"] if self.starting else []
+        if self.H is not None:
+            machine.append(f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}")
+        if self.starting is not None:
+            machine.append(f"starting current {self.starting:.2g} times that before the dip")
+        share = f", {self.share:.0%} of P" if self.P > 0 else ""
         return (
-            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}, {self.share:.0%} of P; static "
-            f"load {self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q}; {', '.join(machine)}"
+            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}{share}; static load "
+            f"{self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q}; {', '.join(machine)}"
         )
 
     @property
