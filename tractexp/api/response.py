@@ -43,7 +43,7 @@ class Response:
     def row(self) -> list[str]:
         """Title, lowest U, lowest and highest P and Q, and both errors, as a table shows them."""
         errors = [*map(epsilon, self.epsilon)] if self.epsilon else ["", ""]
-        errors += [] if self.epsilon_i is None else [f"{epsilon(self.epsilon_i)}"]
+        errors += [] if self.epsilon_i is None else [epsilon(self.epsilon_i)]
         ends = self.U.min(), self.P.min(), self.P.max(), self.Q.min(), self.Q.max()
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
