@@ -60,6 +60,12 @@ def there(path: Path | str) -> bool:
     return kind == stat.S_IFREG
 
 
+def check_there(path: Path) -> None:
+    """Raise `UserError` where there is no ordinary file."""
+    if not there(path):
+        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+
+
 def read(path: Path | str, limit: int | None = None) -> bytes:
     """The content of an ordinary file, or its first bytes to a limit.
 

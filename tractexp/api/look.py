@@ -21,6 +21,7 @@ from tractexp.record.wave_event import COARSEST, smeared
 from tractexp.recording.feeder import unrecognised
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
+from tractexp.wording import counted
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -140,7 +141,7 @@ class Look(Written):
             [f"{f['file']} {feeder['name']}" if several else feeder["name"], *event_row(event)]
             for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
         ]  # fmt: skip
-        title = f"{len(rows)} event{'s' * (len(rows) != 1)} in {', '.join(f['file'] for f in self.content['files'])}"
+        title = f"{counted(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
@@ -168,9 +169,6 @@ class Look(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         sources = [s if isinstance(s, str) else record_again(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
-
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "look.json", self.content)]
 
 
 @public

@@ -85,9 +85,6 @@ class Forecasts(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "plan.json", self.content)]
-
 
 @public
 def plan(

@@ -142,8 +142,7 @@ class _Opened:
 
 def _opened(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
     text, encoding = decode(files.read(path), str(path), encoding)

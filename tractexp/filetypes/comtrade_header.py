@@ -12,6 +12,7 @@ from math import isfinite
 from tractexp.errors import UserError
 from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import unit_of
+from tractexp.wording import counted
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
@@ -183,8 +184,8 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
     if len(fields) not in (10, 13) and not short:
         raise rows.refuse(
-            line, f"{channel} has {_fields(fields)}, but an analog channel has 13, or 10 by the standard of 1991; "
-            "correct the line, or the numbers of channels in line 2",
+            line, f"{channel} has {counted(len(fields), 'field')}, but an analog channel has 13, or 10 by the standard "
+            "of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
 
     def value(i: int, what: str, default: float | None) -> float:
@@ -216,10 +217,6 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     return _checked_ratio(rows, line, channel, analog)
 
 
-def _fields(fields: list[str]) -> str:
-    return f"{len(fields)} field{'s' * (len(fields) != 1)}"
-
-
 def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Analog:
     """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
     if analog.side != "S" or (analog.primary > 0 and analog.secondary > 0):
@@ -247,8 +244,8 @@ def _digital(rows: _Lines, k: int, count: int) -> Digital:
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
         name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
         raise rows.refuse(
-            line, f"status channel {k + 1} of {count} {name} has {_fields(fields)}, but a status channel has 5, or "
-            "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
+            line, f"status channel {k + 1} of {count} {name} has {counted(len(fields), 'field')}, but a status channel "
+            "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
     if len(fields) == 5:
         name, phase, circuit = fields[1:4]

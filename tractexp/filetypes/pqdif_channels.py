@@ -116,8 +116,7 @@ def observed(
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     reading = _Reading(kinds, remarks)
     for kind, body in records(path, encoding, remarks):
         if kind == SOURCE:

@@ -62,8 +62,7 @@ class Results(TableFile):
 
 def table(path: Path, form: TableForm) -> Results:
     """The results that a `.out` file is part of; raises `UserError` where no `.inf` file names its channels."""
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     number = _NUMBERED.fullmatch(path.stem)
     case = number[1] if number else path.stem
     beside = sorted(path.parent.iterdir())

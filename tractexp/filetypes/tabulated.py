@@ -317,7 +317,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
         )
     t = mapping.columns["t"]
     named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
-    numbers = {k: "number" for k in named if _numeric(table, k)}
+    numbers = {k: "number" for k in named if all(_numbers_of(table, k))}
     others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, t.number)]
     _refuse_other_rates(table, others)
     cells = table.read({t.number: "time", **numbers})
@@ -334,11 +334,6 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
     start, notes = cells[t.number].start, [*table.notes, *note, *odd]
     return in_units(Recording(table.source, channels, segments, nominal, start=start, notes=notes), {}, {})
-
-
-def _numeric(table: TableFile, number: int) -> bool:
-    """Whether a column begins with numbers, and not with words."""
-    return all(_numbers_of(table, number))
 
 
 def _numbers_of(table: TableFile, number: int) -> list[bool]:

@@ -9,6 +9,7 @@ import numpy as np
 
 from tractexp.errors import UserError, among
 from tractexp.kinds import check_kind
+from tractexp.wording import counted
 
 
 def check_fields(cls: type[Any], content: Any, where: str) -> None:
@@ -91,7 +92,7 @@ def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
         if values.shape != t.shape:
             raise UserError(f"{name} has {len(values)} samples where t has {len(t)}; give as many")
     if len(t) < 2:
-        raise UserError(f"t has {len(t)} sample{'s' * (len(t) != 1)}; a prediction needs at least two")
+        raise UserError(f"t has {counted(len(t), 'sample')}; a prediction needs at least two")
     steps = np.diff(t)
     usual = float(np.median(steps))
     if not (usual > 0 and (np.abs(steps - usual) < usual / 2).all()):

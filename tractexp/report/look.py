@@ -16,7 +16,7 @@ from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.wording import as_sentence, change, degrees, figure, share
+from tractexp.wording import as_sentence, change, counted, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
@@ -96,7 +96,7 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     loads = sum(len(f["feeders"]) for f in files)
     events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
     worth = sum(e["worth"] for e in events)
-    return f"{_count(loads, 'load')}, {_count(len(events), 'event')}, {worth} worth fitting."
+    return f"{counted(loads, 'load')}, {counted(len(events), 'event')}, {worth} worth fitting."
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
@@ -201,7 +201,7 @@ def _unassigned(page: Report, view: View) -> None:
                 y = channel.values(segment.first, segment.stop)
                 y, step = (y, 1) if every == 1 else (envelope(y, every), every)
                 chart.samples(channel.name, segment.start, step / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
-    with page.folded(f"The {_count(count, 'channel')} of no load"):
+    with page.folded(f"The {counted(count, 'channel')} of no load"):
         page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
 
 
@@ -414,7 +414,3 @@ def _details(page: Report, view: View, shown: Sight) -> None:
             page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
         page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"

@@ -9,6 +9,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.studies.bbob.runs import BbobRuns
 from tractexp.studies.comparison.charts import runtime_curves
+from tractexp.wording import counted
 
 
 def scale(benchmark: BbobRuns) -> str:
@@ -16,8 +17,8 @@ def scale(benchmark: BbobRuns) -> str:
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
-        f"{functions} BBOB function{'s' * (functions > 1)} in dimension {dimensions},"
-        f" {len(plan.instances)} instance{'s' * (len(plan.instances) > 1)} each,"
+        f"{counted(functions, 'BBOB function')} in dimension {dimensions},"
+        f" {counted(len(plan.instances), 'instance')} each,"
         f" {plan.multiplier:,} evaluations per dimension and run"
     )
 
