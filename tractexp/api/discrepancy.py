@@ -168,11 +168,11 @@ class Investigation(Written):
         return self._sizes(near["effects"], near["parameters"]) if near else []
 
     @staticmethod
-    def _sizes(effects: Sequence[str], known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
         from tractexp.plugin import get
 
         own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
-        return [_size(p.name, known[p.name], p.unit) for p in own]
+        return [_size(p.name, parameters[p.name], p.unit) for p in own]
 
     @property
     def sets(self) -> list[Mapping[str, Any]]:

@@ -183,15 +183,15 @@ def chosen_events(setup: Setup, values: Any, most: int) -> "list[ChosenEvent]":
     if setup.problem_of(setup.train[:1]).per_event:
         raise UserError("events are chosen for shared parameters; leave model.per_event empty")
     at, *_ = _guess(setup, max(setup.train, key=lambda e: e.depth), values)
-    told, refused = {}, ""
+    informations, refused = {}, ""
     for event in setup.train:
         try:
-            told[event.record.name] = alone(setup.problem_of([event]), at)
+            informations[event.record.name] = alone(setup.problem_of([event]), at)
         except UserError as error:
             refused = str(error)
-    if not told:
+    if not informations:
         raise UserError(refused)
-    return best_of([*told.values()], [*told], 0.0, most)
+    return best_of([*informations.values()], [*informations], 0.0, most)
 
 
 def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "DipShape":

@@ -202,7 +202,7 @@ class Chart:
         self._data: list[dict[str, Any]] = []
         self._shapes: list[dict[str, Any]] = []
         self._notes: list[dict[str, Any]] = []
-        self._told: set[str] = set()
+        self._in_legend: set[str] = set()
         self._panels, self._cursor = panels, None
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
         self._x: dict[str, Any] = {"title": {"text": quoting.html(x)}, "anchor": _axis("y", len(panels) - 1)}
@@ -333,7 +333,7 @@ class Chart:
                 {"text": quoting.html(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
                  "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
             )  # fmt: skip
-        if name and name not in self._told:
+        if name and name not in self._in_legend:
             square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
             self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
         return self
@@ -421,9 +421,9 @@ class Chart:
         )
 
     def _add(self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
-        shown = bool(name) and name not in self._told and not silent
+        shown = bool(name) and name not in self._in_legend and not silent
         if shown:
-            self._told.add(name)
+            self._in_legend.add(name)
         trace = {"type": kind, "name": quoting.html(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
                  "yaxis": _axis("y", at), "hovertemplate": HOVER}  # fmt: skip
         self._data.append(trace | more)

@@ -17,11 +17,11 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
     unlike = f"{where} is not a result.json of an identification"
     if not isinstance(content, Mapping):
         raise UserError(f"{unlike}: it holds no mapping of names to values")
-    known = {f.name: f for f in dataclasses.fields(cls)}
+    own = {f.name: f for f in dataclasses.fields(cls)}
     for name in content:
-        if name not in known:
-            raise UserError(f"{unlike}: it has an unknown key '{name}'{among(name, known, 'Keys')}")
-    for name, f in known.items():
+        if name not in own:
+            raise UserError(f"{unlike}: it has an unknown key '{name}'{among(name, own, 'Keys')}")
+    for name, f in own.items():
         if name not in content and f.default is f.default_factory is dataclasses.MISSING:
             raise UserError(f"{unlike}: it lacks '{name}'")
     kinds = get_type_hints(cls)

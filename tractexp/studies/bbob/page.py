@@ -25,7 +25,7 @@ def scale(benchmark: BbobRuns) -> str:
 
 def sentences(benchmark: BbobRuns) -> list[str]:
     """One sentence to quote for each dimension, the best optimizer first."""
-    told = []
+    sentences = []
     plan = benchmark.plan
     for d in plan.dimensions:
         shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
@@ -35,11 +35,11 @@ def sentences(benchmark: BbobRuns) -> list[str]:
             f" {len(plan.functions)} functions"
             for name in ranked
         ]
-        told.append(
+        sentences.append(
             f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,} evaluations on each"
             f" function, {'; '.join(parts)}."
         )
-    return told
+    return sentences
 
 
 def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
@@ -76,16 +76,16 @@ def answer(benchmark: BbobRuns, dimension: int) -> str:
     if not others:
         return f"{best} met {share} of the targets in dimension {dimension}; task.against=[NAME] sets it beside others."
     second = f"{benchmark.share(others[0], dimension, functions):.0%} of {others[0]}"
-    told = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
+    sentence = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
     if share == second.partition(" ")[0]:
-        told = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
+        sentence = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
     elsewhere = []
     for group, chosen in benchmark.groups().items():
         shares = {name: benchmark.share(name, dimension, chosen) for name in (best, *others)}
         lead = max(shares, key=lambda name: shares[name])
         if shares[lead] > shares[best]:
             elsewhere.append(f"{group} ({lead} {shares[lead]:.0%}, {best} {shares[best]:.0%})")
-    return told + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
+    return sentence + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
 
 
 def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
