@@ -359,8 +359,8 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     objective = float(problem.objective(values[None])[0])
     history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
-    found = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
-    result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
+    search = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
+    result, _ = conclude(problem, search, question.validate, question.seed, model.node, "descent")
     return replace(result, adequacy=adequacy(steps).to_dict())
 
 

@@ -256,11 +256,11 @@ def conclude(
     free = end.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
     fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
-    first, found_values = problem.events[0], _values(problem, free)
+    first, estimates = problem.events[0], _values(problem, free)
     own = OwnBase.at(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     result = Result(
-        **found_values,
+        **estimates,
         objective=float(problem.objective(free[None])[0]),
         epsilon_p=epsilon_p,
         epsilon_q=epsilon_q,
@@ -282,7 +282,7 @@ def conclude(
         notes=[note for f in fits for note in f.event.record.notes],
         records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
-        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
+        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*estimates.values()), exponents),
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )

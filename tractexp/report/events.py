@@ -9,7 +9,7 @@ from tractexp.blocks import style
 from tractexp.blocks.chart import MOST, Chart
 from tractexp.record import Event
 
-FOUND = "#E69F00"  # shades what stands out
+EXCESS = "#E69F00"  # shades what stands out
 WITHIN = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
@@ -56,7 +56,7 @@ def event_chart(
         for place in places:
             if place.channel == channel:
                 for panel in (above, above + 1):
-                    chart.shade(place.start, place.end, FOUND, panel, "more than chance leaves", opacity=0.25)
+                    chart.shade(place.start, place.end, EXCESS, panel, "more than chance leaves", opacity=0.25)
         chart.line("measured", t, measured, style.MEASURED, above, width=3)
         for name, power, color, dash in curves:
             chart.line(name, t, power[c], color, above, dash=dash)

@@ -11,14 +11,14 @@ from tractexp.domain.playback import AFTER
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit
 from tractexp.record import WaveEvent
-from tractexp.report.events import FOUND, WITHIN
+from tractexp.report.events import EXCESS, WITHIN
 
 PHASES = ("a", "b", "c")
 CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
 FASTEST = 1300.0  # Hz: what a spectrum shows
 KILO = 1.0  # kA of a peak from which an axis is in kA
-TOLD = 4  # events of which it is told how they were prepared
+FEW = 4  # events of which it is told how they were prepared
 SPECTRUM = (
     "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
     " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on ({after:.0f} ms), below before"
@@ -74,7 +74,7 @@ def wave_chart(
     if deviation is not None and around is not None:
         _noise_bands(chart, event, one * deviation, one * around)
     for first, last in _together(places):
-        chart.shade(first, last, FOUND, 1 + event.phases, "more than chance leaves", opacity=0.2)
+        chart.shade(first, last, EXCESS, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
         chart.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
@@ -175,7 +175,7 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
 def prepared(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     """What was done to each record before it was fitted, and how it is simulated, in sentences."""
     steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
-    return [*(_prepared(fit) for fit in fits[:TOLD] if fit.waves is not None), steps]
+    return [*(_prepared(fit) for fit in fits[:FEW] if fit.waves is not None), steps]
 
 
 def _prepared(fit: Fit) -> str:

@@ -213,7 +213,7 @@ def _spent(study: Study, name: str) -> list[str]:
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         _label(name), _middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
-        "-" if literal else f"{study.found_floor(ends):.0%}",
+        "-" if literal else f"{study.floor_share(ends):.0%}",
         "-" if literal else _middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
