@@ -38,6 +38,11 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
+def packaged(name: str) -> str:
+    """The text of a file that the package brings along, such as `blocks/chart.js`."""
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+
+
 def there(path: Path | str) -> bool:
     """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for no name of a file.
 
