@@ -43,7 +43,6 @@ FUNDAMENTAL = (tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"), tag("672d0310-7810-1
 FEWEST = 4  # samples of a waveform
 CLOSE = 1e-6  # s: times that are the same to the resolution of a moment
 GAP = 1.5  # usual steps: after a longer one a log is another one
-ENDINGS = (".pqd", ".pqdif")
 
 
 @dataclass(frozen=True, eq=False)
