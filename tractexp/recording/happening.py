@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.record.change import SMALL, Change, load_changes, runs
-from tractexp.record.event import FEWEST_BEFORE, OPEN_POLE, SHALLOWEST, STEADY, UNCLEARED
+from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, STEADY
+from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
