@@ -22,7 +22,7 @@ from tractexp.overrides import assigned, override
 from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.report.look import envelope
+from tractexp.report.look_charts import envelope
 from tractexp.report.look_console import summary
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
-from tractexp.filetypes.comtrade_header import number, quoted
+from tractexp.filetypes.comtrade_fields import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.remarks import Remarks

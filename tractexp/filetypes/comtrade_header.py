@@ -7,9 +7,9 @@ import re
 from collections import deque
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from math import isfinite
 
 from tractexp.errors import UserError
+from tractexp.filetypes.comtrade_fields import date, number, quoted
 from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import unit_of
 from tractexp.wording import counted
@@ -19,7 +19,6 @@ FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with
 MOST_RATES = 10  # sampling rates of one file, where their number stands for the nominal frequency
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
 _COUNTS = re.compile(r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE)
 
 
@@ -121,20 +120,6 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
     _kind(rows, header)
     _trailer(rows, header)
     return header
-
-
-def number(text: str) -> float | None:
-    """A finite number as files write it, or None."""
-    text = text.strip()
-    if not _NUMBER.fullmatch(text):
-        return None
-    value = float(text.replace("d", "e").replace("D", "e"))
-    return value if isfinite(value) else None
-
-
-def quoted(text: str) -> str:
-    """A value of the file for a message: not longer than a line bears."""
-    return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
 
 def _station(rows: _Lines, header: Header) -> None:
@@ -350,33 +335,6 @@ def _dates(rows: _Lines, header: Header) -> None:
 
 
 _LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)
-_DATE = re.compile(
-    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
-    re.ASCII,
-)
-
-
-def date(text: str, american: bool) -> tuple[datetime | None, str]:
-    """A date in whichever order its numbers allow, and a remark on it; None where they allow none.
-
-    `american`: the month is written first (1991).
-    """
-    match = _DATE.fullmatch(text.strip())
-    if match is None:
-        return None, f"{quoted(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
-    a, b, c, hour, minute, second = map(int, match.groups()[:6])
-    micro = int((match[7] or "0")[:6].ljust(6, "0"))
-    orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
-    if len(match[1]) > 2:
-        orders = [(a, b, c), (a, c, b)]
-    for k, (year, month, day) in enumerate(orders):
-        year += (1900 if year >= 70 else 2000) if year < 100 else 0
-        try:
-            moment = datetime(year, month, day, hour, minute, second, micro)
-        except ValueError:
-            continue
-        return moment, f"date {quoted(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
-    return None, f"{quoted(text)} is not a day of the calendar; not used"
 
 
 def _kind(rows: _Lines, header: Header) -> None:
