@@ -16,6 +16,7 @@ from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
 from tractexp.provenance import in_words as identity_in_words
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
@@ -59,14 +60,22 @@ def summary(fit: "Identification") -> Report:
     report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
     report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
     return report.text(
-        *start, result.acceptance, *[headline(result)] * bool(verdicts), *(f"  {sentence}" for sentence in poor),
-        *notes, *filter(None, [fit.end_of_search]), *(f"next: {sentence}" for sentence in fit.advice),
+        *yardstick(fit), *start, result.acceptance, *[headline(result)] * bool(verdicts),
+        *(f"  {sentence}" for sentence in poor), *notes, *filter(None, [fit.end_of_search]),
+        *(f"next: {sentence}" for sentence in fit.advice),
     )  # fmt: skip
 
 
 def machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
     return [str(fit.operating_point)] * (fit.operating_point is not None)
+
+
+def yardstick(fit: "Identification") -> list[str]:
+    """The best linear network beside it, in a sentence, with its poles where there are some; [] where not judged."""
+    poles = fit.result.linear_network.get("poles")
+    beside = f" Its poles: {poles_in_words(poles)}." if poles else ""
+    return [as_sentence(fit.yardstick) + beside] * bool(fit.yardstick)
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:
@@ -93,7 +102,7 @@ def report(fit: "Identification") -> Report:
     _curves(page, details.fits, uncertainty)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
-    page.heading("How well it fits").add(errors(fit))
+    page.heading("How well it fits").add(errors(fit)).text(*yardstick(fit))
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
