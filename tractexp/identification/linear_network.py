@@ -57,15 +57,15 @@ class BlackBox:
 
     @property
     def poles(self) -> list[dict[str, float]]:
-        """`decay` [1/s] and `frequency` [Hz] of each pole of the vectors, the slowest first.
+        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the vectors, the slowest first.
 
         In waveforms the frequency is that in the phases, negative where the vector turns backwards; in phasors P and Q
-        oscillate with it.
+        oscillate with it. The admittance is what the pole adds at first and what dies out.
         """
-        turning = [float(p.imag) / (2 * np.pi) + self.turns for p in self.networks[0].poles]
-        told = [f if self.turns else abs(f) for f in turning]
-        pairs = sorted(zip((-self.networks[0].poles.real).tolist(), told, strict=True))
-        return [{"decay": decay, "frequency": frequency} for decay, frequency in pairs]
+        poles, shares = self.networks[0].poles, np.abs(self.networks[0].coefficients)
+        turning = poles.imag / (2 * np.pi) + self.turns if self.turns else np.abs(poles.imag) / (2 * np.pi)
+        rows = zip((-poles.real).tolist(), turning.tolist(), shares.tolist(), strict=False)
+        return [dict(zip(("decay", "frequency", "admittance"), row, strict=True)) for row in sorted(rows)]
 
     def play(self, event: Event) -> Playback:
         """What it calculates of an event of its domain."""
@@ -85,13 +85,14 @@ def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST) -> lis
 
 
 def best(domain: Domain, train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
-    """The one that leaves least of events that it has not seen; without such, of the least information criterion.
+    """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes` does."""
+    return chosen(black_boxes(domain, train), train, held_out)
 
-    Raises `UserError` as `black_boxes` does.
-    """
-    boxes = black_boxes(domain, train)
+
+def chosen(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
+    """The one that leaves least of events that it has not seen; without such, of the least information criterion."""
     vectors = [box.networks[0] for box in boxes]
-    ports = [domain.ports(event)[0] for event in held_out or train]
+    ports = [boxes[0].domain.ports(event)[0] for event in held_out or train]
     by = [one.left(ports) for one in vectors] if held_out else information(vectors, ports)
     return replace(boxes[int(np.argmin(by))], chosen_by=HELD_OUT if held_out else CRITERION)
 

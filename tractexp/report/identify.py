@@ -144,12 +144,12 @@ def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None
     for k, fit in enumerate(fits):
         noise = deviation[:, parts[k]] if fit.role == "train" else None
         with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
-            _event(page, fit, noise)
+            event_curves(page, fit, noise)
     if waves:
         page.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
 
 
-def _event(page: Report, fit: Any, noise: np.ndarray | None) -> None:
+def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
     """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
     about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
