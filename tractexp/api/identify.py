@@ -420,7 +420,7 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
 
 @plugin
 class Identify(Task, call=identify):
-    """Fit free parameters to the training events, judge on all, show and log the outcome."""
+    """Fit free parameters to the training events, judge on all, show and log that."""
 
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
