@@ -94,6 +94,7 @@ def report(fit: "Identification") -> Report:
     page = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
     page.verdict(
         as_sentence(fit.headline),
+        *yardstick(fit),
         f"{as_sentence(result.acceptance)}{_of_currents(result)}",
         headline(result),
         kind=KIND[fit.grade],
@@ -102,7 +103,7 @@ def report(fit: "Identification") -> Report:
     _curves(page, details.fits, uncertainty)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
-    page.heading("How well it fits").add(errors(fit)).text(*yardstick(fit))
+    page.heading("How well it fits").add(errors(fit))
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
