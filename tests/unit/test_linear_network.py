@@ -189,13 +189,25 @@ def test_a_single_phase_has_a_network_of_its_own():
     I = 2 * np.mean((i * np.exp(-2j * np.pi * F0 * t))[before:start])
     made = synthetic_event("made", t, u * np.exp(-2j * np.pi * F0 * t), (1.0, I.real, -I.imag), F0, start, start + 190)
     i[:before] = np.nan
-    event = replace(made, phases=1, currents=np.stack([i, np.full(n, np.nan), np.full(n, np.nan)]))
+    currents = np.stack([i, np.full(n, np.nan), np.full(n, np.nan)])
+    event = replace(made, phases=1, currents=currents, lead=before, steady=slice(before, start))
     box = black_boxes(WAVES, [event], most=1)[1]
     (pole,) = box.poles
     assert pole["decay"] == pytest.approx(30, rel=0.01)
     assert abs(pole["frequency"]) < 0.1
     calculated = WAVES.drawn(event, [box.networks[0].response(WAVES.ports(event)[0])])
     assert np.abs(calculated[0] - i)[start:].max() < 0.002 * np.nanmax(np.abs(i))
+
+
+def test_what_is_periodic_before_the_dip_goes_on():
+    """Harmonics and a negative sequence that the load draws, and those of the voltage."""
+    v, t = voltage(), np.arange(1600) / RATE
+    own = 0.05 * np.exp(-4j * np.pi * F0 * t) + 0.03 * np.exp(2j * np.pi * 6 * F0 * t)
+    driven = 0.02 * np.exp(-2j * np.pi * 6 * F0 * t)
+    boxes = black_boxes(WAVES, [event := in_waves(v + driven, planted(v, POLES, SHARES) + own)], most=2)
+    np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
+    calculated = WAVES.drawn(event, [boxes[2].networks[0].response(WAVES.ports(event)[0])])
+    np.testing.assert_allclose(calculated[:2], event.currents[:2], atol=1e-6)
 
 
 def test_the_zero_sequence_has_a_path_of_resistance_and_inductance():

@@ -1,8 +1,9 @@
 """Voltage and current of an event as a linear network sees them: how they deviate from the steady state before the dip.
 
-In waveforms both are space vectors in the frame that turns with the voltage before the dip, in phasors the voltage is
-its magnitude and the current P - jQ. A network of waveforms draws in the steady state what the load draws there: so its
-response to a constant voltage is known. In phasors it is not, for P and Q may follow any power of the voltage.
+In waveforms both are space vectors in the frame that turns with the voltage before the dip, and what is periodic there,
+harmonics and unbalance, goes on. In phasors the voltage is its magnitude and the current P - jQ. A network of waveforms
+draws of the fundamental what the load draws before the dip: so its response to a constant voltage is known. In phasors
+it is not, for P and Q may follow any power of the voltage.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tractexp.record import Event, WaveEvent
-from tractexp.record.wave_event import stationary
+from tractexp.record.wave_event import Periodic, stationary
 
 Complex = NDArray[np.complexfloating[Any, Any]]
 
@@ -47,20 +48,24 @@ def power_port(event: Event) -> Port:
 
 
 def current_ports(event: WaveEvent) -> tuple[Port, ...]:
-    """The space vectors, less the fundamental before the dip, and the zero sequence where it is compared.
+    """The space vectors, and the zero sequence where it is compared, less their periodic courses before the dip.
 
     Of a single phase the imaginary part is what it was a quarter of a cycle ago, of the current as of the voltage.
     """
-    step = event.record.step
-    i = event.currents[0] + 1j * event.currents[1]
-    if event.phases == 1:
-        i, _ = stationary(event.currents[:1], event.rate, event.f0)
-    Y = admittance(event)
-    vectors = Port(event.v - event.U0, i / event.turn - Y * event.U0, step, event.start, Y, event.f0)
-    zero = Port(event.v_zero + 0j, event.currents[2] + 0j, step, event.start, None, series=True)
+    step, v = event.record.step, event.v * event.turn
+    u = np.stack([v.real, v.imag, event.v_zero])
+    u, i = u - before(event, u), event.currents - before(event, event.currents)
+    vector = stationary(i[:1], event.rate, event.f0)[0] if event.phases == 1 else i[0] + 1j * i[1]
+    Y = (event.P0 - 1j * event.Q0) / event.U0**2
+    vectors = Port((u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0)
+    zero = Port(u[2] + 0j, i[2] + 0j, step, event.start, None, series=True)
     return (vectors, zero) if event.compared[2] else (vectors,)
 
 
-def admittance(event: WaveEvent) -> complex:
-    """What the load draws of the fundamental before the dip [pu]."""
-    return (event.P0 - 1j * event.Q0) / event.U0**2
+def before(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
+    """Channels (C, N) as they went before the dip, harmonics included, all along; 0 where one is not compared."""
+    t, part = event.record.t, event.steady
+    there = np.isfinite(channels[:, part]).all(axis=1)
+    course = np.zeros(channels.shape)
+    course[there] = Periodic.of(t[part], channels[there][:, part], event.f0, event.rate).at(t)
+    return course

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.domain import excitation, wave_errors
 from tractexp.domain.domain import DipGrid, Domain, simulated
 from tractexp.domain.playback import Playback
-from tractexp.domain.port import Complex, Port, admittance, current_ports
+from tractexp.domain.port import Complex, Port, before, current_ports
 from tractexp.model.drive import WAVES, Drive, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -84,8 +84,8 @@ class WaveDomain(Domain):
 
     def drawn(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         event, (vector, *zero) = cast(WaveEvent, event), responses
-        i = (admittance(event) * event.U0 + vector) * event.turn
-        return np.stack([i.real, i.imag, zero[0].real if zero else np.zeros(len(i))])
+        i = vector * event.turn
+        return before(event, event.currents) + np.stack([i.real, i.imag, zero[0].real if zero else np.zeros(len(i))])
 
     def better(self, event: Event) -> str:
         return ""

@@ -2,7 +2,7 @@ r"""The best linear network of a few poles from the recorded voltage to the reco
 
     i = G u + C du/dt + sum_k g_k s / (s - p_k) u
 
-u and i deviate from the steady state before the dip, complex (`tractexp.domain.port`); G is how the current follows a
+u and i deviate from their course before the dip, complex (`tractexp.domain.port`); G is how the current follows a
 voltage that stays, C a capacitance, g_k what pole k adds at first and what dies out with it. The zero sequence has the
 path of a resistance and an inductance, g / (s - p) u. Between samples u is a straight line: so responses are exact. The
 poles are found by variable projection (`tractexp.identification.projection`), their number by events held out.

@@ -1,7 +1,7 @@
 """How good a model of these records can get: its error over that of the best linear network of few poles.
 
-A network knows no physics, has as many poles as predict best, and leaves harmonics, noise and what is not linear. A
-model that leaves much more lacks something; one that leaves less knows something that no linear network can.
+A network knows no physics, has as many poles as predict best, and leaves noise and what is not linear. A model that
+leaves much more lacks something; one that leaves less knows something that no linear network can.
 """
 
 from collections.abc import Mapping, Sequence
