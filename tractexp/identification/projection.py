@@ -79,7 +79,7 @@ class Projection:
         found = least_squares(
             lambda x: _parts(self.solved(_poles(x, n)).left), np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
-            bounds=bounds, x_scale="jac", max_nfev=STEPS,
+            bounds=bounds, x_scale="jac", method="dogbox", max_nfev=STEPS,
         )  # fmt: skip
         return _poles(found.x, n)
 

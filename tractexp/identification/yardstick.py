@@ -61,7 +61,7 @@ def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
 
 def _of_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
     """The same of the currents themselves, which hold more than P and Q; "" of phasors."""
-    if fits[0].epsilon_i is None:
+    model, left = (float(np.sqrt(np.mean([(one.epsilon_i or 0.0) ** 2 for one in of]))) for of in (fits, played))
+    if not left:
         return ""
-    model, left = (float(np.sqrt(np.mean([float(one.epsilon_i or 0) ** 2 for one in of]))) for of in (fits, played))
     return f", and of the currents {model / left:.2g} times (epsilon_i {in_percent(model)} against {in_percent(left)})"
