@@ -148,14 +148,14 @@ def test_the_one_chosen_leaves_least_of_what_it_never_saw():
     v, other = voltage(), voltage(depth=0.5, duration=0.1)
     train = in_waves(v, planted(v, POLES, SHARES) + noise(len(v), 0.02))
     held = in_waves(other, planted(other, POLES * 1.1, SHARES) + noise(len(v), 0.02, seed=1))
-    left = [box.networks[0].left(WAVES.ports(held)) for box in black_boxes(WAVES, [train])]
+    left = [box.networks[0].squares(WAVES.ports(held)) for box in black_boxes(WAVES, [train])]
     assert len(best(WAVES, [train], [held]).poles) == int(np.argmin(left))
 
 
 def test_more_poles_leave_less_of_what_was_fitted():
     v = voltage()
     event = in_waves(v, planted(v, POLES, SHARES) * (1 + 0.1 * np.abs(v)) + noise(len(v), 0.003))
-    left = [box.networks[0].left(WAVES.ports(event)) for box in black_boxes(WAVES, [event])]
+    left = [box.networks[0].squares(WAVES.ports(event)) for box in black_boxes(WAVES, [event])]
     assert left == sorted(left, reverse=True)
 
 
@@ -195,7 +195,7 @@ def test_a_single_phase_has_a_network_of_its_own():
     (pole,) = box.poles
     assert pole["decay"] == pytest.approx(30, rel=0.01)
     assert abs(pole["frequency"]) < 0.1
-    calculated = WAVES.drawn(event, [box.networks[0].response(WAVES.ports(event)[0])])
+    calculated = WAVES.outputs(event, [box.networks[0].response(WAVES.ports(event)[0])])
     assert np.abs(calculated[0] - i)[start:].max() < 0.002 * np.nanmax(np.abs(i))
 
 
@@ -206,7 +206,7 @@ def test_what_is_periodic_before_the_dip_goes_on():
     driven = 0.02 * np.exp(-2j * np.pi * 6 * F0 * t)
     boxes = black_boxes(WAVES, [event := in_waves(v + driven, planted(v, POLES, SHARES) + own)], most=2)
     np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
-    calculated = WAVES.drawn(event, [boxes[2].networks[0].response(WAVES.ports(event)[0])])
+    calculated = WAVES.outputs(event, [boxes[2].networks[0].response(WAVES.ports(event)[0])])
     np.testing.assert_allclose(calculated[:2], event.currents[:2], atol=1e-6)
 
 
@@ -226,7 +226,7 @@ def test_the_slopes_are_those_of_the_residual_where_it_is_zero():
     v = voltage()
     fit = Projection.of(WAVES.ports(in_waves(v, planted(v, POLES, SHARES))))
     x, step = np.concatenate([np.log(-POLES.real), POLES.imag]), 1e-5
-    left = lambda x: fit.solved(-np.exp(x[:2]) + 1j * x[2:]).left  # noqa: E731
+    left = lambda x: fit.linear_part(-np.exp(x[:2]) + 1j * x[2:]).residual  # noqa: E731
     slopes = np.stack([(left(x + d) - left(x - d)) / (2 * step) for d in step * np.eye(4)], axis=1)
     expected = np.concatenate([slopes.real, slopes.imag])
     assert np.abs(fit.jacobian(POLES) - expected).max() < 2e-3 * np.abs(expected).max()

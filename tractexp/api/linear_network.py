@@ -42,7 +42,7 @@ class NetworkFit(Written):
     train: Dips
     validate: Dips
     domain: str
-    asked: int | None  # poles
+    order: int | None  # poles, where they are given
     content: Mapping[str, Any]
 
     @functools.cached_property
@@ -91,12 +91,12 @@ class NetworkFit(Written):
 
     def to_dict(self) -> dict[str, Any]:
         events = {"train": list(map(kept, self.train)), "validate": list(map(kept, self.validate))}
-        return events | {"domain": self.domain, "asked": self.asked, "content": dict(self.content)}
+        return events | {"domain": self.domain, "order": self.order, "content": dict(self.content)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         train, validate = (Dips(map(again, content[key])) for key in ("train", "validate"))
-        return cls(train, validate, content["domain"], content["asked"], content["content"])
+        return cls(train, validate, content["domain"], content["order"], content["content"])
 
     def write_results(self, folder: Path) -> list[Path]:
         return [files.write_json(folder / "linear_network.json", self.content)]
@@ -125,25 +125,25 @@ def linear_network(
     if poles is not None:
         check_range("task.poles", poles, 0, MOST)
     train, held_out = dips_together(records, validate)
-    asked = NetworkFit(train, held_out, domain, poles, {})
+    request = NetworkFit(train, held_out, domain, poles, {})
     tell(progress, recorded(train, held_out))
-    box, boxes = _fitted(asked)
-    return NetworkFit(train, held_out, domain, poles, files.plain(_content(asked, box, boxes)))
+    box, boxes = _fitted(request)
+    return NetworkFit(train, held_out, domain, poles, files.plain(_content(request, box, boxes)))
 
 
 def _fitted(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
     """The network for the events of a call, and those of fewer and of more poles."""
     from tractexp.domain import DOMAINS
-    from tractexp.identification.linear_network import MOST, black_boxes, chosen
+    from tractexp.identification.linear_network import MOST, black_boxes, selection
 
     domain = DOMAINS[of.domain]
     train, held_out = domain.events(of.train), domain.events(of.validate)
-    boxes = black_boxes(domain, train, MOST if of.asked is None else of.asked)
-    if of.asked is None:
-        return chosen(boxes, train, held_out), boxes
-    if len(boxes) <= of.asked:
+    boxes = black_boxes(domain, train, MOST if of.order is None else of.order)
+    if of.order is None:
+        return selection(boxes, train, held_out), boxes
+    if len(boxes) <= of.order:
         raise UserError(
-            f"task.poles={of.asked}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer poles,"
+            f"task.poles={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer poles,"
             " or take a record that goes on longer"
         )
     return boxes[-1], boxes
@@ -176,7 +176,7 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
     if error["held_out"]:
         sentence += f", and of the held-out dips {ModelError.of(error['held_out'])}"
     return {
-        "sentence": sentence, "poles": box.poles, "chosen_by": box.chosen_by or f"task.poles={of.asked}",
+        "sentence": sentence, "poles": box.poles, "chosen_by": box.chosen_by or f"task.poles={of.order}",
         "model_error": error,
         "events": [fit.to_dict() for fit in fits], "by_poles": by_poles,
         "records": [{"role": f.role, "name": f.event.record.name} | provenance.identity(f.event.record) for f in fits],

@@ -123,7 +123,7 @@ class Domain(ABC):
         """Voltage and current of an event of this domain, as a linear network sees them."""
 
     @abstractmethod
-    def drawn(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         """What is compared (C, N), where deviations of the ports' currents are `responses`, (N,) complex each [pu]."""
 
     @abstractmethod

@@ -75,7 +75,7 @@ class PhasorDomain(Domain):
     def ports(self, event: Event) -> tuple[Port, ...]:
         return (power_port(event),)
 
-    def drawn(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         (i,) = responses
         return np.stack([event.P0 + i.real, event.Q0 - i.imag])
 

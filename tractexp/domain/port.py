@@ -35,8 +35,8 @@ class Port:
     series: bool = False
 
     @property
-    def known(self) -> Complex:
-        """What is known of the response (N,) [pu]."""
+    def steady_response(self) -> Complex:
+        """What of the response (N,) [pu] the steady state tells: 0 where it does not."""
         return (0.0 if self.steady is None else self.steady) * self.u
 
 
@@ -54,7 +54,7 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
     """
     step, v = event.record.step, event.v * event.turn
     u = np.stack([v.real, v.imag, event.v_zero])
-    u, i = u - before(event, u), event.currents - before(event, event.currents)
+    u, i = u - periodic_course(event, u), event.currents - periodic_course(event, event.currents)
     vector = stationary(i[:1], event.rate, event.f0)[0] if event.phases == 1 else i[0] + 1j * i[1]
     Y = (event.P0 - 1j * event.Q0) / event.U0**2
     vectors = Port((u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0)
@@ -62,7 +62,7 @@ def current_ports(event: WaveEvent) -> tuple[Port, ...]:
     return (vectors, zero) if event.compared[2] else (vectors,)
 
 
-def before(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
+def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
     """Channels (C, N) as they went before the dip, harmonics included, all along; 0 where one is not compared."""
     t, part = event.record.t, event.steady
     there = np.isfinite(channels[:, part]).all(axis=1)

@@ -11,7 +11,7 @@ import numpy as np
 from tractexp.domain import excitation, wave_errors
 from tractexp.domain.domain import DipGrid, Domain, simulated
 from tractexp.domain.playback import Playback
-from tractexp.domain.port import Complex, Port, before, current_ports
+from tractexp.domain.port import Complex, Port, current_ports, periodic_course
 from tractexp.model.drive import WAVES, Drive, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -82,10 +82,12 @@ class WaveDomain(Domain):
     def ports(self, event: Event) -> tuple[Port, ...]:
         return current_ports(cast(WaveEvent, event))
 
-    def drawn(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
         event, (vector, *zero) = cast(WaveEvent, event), responses
         i = vector * event.turn
-        return before(event, event.currents) + np.stack([i.real, i.imag, zero[0].real if zero else np.zeros(len(i))])
+        return periodic_course(event, event.currents) + np.stack(
+            [i.real, i.imag, zero[0].real if zero else np.zeros(len(i))]
+        )
 
     def better(self, event: Event) -> str:
         return ""

@@ -35,13 +35,13 @@ class LinearNetwork:
 
     def response(self, port: Port) -> Complex:
         """The current's deviation (N,) [pu]."""
-        return port.known + basis(port, self.poles) @ self.coefficients
+        return port.steady_response + basis(port, self.poles) @ self.coefficients
 
-    def left(self, ports: Sequence[Port]) -> float:
+    def squares(self, ports: Sequence[Port]) -> float:
         """The sum of squares that it leaves from the dips on [pu²]."""
-        return sum(float(np.nansum(np.abs(rest) ** 2)) for rest in map(self.rest, ports))
+        return sum(float(np.nansum(np.abs(rest) ** 2)) for rest in map(self.residual, ports))
 
-    def rest(self, port: Port) -> Complex:
+    def residual(self, port: Port) -> Complex:
         """What it leaves from the dip on (n,) [pu]; nan where the current is not compared."""
         return (port.i - self.response(port))[port.start :]
 
@@ -70,7 +70,7 @@ class BlackBox:
     def play(self, event: Event) -> Playback:
         """What it calculates of an event of its domain."""
         responses = [n.response(port) for n, port in zip(self.networks, self.domain.ports(event), strict=False)]
-        return self.domain.comparison(event, self.domain.drawn(event, responses))
+        return self.domain.comparison(event, self.domain.outputs(event, responses))
 
 
 def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST) -> list[BlackBox]:
@@ -86,24 +86,24 @@ def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST) -> lis
 
 def best(domain: Domain, train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
     """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes` does."""
-    return chosen(black_boxes(domain, train), train, held_out)
+    return selection(black_boxes(domain, train), train, held_out)
 
 
-def chosen(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
+def selection(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
     """The one that leaves least of events that it has not seen; without such, of the least information criterion."""
     vectors = [box.networks[0] for box in boxes]
     ports = [boxes[0].domain.ports(event)[0] for event in held_out or train]
-    by = [one.left(ports) for one in vectors] if held_out else information(vectors, ports)
+    by = [one.squares(ports) for one in vectors] if held_out else information(vectors, ports)
     return replace(boxes[int(np.argmin(by))], chosen_by=HELD_OUT if held_out else CRITERION)
 
 
 def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     """The best network of no pole, one, and so on, up to `most` or to what the samples allow."""
     fit = Projection.of(ports)
-    found = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.solved(none).coefficients)]
+    found = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
     while len(found) <= most and _samples(ports) >= SAMPLES * unknowns(len(found), ports[0]):
-        poles = fit.refined(np.append(found[-1].poles, fit.start(found[-1].poles)))
-        found.append(LinearNetwork(poles, fit.solved(poles).coefficients))
+        poles = fit.optimum(np.append(found[-1].poles, fit.start(found[-1].poles)))
+        found.append(LinearNetwork(poles, fit.linear_part(poles).coefficients))
     return found
 
 
@@ -112,8 +112,8 @@ def information(found: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.nda
 
     Source: Schwarz 1978; Bayley and Hammersley 1946 (the effective number of samples).
     """
-    left = np.array([one.left(ports) for one in found])
-    rests = [found[-1].rest(port) for port in ports]
+    left = np.array([one.squares(ports) for one in found])
+    rests = [found[-1].residual(port) for port in ports]
     in_turn = abs(sum(complex(np.nansum(rest[1:] * rest[:-1].conj())) for rest in rests))
     correlation = in_turn / max(float(left[-1]), 1e-300)
     worth = _samples(ports) * (1 - correlation) / (1 + correlation)

@@ -20,12 +20,12 @@ STEPS = 40  # of the nonlinear least squares
 PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is theirs
 
 
-class Solved(NamedTuple):
-    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), what is left (R,)."""
+class LinearPart(NamedTuple):
+    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), the residual (R,)."""
 
     coefficients: Complex
     base: Complex
-    left: Complex
+    residual: Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,14 +40,14 @@ class Projection:
     @classmethod
     def of(cls, ports: Sequence[Port]) -> "Projection":
         seconds = max((len(port.u) - port.start) * port.step for port in ports)
-        current = _rows(ports, lambda port: port.i - port.known)
+        current = _rows(ports, lambda port: port.i - port.steady_response)
         return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
 
-    def solved(self, poles: Complex) -> Solved:
+    def linear_part(self, poles: Complex) -> LinearPart:
         """The best linear part beside poles (n,)."""
         base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
         inside = base.conj().T @ self.current
-        return Solved(np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside)
+        return LinearPart(np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside)
 
     @property
     def grid(self) -> list[complex]:
@@ -58,17 +58,17 @@ class Projection:
 
     def start(self, poles: Complex) -> complex:
         """The pole of the grid that takes most of what these leave, beside them."""
-        _, base, left = self.solved(poles)
+        _, base, residual = self.linear_part(poles)
 
         def taken(pole: complex) -> float:
             response = _rows(self.ports, lambda port: of_pole(port, pole))
             apart = response - base @ (base.conj().T @ response)
             least = PARALLEL * np.linalg.norm(response) + np.finfo(float).tiny
-            return float(abs(np.vdot(left, apart)) / max(np.linalg.norm(apart), least))
+            return float(abs(np.vdot(residual, apart)) / max(np.linalg.norm(apart), least))
 
         return max(self.grid, key=taken)
 
-    def refined(self, poles: Complex) -> Complex:
+    def optimum(self, poles: Complex) -> Complex:
         """The poles that leave least, near these."""
         from scipy.optimize import least_squares
 
@@ -77,7 +77,7 @@ class Projection:
         bounds = np.array([[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)).T
         first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
         found = least_squares(
-            lambda x: _parts(self.solved(_poles(x, n)).left), np.clip(first, *bounds),
+            lambda x: _parts(self.linear_part(_poles(x, n)).residual), np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
             bounds=bounds, x_scale="jac", method="dogbox", max_nfev=STEPS,
         )  # fmt: skip
@@ -85,7 +85,7 @@ class Projection:
 
     def jacobian(self, poles: Complex) -> np.ndarray:
         """How what is left (2 R,) moves with the logarithms of the decays and with the frequencies."""
-        coefficients, base, _ = self.solved(poles)
+        coefficients, base, _ = self.linear_part(poles)
         moved = _rows(self.ports, lambda port: np.stack([with_pole(port, p) for p in poles], axis=1))
         moved = moved * coefficients[: len(poles)]
         moved = base @ (base.conj().T @ moved) - moved
