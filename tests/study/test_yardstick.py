@@ -1,6 +1,7 @@
 """Each fit says how much more it leaves than the best linear network of few poles does."""
 
 import json
+from html import unescape
 from dataclasses import replace
 
 import numpy as np
@@ -53,8 +54,8 @@ def test_one_sentence_on_console_page_and_result(fit, tmp_path):
     )
     assert fit.yardstick == sentence
     told = sentence.replace("the physical", "The physical")
-    assert f"{told}. Its poles: " in " ".join(str(fit.summary()).split())
-    assert f"{told}. Its poles: " in fit.report().html
+    assert f"{told}. The network's poles: " in " ".join(str(fit.summary()).split())
+    assert f"{told}. The network's poles: " in unescape(fit.report().html)
     assert json.loads(fit.result.write(tmp_path / "result.json").read_text())["linear_network"]["sentence"] == sentence
 
 

@@ -74,7 +74,7 @@ def machine(fit: "Identification") -> list[str]:
 def yardstick(fit: "Identification") -> list[str]:
     """The best linear network beside it, in a sentence, with its poles where there are some; [] where not judged."""
     poles = fit.result.linear_network.get("poles")
-    beside = f" Its poles: {poles_in_words(poles)}." if poles else ""
+    beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
     return [as_sentence(fit.yardstick) + beside] * bool(fit.yardstick)
 
 
