@@ -1,8 +1,8 @@
 """Each fit says how much more it leaves than the best linear network of few poles does."""
 
 import json
-from html import unescape
 from dataclasses import replace
+from html import unescape
 
 import numpy as np
 import pytest
