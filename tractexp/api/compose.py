@@ -17,6 +17,7 @@ from tractexp.outcome import Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
+    from tractexp.record import Event
 
 GROUP, DOMAIN, PARTS = "model", "domain", ("motor", "static")
 
@@ -41,6 +42,8 @@ class LoadModel(Portable, Tabulated):
     per_event: Sequence[str] = ()
     integration: str = "classical"
     domain: str = "phasors"
+    shown_effects: bool = False
+    shown: Mapping[str, str] = field(default_factory=dict)  # {effect that the records show: how they do}
 
     @property
     def node(self) -> dict[str, Any]:
@@ -71,6 +74,13 @@ class LoadModel(Portable, Tabulated):
             if key in given:
                 given[key] = {**getattr(self, key), **given[key]}
         return replace(self, **given)
+
+    def fitting(self, events: Sequence["Event"]) -> "LoadModel":
+        """The model with the effects that some of the events show, where it is one of `shown_effects`."""
+        if not self.shown_effects:
+            return self
+        shown = effects_shown(self.model, events)
+        return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
 
     def table(self) -> Table:
         rows = [
@@ -129,6 +139,20 @@ def compose(
             known = among(key, composed.parameters, "Parameters")
             raise UserError(f"fixed.{key}: this model has no parameter '{key}'{known}")
     return composed
+
+
+def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
+    """{effect: how one of the events shows it}, of those that the model takes and does not have."""
+    from tractexp.domain import domain_of
+    from tractexp.model.parts import Effect
+    from tractexp.plugin import discover, get
+
+    names = discover()["effect"].keys() - {effect.name for effect in model.effects}
+    showing = [cls() for cls in (get("effect", name) for name in sorted(names)) if cls.shown is not Effect.shown]
+    taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
+    seen = domain_of(model).events(events) if taken else ()
+    how = {effect.name: next(filter(None, map(effect.shown, seen)), "") for effect in taken}
+    return {name: sentence for name, sentence in how.items() if sentence}
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:

@@ -309,6 +309,7 @@ def investigate(
     if base.per_event:
         raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
     train, held = dips_together(records, validate)
+    base = base.fitting(train)
     question = Question(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
         false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),

@@ -395,7 +395,9 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     result, fits = conclude(
         problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )
-    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, uncertainty.values))
+    result = replace(result, shown_effects=dict(setup.model.shown))
+    held = active_bounds(problem, uncertainty.values, result.nuisances)
+    adequacy = graded(estimated.surprise, *errors_of(result), held)
     together = compare_events(uncertainty) if len(problem.events) > 1 else None
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}

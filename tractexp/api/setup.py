@@ -11,6 +11,7 @@ from tractexp.api.read import Dips, again, dips_together, kept
 from tractexp.errors import check_range
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
+from tractexp.wording import shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
@@ -64,7 +65,7 @@ class Setup(Given):
         return cls(
             train=train,
             validate=held,
-            model=model_of(model, known.get("domain")).with_(**known),
+            model=model_of(model, known.get("domain")).with_(**known).fitting(train),
             objective=Choice.of("objective", objective),
             **search,
         )
@@ -92,7 +93,8 @@ class Setup(Given):
         problem = self.problem
         model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
-        return [*recorded(self.train, self.validate), f"{model}; {steps}"]
+        shown = [shown_in_words(self.model.shown)] if self.model.shown else []
+        return [*recorded(self.train, self.validate), f"{model}; {steps}", *shown]
 
     def search(self, optimizer: Choice, seed: int, progress: Progress) -> "SearchResult":
         """Search, and show how far that is."""

@@ -159,6 +159,14 @@ class Effect(Part):
         Asking `eq` for what a model lacks refuses the effect for that model.
         """
 
+    def shown(self, event: Any) -> str:
+        """How a recorded event shows this effect before anything is fitted, in words; "" where it does not.
+
+        A model with `shown_effects` has the effects that an event shows, as nuisances: what the fit needs to meet the
+        record, and nobody asks for. `event` is a `tractexp.record.Event`, in waveforms a `WaveEvent`.
+        """
+        return ""
+
     def refusal(self, eq: "Equations") -> str | None:
         """A reason, as a sentence, that only this effect knows why it makes no sense for the equations in `eq`.
 
