@@ -42,6 +42,7 @@ class LoadModel(Portable, Tabulated):
     per_event: Sequence[str] = ()
     integration: str = "classical"
     domain: str = "phasors"
+    priors: bool = False
     shown_effects: bool = False
     shown: Mapping[str, str] = field(default_factory=dict)  # {effect that the records show: how they do}
 

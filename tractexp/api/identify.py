@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
     from tractexp.identification.model_error import ModelError
+    from tractexp.identification.problem import Problem
     from tractexp.identification.result import Fit
     from tractexp.identification.search import SearchResult
     from tractexp.identification.uncertainty import Uncertainty
@@ -405,11 +406,26 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     starts = [s.to_dict(problem.space.names) for s in estimated.starts]
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
-    advice = advise(uncertainty, adequacy, together.odd if together else (), data=data)
+    advice = [
+        *advise(uncertainty, adequacy, together.odd if together else (), data=data),
+        *_with_priors(problem, result),
+    ]
     result = replace(
         result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
     )
     return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
+
+
+def _with_priors(problem: "Problem", result: Result) -> list[str]:
+    """The command that holds a motor that no load has to what machines usually are; [] where it is one, or is held."""
+    from tractexp.exchange.operating_point import OperatingPoint
+    from tractexp.identification.prior import departures
+    from tractexp.provenance import again
+
+    point = OperatingPoint.of(result)
+    if problem.priors or not (point and point.doubt) or not departures(problem, problem.defaults[None]).size:
+        return []
+    return [f"hold the motor to what machines usually are: {again('model.priors=true')}"]
 
 
 @plugin

@@ -79,7 +79,7 @@ class Setup(Given):
         from tractexp.identification.problem import Problem
 
         m, loss, events = self.model, self.objective.build("objective"), self.train if train is None else train
-        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
+        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss, priors=m.priors)
 
     @property
     def limits(self) -> "Limits":

@@ -65,10 +65,19 @@ class Motor(Part):
         The motor draws V conj(I), V = `eq.V`; the framework declares that.
         """
 
+    def usual(self, *_: Any, **parameters: Any) -> "Iterable[tuple[Any, float, float]]":
+        """What such machines usually are: (quantity, median, factor), each positive and log-normally spread.
+
+        Two machines of three have a quantity within `factor` times or over its median. Parameters are numbers or
+        arrays (n,); quantities do not depend on the base. Where `model.priors` asks for it, the estimate is held to it.
+        """
+        return ()
+
     @classmethod
     def check_class(cls, where: str) -> None:
         super().check_class(where)
         check_signature(cls, "declare", "eq", where)
+        check_signature(cls, "usual", None, where, all_taken=False)
 
 
 class Static(Part):
