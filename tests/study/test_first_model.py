@@ -58,6 +58,12 @@ def test_a_model_that_is_asked_for_stays_as_it_is():
         assert model.fitting(events) is model
 
 
+def test_a_model_that_has_what_its_records_show_stays_as_it_is():
+    events = beside([2, 7], Earthed(0.2, 1.0))
+    model = model_of(None, "waves").fitting(events)
+    assert model.fitting(events) == model
+
+
 def test_what_carries_the_network_alone_is_told_in_a_line_and_not_in_the_table():
     """The path's susceptance and resistance are found, and the fit leaves nothing but noise."""
     fit = tractexp.identify(beside([2, 7], Earthed(0.2, 1.0)), **QUICK)

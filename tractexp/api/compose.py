@@ -80,7 +80,7 @@ class LoadModel(Portable, Tabulated):
         """The model with the effects that some of the events show, where it is one of `shown_effects`."""
         if not self.shown_effects:
             return self
-        shown = effects_shown(self.model, events)
+        shown = {**self.shown, **effects_shown(self.model, events)}
         return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
 
     def table(self) -> Table:

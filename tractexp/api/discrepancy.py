@@ -27,7 +27,7 @@ from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, console, say, telling
-from tractexp.wording import joined, with_error
+from tractexp.wording import joined, shown_in_words, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
@@ -323,6 +323,8 @@ def _steps(question: Question, progress: Progress) -> "Steps":
 
     q, base = question, question.model
     with telling(progress) as tell:
+        if base.shown:
+            tell(shown_in_words(base.shown))
         return found(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
             criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
@@ -362,7 +364,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     status = f"ended with the verdict {steps.verdict.word}"
     found = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
     result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
-    return replace(result, adequacy=adequacy(steps).to_dict())
+    return replace(result, adequacy=adequacy(steps).to_dict(), shown_effects=dict(base.shown))
 
 
 @plugin
