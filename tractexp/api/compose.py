@@ -111,6 +111,8 @@ def compose(
     per_event: Sequence[str] | None = None,
     integration: str | None = None,
     domain: str | None = None,
+    priors: bool | None = None,
+    shown_effects: bool | None = None,
 ) -> LoadModel:
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
 
@@ -120,7 +122,8 @@ def compose(
     upper]} and `fixed` {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
     parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample, as many as needed
     by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain` "waves" the same equations
-    draw sampled currents, and what phasors neglect is kept.
+    draw sampled currents, and what phasors neglect is kept. With `priors` a fit holds the motor to what machines
+    usually are, where its records do not tell; with `shown_effects` it has the effects that its records show.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
@@ -132,6 +135,7 @@ def compose(
     }
     given = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
+        "priors": priors, "shown_effects": shown_effects,
     }  # fmt: skip
     composed = composed.with_(bounds=bounds, fixed=fixed, **given, **parts)
     _ = composed.parameters

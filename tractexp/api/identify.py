@@ -341,6 +341,7 @@ def identify(
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
     domain: str | None = None,
+    priors: bool | None = None,
     objective: Any = None,
     optimizer: Any = None,
     budget: int | None = None,
@@ -354,8 +355,9 @@ def identify(
 
     `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
     judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
-    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps` and `domain` are as in
-    `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
+    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps`, `domain` and
+    `priors` are as in `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power
+    that phasors show.
 
     `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
     model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
@@ -367,7 +369,10 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
-    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
+    model_settings = {
+        "bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain,
+        "priors": priors,
+    }  # fmt: skip
     setup = FitSpec.of(
         records, model, validate, objective, model_settings, seed=seed, budget=budget, time_limit=time_limit,
         target=target,
