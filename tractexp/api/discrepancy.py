@@ -325,6 +325,8 @@ def _steps(question: Question, progress: Progress) -> "Steps":
     with telling(progress) as tell:
         if base.shown:
             tell(shown_in_words(base.shown))
+        if base.priors:
+            tell("model.priors holds no fit of an investigation, which judges by the records alone")
         return found(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
             criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
