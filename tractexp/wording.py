@@ -2,7 +2,7 @@
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
 MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
@@ -87,3 +87,8 @@ def share(value: float | None) -> str:
 def degrees(value: float | None) -> str:
     """An angle to a tenth of a degree, without a minus before zero; "" where there is none."""
     return "" if value is None else f"{round(value, 1) + 0.0:.1f}"
+
+
+def shown_in_words(shown: Mapping[str, str]) -> str:
+    """Which effects are in a model because the records show them, in a sentence."""
+    return f"in the model because the record shows it: {'; '.join(f'{name} ({how})' for name, how in shown.items())}"

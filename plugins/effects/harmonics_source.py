@@ -5,6 +5,7 @@ import numpy as np
 from tractexp.extend import INPUTS, Measurement, Parameter, plugin
 
 HIGHEST, CYCLES = 13, 2
+HEARD = 0.03  # of the current: fewer harmonics before the event leave less than a twentieth of the usual error
 
 
 @plugin
@@ -27,6 +28,11 @@ class HarmonicsSource(Measurement):
     waves_only = "phasors have no harmonics"
     relevant = {"harmonics": 0.2}
     confused_with = ("transformer_saturation",)
+
+    def shown(self, event):
+        periodic = np.sqrt(max(event.levels[0] ** 2 - event.random[0] ** 2, 0.0) * 2)
+        share = periodic * event.U0 / np.hypot(event.P0, event.Q0)
+        return f"harmonics and unbalance of {share:.1%} of the current before the dip" if share > HEARD else ""
 
     def observe(self, power, drive, values):
         out = power.copy()

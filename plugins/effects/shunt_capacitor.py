@@ -1,8 +1,11 @@
 """Shunt capacitor bank."""
 
+import numpy as np
+
 from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "WECC composite load model (Bss, Bfdr)"
+SUPPLIED = 0.05  # of the apparent power: what no motor and no reactance would supply
 
 
 @plugin
@@ -26,6 +29,10 @@ class ShuntCapacitor(Effect):
     places, kind = ("bus",), "law"
     relevant = {"capacitor": 0.05}
     confused_with = ("static_var_compensator", "negative_sequence_braking")
+
+    def shown(self, event):
+        supplied = -event.Q0 / np.hypot(event.P0, event.Q0)
+        return f"the load supplies Q, {supplied:.0%} of S, before the dip" if supplied > SUPPLIED else ""
 
     def edit(self, eq, capacitor):
         eq.draw(eq.capacitor(capacitor))

@@ -1,5 +1,7 @@
 """Path of the zero sequence to earth."""
 
+import numpy as np
+
 from tractexp.extend import Effect, Parameter, plugin
 
 SOURCE = "Kundur 1994, section 3.4 (sequence networks of transformers); IEC 60909-0, zero-sequence impedances"
@@ -28,6 +30,14 @@ class ZeroSequencePath(Effect):
     reads = ("I0",)
     grid = {"zero_resistance": (0.02, 0.1, 0.5)}
     relevant = {"zero_susceptance": 0.1}
+
+    def shown(self, event):
+        if not event.compared[2]:
+            return ""
+        dip = slice(event.start, event.end)
+        drawn, before = np.sqrt(2 * np.mean(event.currents[2, dip] ** 2)), np.hypot(event.P0, event.Q0) / event.U0
+        driven = np.abs(event.v_zero[dip]).max() / event.U0
+        return f"zero sequence, {driven:.0%} of the voltage in the dip, drives {drawn / before:.2g} times the current"
 
     def edit(self, eq, zero_susceptance, zero_resistance):
         psi = eq.lag("zero_flux", r"\psi_0")

@@ -37,6 +37,9 @@ class DoubleCage(Motor):
         0.2, (0.03, 1.2), "pu", "subtransient reactance on the record's base", SOURCE, "X''", power_exponent=-1
     )
 
+    def usual(self, T_prime, X_prime, C, M, T_m):
+        return _machine.usual(T_prime, X_prime, C, M, T_m)
+
     def declare(self, eq, T_prime, X_prime, C, M, T_m, T_second, X_second):
         from sympy import I, conjugate, re
 

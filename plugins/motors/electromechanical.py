@@ -32,6 +32,9 @@ class Electromechanical(Motor):
 
     T_prime, X_prime, C, M, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.M, _machine.T_M
 
+    def usual(self, T_prime, X_prime, C, M, T_m):
+        return _machine.usual(T_prime, X_prime, C, M, T_m)
+
     def declare(self, eq, T_prime, X_prime, C, M, T_m):
         current, omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
         eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)  # Eq. (1)

@@ -54,11 +54,20 @@ class MotorGroups(Motor):
     def label(self):
         return " + ".join(map(_name, self.of))
 
+    def usual(self, **parameters):
+        for k, one in enumerate(self.members, 1):
+            assert isinstance(one, Motor)
+            yield from one.usual(**self._own_of(k, one, parameters))
+
+    @staticmethod
+    def _own_of(k, one, parameters):
+        return {p.name: parameters[p.name + _suffix(k)] for p in one.parameters}
+
     def declare(self, eq, **parameters):
         total = 0
         for k, one in enumerate(self.members, 1):
             assert isinstance(one, Motor)
-            own = {p.name: parameters[p.name + _suffix(k)] for p in one.parameters}
+            own = self._own_of(k, one, parameters)
             current = one.declare(eq if k == 1 else eq.apart(_suffix(k)), **own)
             if k == 1 and sites.stator_current not in eq:
                 current = eq.place(sites.stator_current, current)

@@ -36,6 +36,9 @@ class StatorFlux(Motor):
     R_s = Parameter(0.02, (0.001, 0.2), "pu", "stator resistance on the record's base", SOURCE, power_exponent=-1)
     within_a_cycle = True
 
+    def usual(self, T_prime, X_prime, C, M, T_m, R_s):
+        return [*_machine.usual(T_prime, X_prime, C, M, T_m), (R_s / X_prime, 0.12, 3.9)]
+
     def declare(self, eq, T_prime, X_prime, C, M, T_m, R_s):
         from sympy import I, conjugate, re
 

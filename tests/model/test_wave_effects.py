@@ -20,7 +20,8 @@ NAMES = sorted(discover()["effect"])
 PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush",
                  "polynomial_static_load", "rotor_flux", "second_cage", "stator_transients"}  # fmt: skip
 WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance",
-              "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source"}  # fmt: skip
+              "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source",
+              "resonant_branch"}  # fmt: skip
 STACK = ("feeder_impedance", "shunt_capacitor", "second_motor_group", "undervoltage_trip", "transformer_saturation",
          "current_transformer_saturation", "harmonics_source")  # fmt: skip
 DIP = drives.wave_dip(0.5)
@@ -152,6 +153,42 @@ def test_a_load_behind_a_feeder_draws_before_the_dip_what_was_recorded():
     for motor in ("stator_flux", "electromechanical"):
         seen, _ = run("feeder_impedance", "shunt_capacitor", motor=motor, R_f=0.02, X_f=0.1, capacitor=0.3)
         assert np.abs(seen[:380] - (P0 - 1j * Q0)).max() < 1e-6
+
+
+def test_a_resonant_branch_is_its_resistance_inductance_and_capacitor():
+    """In the stationary frame, where it is not declared: 1/b = X_L (n² - 1), R = 2 X_L/(omega_n T)."""
+    b, f, T = 0.3, 190.0, 0.02
+    square = (f / 50) ** 2
+    X, speed = 1 / (b * (square - 1)), OMEGA / OMEGA_N
+    R, susceptance = 2 * X / (OMEGA_N * T), 1 / (square * X)
+    admittance = 1 / (R + 1j * X * speed + 1 / (1j * susceptance * speed))
+    v, _ = smooth("v_d", "v_q")
+    angle = lambda t: np.exp(1j * OMEGA * t)  # noqa: E731
+    i_0 = admittance * v(0.0)
+
+    def slope(t, y):
+        return [OMEGA_N / X * (v(t) * angle(t) - R * y[0] - y[1]), OMEGA_N * y[0] / susceptance]
+
+    i, _ = solved(slope, [i_0, v(0.0) - (R + 1j * X * speed) * i_0])
+    t = DIPS.inputs[INPUTS.index("t")]
+    drawn = admittance.conjugate()
+    G, B, r = branch_of(P0 - drawn.real, Q0 - drawn.imag)
+    (psi,) = solved(lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y, [1 / (r + 1j * OMEGA / OMEGA_N)])
+    known = G * v(t) + B * psi + i / angle(t)
+    chosen = {"resonant_susceptance": b, "resonance_frequency": f, "ringing_time": T}
+    assert np.abs(run("resonant_branch", substeps=32, **chosen)[0] - known).max() < 2e-6
+
+
+def test_a_resonant_branch_rings_at_its_frequency_until_its_time_is_over():
+    drive = Drive.of([drives.wave_dip(0.3, rate=12800.0, length=0.4)])
+    chosen = {"resonant_susceptance": 0.3, "resonance_frequency": 190.0, "ringing_time": 0.02}
+    ringing = run("resonant_branch", drive=drive, **chosen)[0] - run(drive=drive)[0]
+    turned = (ringing - ringing[-1]) * drives.wave_dip(0.3, rate=12800.0, length=0.4).turn
+    after = turned[-2600:]  # from 0.2 s on, the dip over
+    spectrum = np.abs(np.fft.fft(after * np.hanning(len(after)), 1 << 16))
+    f = np.abs(np.fft.fftfreq(1 << 16, 1 / 12800.0))
+    high = f > 100
+    assert f[high][spectrum[high].argmax()] == pytest.approx(190, abs=6)
 
 
 def test_the_zero_sequence_follows_its_branch():

@@ -86,6 +86,8 @@ def test_a_setting_that_the_task_ignores_is_refused(overrides, sentence):
         "task=simulate model/motor=none model.effects=[feeder_impedance] data=tibet_30pct",
         "task=simulate task.parameters=a.json data=tibet_30pct",
         "task=plan data=tibet_30pct model.substeps=2",
+        "model.priors=true model.shown_effects=false domain=waves",
+        "task=discrepancy model.priors=true model.shown_effects=false domain=waves",  # as the advice repeats a fit's
         "task=linear_network domain=waves data=tibet_30pct",
         "task=simulate domain=waves data=tibet_30pct",
         "task=generalise domain=waves data=tibet_30pct",

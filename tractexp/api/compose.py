@@ -17,6 +17,7 @@ from tractexp.outcome import Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
+    from tractexp.record import Event
 
 GROUP, DOMAIN, PARTS = "model", "domain", ("motor", "static")
 
@@ -41,6 +42,9 @@ class LoadModel(Portable, Tabulated):
     per_event: Sequence[str] = ()
     integration: str = "classical"
     domain: str = "phasors"
+    priors: bool = False
+    shown_effects: bool = False
+    shown: Mapping[str, str] = field(default_factory=dict)  # {effect that the records show: how they do}
 
     @property
     def node(self) -> dict[str, Any]:
@@ -72,6 +76,13 @@ class LoadModel(Portable, Tabulated):
                 given[key] = {**getattr(self, key), **given[key]}
         return replace(self, **given)
 
+    def fitting(self, events: Sequence["Event"]) -> "LoadModel":
+        """The model with the effects that some of the events show, where it is one of `shown_effects`."""
+        if not self.shown_effects:
+            return self
+        shown = {**self.shown, **effects_shown(self.model, events)}
+        return replace(self, effects=sorted({*self.effects, *shown}), shown=shown)
+
     def table(self) -> Table:
         rows = [
             [p.name, self.fixed.get(p.name, p.default), p.unit,
@@ -100,6 +111,8 @@ def compose(
     per_event: Sequence[str] | None = None,
     integration: str | None = None,
     domain: str | None = None,
+    priors: bool | None = None,
+    shown_effects: bool | None = None,
 ) -> LoadModel:
     """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
 
@@ -109,7 +122,8 @@ def compose(
     upper]} and `fixed` {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
     parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample, as many as needed
     by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain` "waves" the same equations
-    draw sampled currents, and what phasors neglect is kept.
+    draw sampled currents, and what phasors neglect is kept. With `priors` a fit holds the motor to what machines
+    usually are, where its records do not tell; with `shown_effects` it has the effects that its records show.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
@@ -121,6 +135,7 @@ def compose(
     }
     given = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
+        "priors": priors, "shown_effects": shown_effects,
     }  # fmt: skip
     composed = composed.with_(bounds=bounds, fixed=fixed, **given, **parts)
     _ = composed.parameters
@@ -129,6 +144,20 @@ def compose(
             allowed = among(key, composed.parameters, "Parameters")
             raise UserError(f"fixed.{key}: this model has no parameter '{key}'{allowed}")
     return composed
+
+
+def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
+    """{effect: how one of the events shows it}, of those that the model takes and does not have."""
+    from tractexp.domain import domain_of
+    from tractexp.model.parts import Effect
+    from tractexp.plugin import discover, get
+
+    names = discover()["effect"].keys() - {effect.name for effect in model.effects}
+    showing = [cls() for cls in (get("effect", name) for name in sorted(names)) if cls.shown is not Effect.shown]
+    taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
+    seen = domain_of(model).events(events) if taken else ()
+    how = {effect.name: next(filter(None, map(effect.shown, seen)), "") for effect in taken}
+    return {name: sentence for name, sentence in how.items() if sentence}
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:

@@ -27,7 +27,7 @@ from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, console, say, telling
-from tractexp.wording import joined, with_error
+from tractexp.wording import joined, shown_in_words, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
@@ -309,6 +309,7 @@ def investigate(
     if base.per_event:
         raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
     train, held = dips_together(records, validate)
+    base = base.fitting(train)
     question = Question(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
         false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),
@@ -322,6 +323,10 @@ def _steps(question: Question, progress: Progress) -> "Steps":
 
     q, base = question, question.model
     with telling(progress) as tell:
+        if base.shown:
+            tell(shown_in_words(base.shown))
+        if base.priors:
+            tell("model.priors holds no fit of an investigation, which judges by the records alone")
         return found(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
             criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
@@ -361,7 +366,7 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     status = f"ended with the verdict {steps.verdict.word}"
     search = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
     result, _ = conclude(problem, search, question.validate, question.seed, model.node, "descent")
-    return replace(result, adequacy=adequacy(steps).to_dict())
+    return replace(result, adequacy=adequacy(steps).to_dict(), shown_effects=dict(base.shown))
 
 
 @plugin

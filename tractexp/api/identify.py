@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
     from tractexp.identification.model_error import ModelError
+    from tractexp.identification.problem import Problem
     from tractexp.identification.result import Fit
     from tractexp.identification.search import SearchResult
     from tractexp.identification.uncertainty import Uncertainty
@@ -340,6 +341,7 @@ def identify(
     per_event: Sequence[str] | None = None,
     substeps: int | None = None,
     domain: str | None = None,
+    priors: bool | None = None,
     objective: Any = None,
     optimizer: Any = None,
     budget: int | None = None,
@@ -353,8 +355,9 @@ def identify(
 
     `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
     judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
-    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps` and `domain` are as in
-    `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
+    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps`, `domain` and
+    `priors` are as in `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power
+    that phasors show.
 
     `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
     model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
@@ -366,7 +369,10 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
-    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain}
+    model_settings = {
+        "bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain,
+        "priors": priors,
+    }  # fmt: skip
     setup = FitSpec.of(
         records, model, validate, objective, model_settings, seed=seed, budget=budget, time_limit=time_limit,
         target=target,
@@ -401,7 +407,9 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     result, fits = conclude(
         problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )
-    adequacy = graded(estimated.surprise, *errors_of(result), active_bounds(problem, uncertainty.values))
+    result = replace(result, shown_effects=dict(setup.model.shown))
+    held = active_bounds(problem, uncertainty.values, result.nuisances)
+    adequacy = graded(estimated.surprise, *errors_of(result), held)
     together = compare_events(uncertainty) if len(problem.events) > 1 else None
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
@@ -409,13 +417,28 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     starts = [s.to_dict(problem.space.names) for s in estimated.starts]
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
-    advice = advise(uncertainty, adequacy, together.odd if together else (), data=data)
+    advice = [
+        *advise(uncertainty, adequacy, together.odd if together else (), data=data),
+        *_with_priors(problem, result),
+    ]
     beside = yardstick(fits, result.model_error)
     result = replace(
         result, **fields, adequacy=adequacy.to_dict(), linear_network=beside, starts=starts,
         rival_structures=structures, advice=advice,
     )  # fmt: skip
     return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
+
+
+def _with_priors(problem: "Problem", result: Result) -> list[str]:
+    """The command that holds a motor that no load has to what machines usually are; [] where it is one, or is held."""
+    from tractexp.exchange.operating_point import OperatingPoint
+    from tractexp.identification.prior import departures
+    from tractexp.provenance import again
+
+    point = OperatingPoint.of(result)
+    if problem.priors or not (point and point.doubt) or not departures(problem, problem.defaults[None]).size:
+        return []
+    return [f"hold the motor to what machines usually are: {again('model.priors=true')}"]
 
 
 @plugin

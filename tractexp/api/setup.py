@@ -11,6 +11,7 @@ from tractexp.api.read import Dips, dips_together, event_from_dict, event_to_dic
 from tractexp.errors import check_range
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
+from tractexp.wording import shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
@@ -64,7 +65,7 @@ class Setup(Given):
         return cls(
             train=train,
             validate=held,
-            model=model_of(model, settings.get("domain")).with_(**settings),
+            model=model_of(model, settings.get("domain")).with_(**settings).fitting(train),
             objective=Choice.of("objective", objective),
             **search,
         )
@@ -78,7 +79,7 @@ class Setup(Given):
         from tractexp.identification.problem import Problem
 
         m, loss, events = self.model, self.objective.build("objective"), self.train if train is None else train
-        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss)
+        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss, priors=m.priors)
 
     @property
     def limits(self) -> "Limits":
@@ -92,7 +93,8 @@ class Setup(Given):
         problem = self.problem
         model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
-        return [*recorded(self.train, self.validate), f"{model}; {steps}"]
+        shown = [shown_in_words(self.model.shown)] if self.model.shown else []
+        return [*recorded(self.train, self.validate), f"{model}; {steps}", *shown]
 
     def search(self, optimizer: Choice, seed: int, progress: Progress) -> "SearchResult":
         """Search, and show how far that is."""

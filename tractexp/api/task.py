@@ -18,9 +18,13 @@ from tractexp.plugin import Plugin, build
 from tractexp.progress import console, say
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
-# The equations of a model, without what is known of its parameters
-LOAD = ("model.motor", "model.static", "model.effects", "model.integration", "model.domain")
-OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain")  # arguments that the model's configuration holds
+# The equations of a model, without what is known of its parameters but that they may be held to what machines are
+LOAD = (
+    "model.motor", "model.static", "model.effects", "model.shown_effects", "model.integration", "model.domain",
+    "model.priors",
+)  # fmt: skip
+# Arguments that the model's configuration holds
+OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 OMITTED: Any = object()  # of an argument: its default stands

@@ -32,9 +32,10 @@ class Identified:
 
     @cached_property
     def model(self) -> Model:
-        """In phasors, which every format is written for; the parameters are those of either domain."""
+        """In phasors, which every format is written for: there what carries the network alone is static load."""
         motor, static, effects, integration, _ = parts(self.result.model)
-        return compose(motor, static, effects, integration)
+        own = [e for e in effects if not (e.waves_only or e.name in self.result.shown_effects)]
+        return compose(motor, static, own, integration)
 
     @cached_property
     def values(self) -> dict[str, float]:
@@ -104,7 +105,7 @@ class Format(Plugin):
             ("motor", [model["motor"]["name"]], self.motors),
             ("static load", [model["static"]["name"]], self.statics),
         ]
-        chosen.append(("effect", model.get("effects", ()), self.effects))
+        chosen.append(("effect", [effect.name for effect in load.model.effects], self.effects))
         for kind, names, can in chosen:
             for name in names:
                 if can is not None and name not in can:

@@ -94,6 +94,8 @@ class OperatingPoint:
 
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
     """What speaks against an identified load as a physical one, a clause each."""
-    resting = [name for name, verdict in result.verdicts.items() if verdict.startswith(BOUND)]
+    resting = [
+        name for name, verdict in result.verdicts.items() if verdict.startswith(BOUND) and name not in result.nuisances
+    ]
     held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
     return [*([point.doubt] if point and point.doubt else []), *[held] * bool(resting)]

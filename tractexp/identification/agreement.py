@@ -32,7 +32,7 @@ class EventAgreement:
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
     likelihood = uncertainty.likelihood
-    _, J = likelihood.jacobian(uncertainty.unit)
+    _, J = likelihood.of_records.jacobian(uncertainty.unit)
     free, width = likelihood.free, uncertainty.upper - uncertainty.lower
 
     def errors(rows: np.ndarray) -> np.ndarray:
@@ -87,6 +87,6 @@ def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
     masks = np.array([parts[list(group)].any(axis=0) for group in groups])
 
     def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-        return likelihood.rows(unit) * masks[lanes]
+        return likelihood.of_records.rows(unit) * masks[lanes]
 
     return rows

@@ -25,6 +25,7 @@ from tractexp.identification.descent import Descent, descend
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.local_minima import along_least_certain, distinct, explored, screened
 from tractexp.identification.observed import Observed
+from tractexp.identification.prior import held_in_words
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
 from tractexp.identification.verdict import elsewhere
@@ -230,9 +231,30 @@ def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
 
 
 def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
-    """The minimum of Eq. (8) as the estimate."""
+    """The minimum of Eq. (8) as the estimate; with priors that of Eq. (8) and what machines usually are."""
     uncertainty = conclude(ends.likelihood, ends.best, noise)
-    return EstimationResult(with_local_minima(uncertainty, ends.near), seen, ends.starts)
+    near = ends.near
+    if ends.likelihood.problem.priors:
+        held = held_to_usual(ends.likelihood)
+        near = _held(held, near)
+        uncertainty = conclude(held, near[0], noise, [held_in_words(held.problem, held.values(near[0]))])
+    return EstimationResult(with_local_minima(uncertainty, near), seen, ends.starts)
+
+
+def held_to_usual(squares: Likelihood) -> Likelihood:
+    """The same, whose rows are in units of what is left, with a prior beside which a block of samples counts as one."""
+    problem = squares.problem
+    return replace(
+        squares, prior=np.sqrt(squares.samples / len(blocks_of(problem.events, problem.drive, squares.free)))
+    )
+
+
+def _held(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
+    """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it and the usual."""
+    space, defaults = likelihood.problem.space, likelihood.problem.defaults
+    starts = np.concatenate([near, space.to_unit(defaults)[None]])
+    ends = descend(likelihood.rows, np.concatenate([starts, explored(likelihood).unit]))
+    return distinct(ends, likelihood.free)
 
 
 def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:

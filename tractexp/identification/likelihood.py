@@ -12,6 +12,7 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.identification.descent import SeparableColumns, central_differences
+from tractexp.identification.prior import departures
 from tractexp.identification.problem import Problem
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
@@ -34,12 +35,14 @@ class Likelihood:
     """Whitened residuals of a problem. `valid` (2, N) marks the samples of P and Q that count.
 
     With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they are the means before.
+    `prior` is the weight of rows that hold the motor to what machines usually are; they come last, 0 is without.
     """
 
     problem: Problem
     noise: Noise
     valid: np.ndarray
     initial_power: bool = True
+    prior: float = 0.0
 
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
@@ -61,7 +64,12 @@ class Likelihood:
 
     def scaled(self, factor: float) -> "Likelihood":
         """The same with noise `factor` times as loud."""
-        return replace(self, noise=self.noise.scaled(factor))
+        return replace(self, noise=self.noise.scaled(factor), prior=self.prior / factor)
+
+    @property
+    def of_records(self) -> "Likelihood":
+        """The same without the rows of a prior."""
+        return replace(self, prior=0.0)
 
     @property
     def free(self) -> int:
@@ -122,7 +130,14 @@ class Likelihood:
 
     def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
         """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the lane."""
-        return self.whiten(self.residuals(unit))
+        rows = self.whiten(self.residuals(unit))
+        return np.concatenate([rows, self.prior_rows(unit)], axis=1) if self.prior else rows
+
+    def prior_rows(self, unit: np.ndarray) -> np.ndarray:
+        """How far coordinates (n, D) are from what machines usually are, (n, k); none where nothing holds them."""
+        if not self.prior:
+            return np.empty((len(unit), 0))
+        return self.prior * departures(self.problem, self.values(unit))
 
     def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whitened rows (R,) and their central differences (R, D) at one point (D,) of the unit cube."""

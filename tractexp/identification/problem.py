@@ -92,10 +92,12 @@ class Problem:
     parameters: tuple[Parameter, ...]
     fixed: dict[str, float]
     space: Box
+    defaults: np.ndarray  # (d,)
     lower: np.ndarray
     upper: np.ndarray
     per_event: tuple[str, ...]
     loss: Loss
+    priors: bool
     drive: Drive
     step: Step
 
@@ -108,13 +110,16 @@ class Problem:
         substeps: int | None = None,
         per_event: Sequence[str] = (),
         loss: Loss | None = None,
+        *,
+        priors: bool = False,
     ):
         """Raises `UserError` for unknown names and values out of range; `substeps` None means automatic.
 
         Parameters in `per_event` have a value of their own in each of several events; their columns are called
-        `T_m[1]`, `T_m[2]`, ... `loss` None means least squares.
+        `T_m[1]`, `T_m[2]`, ... `loss` None means least squares. With `priors`
+        the estimate is held to what the model's motor usually is.
         """
-        self.model = model
+        self.model, self.priors = model, priors
         self.events = self.domain.events(events)
         _check_channels(model, self.events)
         _check_power(events)
@@ -137,7 +142,7 @@ class Problem:
         if not free:
             why = "model.fixed fixes every parameter" if self.fixed else f"a {model.title} has no parameters"
             raise UserError(f"{why}; leave at least one free to identify")
-        self.space = Box.of(tuple(free))
+        self.space, self.defaults = Box.of(tuple(free)), np.array([p.default for p in free])
         self.lower, self.upper = self.space.lower, self.space.upper
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()
@@ -149,7 +154,7 @@ class Problem:
 
     def digest(self) -> str:
         """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
-        drive, free = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event)
+        drive, free = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event, self.priors)
         content = self.model.source, [repr(effect) for effect in self.model.measurements], free
         sha = hashlib.sha256(repr(content).encode())
         arrays = drive.inputs, drive.measured, drive.weights, drive.first, drive.event, drive.before

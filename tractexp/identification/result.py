@@ -3,7 +3,7 @@
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -100,6 +100,7 @@ class Result:
     bounds: dict[str, list[float]]
     model: dict[str, Any]
     before: dict[str, float]
+    shown_effects: dict[str, str] = field(default_factory=dict)  # {effect of the model that the records show: how}
     optimizer: str = ""
     search: dict[str, Any] = field(default_factory=dict)
     adequacy: dict[str, Any] = field(default_factory=dict)  # grade, sentence, p; empty where it was not judged
@@ -169,6 +170,13 @@ class Result:
         """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
         values = by_event(self.parameters, self.per_event)
         return {name: values[name] for name in self.verdicts or values}
+
+    @property
+    def nuisances(self) -> dict[str, float]:
+        """The parameters of the effects that are in the model because the records show them."""
+        _, _, effects, *_ = parts(self.model)
+        names = [p.name for effect in effects if effect.name in self.shown_effects for p in effect.parameters]
+        return {name: value for name, value in self.free.items() if name.partition("[")[0] in names}
 
     @property
     def epsilons(self) -> tuple[str, ...]:
@@ -355,9 +363,10 @@ def at_bound(problem: Problem, values: np.ndarray, share: float = 1e-3) -> list[
     return [n for n, z in zip(problem.space.names, unit, strict=True) if z < share or z > 1 - share]
 
 
-def active_bounds(problem: Problem, values: np.ndarray) -> list[str]:
-    """The same, as a sentence tells them: 'T_m at 1'."""
-    return [f"{n} at {values[problem.space.index(n)]:.4g}" for n in at_bound(problem, values)]
+def active_bounds(problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()) -> list[str]:
+    """The same without nuisances, as a sentence tells them: 'T_m at 1'."""
+    names = [name for name in at_bound(problem, values) if name not in nuisances]
+    return [f"{name} at {values[problem.space.index(name)]:.4g}" for name in names]
 
 
 def errors_of(result: Result) -> tuple[ModelError, ModelError | None]:

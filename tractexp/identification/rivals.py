@@ -100,8 +100,9 @@ def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure
     except UserError:
         return None
     likelihood = Likelihood(
-        other, uncertainty.likelihood.noise, uncertainty.likelihood.valid, uncertainty.likelihood.initial_power
-    )
+        other, uncertainty.likelihood.noise, uncertainty.likelihood.valid, uncertainty.likelihood.initial_power,
+        uncertainty.likelihood.prior,
+    )  # fmt: skip
     start = likelihood.placed(_starts(uncertainty, other))
     if uncertainty.exact:
         start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]

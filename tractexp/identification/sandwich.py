@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.identification.blocks import blocks_of, quantile
+from tractexp.identification.descent import central_differences
 from tractexp.identification.information import STRUCTURAL, Information
 from tractexp.identification.likelihood import Likelihood
 
@@ -46,16 +47,18 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     Parameters inside their bounds are told with those on a bound held there; one on a bound as if all were free,
     beyond the bounds, too.
     """
-    problem, whole = likelihood.problem, likelihood.with_initial_power
+    problem, whole = likelihood.problem, likelihood.of_records.with_initial_power
     rows, J = whole.jacobian(whole.placed(unit[None])[0])
     free, drive = likelihood.free, problem.drive
     blocks = blocks_of(problem.events, drive, free)
+    held_by = _prior_jacobian(likelihood, unit)
     shaped, rows, power = (
         J.reshape(drive.channels, -1, J.shape[1]),
         rows.reshape(drive.channels, -1),
         _of_power(whole, blocks),
     )
-    influences = lambda columns: _influences(shaped, rows, columns, free, blocks, power)  # noqa: E731
+    influences = lambda columns: _influences(shaped, rows, columns, free, blocks, power, held_by, likelihood.prior)  # noqa: E731
+    J = np.concatenate([J[:, :free], held_by])
     every = np.arange(free)
     inside = every[(unit[:free] > WALL) & (unit[:free] < 1 - WALL)]
     root, ratio = np.zeros((free, free)), np.ones(free)
@@ -63,8 +66,9 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
         held = np.setdiff1d(every, inside)
-        rows = rows - (J[:, :free] @ np.linalg.lstsq(J[:, :free], rows.ravel())[0]).reshape(rows.shape)
-        full, wider, _ = robust_root(J[:, :free], influences(every))
+        own_J = J[: rows.size]
+        rows = rows - (own_J @ np.linalg.lstsq(own_J, rows.ravel())[0]).reshape(rows.shape)
+        full, wider, _ = robust_root(J, influences(every))
         ratio[held] = wider[held]
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
@@ -73,6 +77,12 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
     )
     return Scatter(information, quantile(len(blocks)), ratio, spread)
+
+
+def _prior_jacobian(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
+    """Derivatives (k, d) of the rows of a prior, per range of each parameter."""
+    _, J = central_differences(lambda at, _: likelihood.prior_rows(at), unit[None], np.zeros(1, dtype=int))
+    return J[0].T
 
 
 def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> np.ndarray:
@@ -90,13 +100,21 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> np.ndarray:
 
 
 def _influences(
-    J: np.ndarray, rows: np.ndarray, columns: np.ndarray, free: int, blocks: Sequence[slice], power: np.ndarray
+    J: np.ndarray, rows: np.ndarray, columns: np.ndarray, free: int, blocks: Sequence[slice], power: np.ndarray,
+    held_by: np.ndarray, weight: float,
 ) -> np.ndarray:  # fmt: skip
-    """The change (G, columns) of the estimate when each block of J (C, N, D) and rows (C, N) is left out."""
+    """The change (G + k, columns) of the estimate when each block of J (C, N, D) and rows (C, N) is left out.
+
+    `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left out; each moves the
+    estimate by what one standard deviation of it does.
+    """
     own, before = J[:, :, columns], J[:, :, free:]
     flat = own.reshape(-1, len(columns))
     cross = flat.T @ before.reshape(len(flat), -1)
-    return moves_without_blocks(own, rows, blocks, flat.T @ flat, [cross @ change for change in power])
+    prior = held_by[:, columns]
+    total = flat.T @ flat + prior.T @ prior
+    moves = moves_without_blocks(own, rows, blocks, total, [cross @ change for change in power])
+    return np.concatenate([moves, weight * prior @ np.linalg.pinv(total)])
 
 
 def moves_without_blocks(

@@ -181,7 +181,7 @@ def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
 
 def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
     """How far least squares spread, by their scatter over blocks, and the likelihood that is as wide."""
-    left = float(np.sum(squares.rows(unit[None])[0] ** 2)) / max(squares.samples - len(unit), 1)
+    left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(squares.samples - len(unit), 1)
     scattered = scatter(squares.scaled(np.sqrt(left)), unit)
     likelihood = squares.scaled(np.sqrt(left) * scattered.spread)
     rows = likelihood.rows(unit[None])[0]

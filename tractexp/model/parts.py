@@ -65,10 +65,19 @@ class Motor(Part):
         The motor draws V conj(I), V = `eq.V`; the framework declares that.
         """
 
+    def usual(self, *_: Any, **parameters: Any) -> "Iterable[tuple[Any, float, float]]":
+        """What such machines usually are: (quantity, median, factor), each positive and log-normally spread.
+
+        Two machines of three have a quantity within `factor` times or over its median. Parameters are numbers or
+        arrays (n,); quantities do not depend on the base. Where `model.priors` asks for it, the estimate is held to it.
+        """
+        return ()
+
     @classmethod
     def check_class(cls, where: str) -> None:
         super().check_class(where)
         check_signature(cls, "declare", "eq", where)
+        check_signature(cls, "usual", None, where, all_taken=False)
 
 
 class Static(Part):
@@ -158,6 +167,14 @@ class Effect(Part):
 
         Asking `eq` for what a model lacks refuses the effect for that model.
         """
+
+    def shown(self, event: Any) -> str:
+        """How a recorded event shows this effect before anything is fitted, in words; "" where it does not.
+
+        A model with `shown_effects` has the effects that an event shows, as nuisances: what the fit needs to meet the
+        record, and nobody asks for. `event` is a `tractexp.record.Event`, in waveforms a `WaveEvent`.
+        """
+        return ""
 
     def refusal(self, eq: "Equations") -> str | None:
         """A reason, as a sentence, that only this effect knows why it makes no sense for the equations in `eq`.

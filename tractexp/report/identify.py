@@ -22,7 +22,7 @@ from tractexp.provenance import in_words as identity_in_words
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
-from tractexp.wording import as_sentence, epsilon, in_words
+from tractexp.wording import as_sentence, epsilon, in_words, shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.api.identify import Identification
@@ -53,7 +53,7 @@ def digits(value: float) -> str:
 def summary(fit: "Identification") -> Report:
     """What it is good for, the estimates, how well they fit, why some are not identified, and what to do next."""
     result = fit.result
-    verdicts = result.verdicts.items()
+    verdicts = own_verdicts(result).items()
     poor = [f"{name}: {verdict}" for name, verdict in verdicts if not verdict.startswith(IDENTIFIED)]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
@@ -68,7 +68,21 @@ def summary(fit: "Identification") -> Report:
 
 def machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
-    return [str(fit.operating_point)] * (fit.operating_point is not None)
+    return [*[str(fit.operating_point)] * (fit.operating_point is not None), *network(fit)]
+
+
+def network(fit: "Identification") -> list[str]:
+    """What the records show beside the load that is fitted, and its nuisances, in a sentence each; [] where nothing."""
+    result = fit.result
+    if not result.shown_effects:
+        return []
+    values = ", ".join(f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1") for n, v in result.nuisances.items())
+    return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
+
+
+def own_verdicts(result: Any) -> dict[str, str]:
+    """The verdicts without those of nuisances."""
+    return {name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances}
 
 
 def yardstick(fit: "Identification") -> list[str]:
@@ -126,12 +140,11 @@ def _of_currents(result: Any) -> str:
 
 def headline(result: Any) -> str:
     """How many of the parameters are identified, and which are not, in one sentence."""
-    poor = [f"{n} {v.partition(':')[0].partition(' (')[0]}" for n, v in result.verdicts.items()
+    verdicts = own_verdicts(result)
+    poor = [f"{n} {v.partition(':')[0].partition(' (')[0]}" for n, v in verdicts.items()
             if not v.startswith(IDENTIFIED)]  # fmt: skip
-    good = len(result.verdicts) - len(poor)
-    return (
-        f"{good} of {len(result.verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
-    )
+    good = len(verdicts) - len(poor)
+    return f"{good} of {len(verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
 
 
 def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
@@ -173,7 +186,7 @@ def parameters(fit: "Identification") -> Table:
     rows = [
         [e.name, e.about, e.value, e.unit, "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
          "{:g} .. {:g}".format(*e.bounds), e.search, brief(e.verdict)]
-        for e in fit.parameters.values()
+        for e in fit.parameters.values() if e.name not in fit.result.nuisances
     ]  # fmt: skip
     columns = ["parameter", "meaning", "value", "unit", "95 % interval", "bounds", "search ended at", "verdict"]
     caption = EXACT if fit.adequate else SCATTERED
@@ -193,7 +206,9 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
         "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
         " where the search ended.",
     )
-    poor = [f"{name}: {v}." for name, v in uncertainty.verdicts.items() if v.word != IDENTIFIED]
+    nuisances = result.nuisances
+    verdicts = uncertainty.verdicts.items()
+    poor = [f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances]
     page.items([*map(as_sentence, fit.structures), *poor])
 
 
