@@ -4,7 +4,7 @@ import functools
 import hashlib
 import re
 import subprocess
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -58,34 +58,6 @@ def folders() -> set[Path]:
     from tractexp import plugin
 
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
-
-
-def identity(record: Any) -> dict[str, Any]:
-    """The identity of a `Record`: sha256, source, base and, where another one, that of its file.
-
-    Kilovolts and MVA are null where nobody said what one per unit is.
-    """
-    in_mva = record.file_base.in_mva
-    source = {"file": record.source, **record.identity}
-    content = {"sha256": digest(record), "source": source, "base": _base(record.base, in_mva)}
-    return content | ({} if record.original_base is None else {"given_base": _base(record.original_base, in_mva)})
-
-
-def in_words(content: Mapping[str, Any]) -> str:
-    """The `identity` of a record as text: where it is from and what one per unit is; "" in early results."""
-    source, said = content.get("source", {}), []
-    said += [f"{key} {text}" * (key != "file") or text for key, text in source.items() if text]
-    for key, name in (("base", "per unit of"), ("given_base", "in the file of")):
-        base = content.get(key, {})
-        sizes = [f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)]
-        said += [f"{name} {' and '.join(sizes)}"] if sizes else []
-    return "; ".join(said)
-
-
-def _base(base: Any, in_mva: bool) -> dict[str, Any]:
-    voltage = None if base.voltage == 1.0 else base.voltage
-    power = base.power if in_mva else None
-    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
 
 
 def digest(record: Any) -> str:

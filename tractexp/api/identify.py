@@ -446,8 +446,11 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
         "fitness": (np.flatnonzero(valid), best),
         "fitness_by_simulations": at_common_steps(history.simulations[valid], best),
     }
+    searched = f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
+    if job.label:
+        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.in_sweep])
     return {
-        "name": f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
+        "name": searched,
         "values": result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
         "metrics": metrics, "curves": curves, "seconds": result.seconds, "description": fit.headline,
         "records": result.records, "model": job.folder / "result.json" if predictor else None,

@@ -17,7 +17,7 @@ from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
 from tractexp.provenance import command
-from tractexp.provenance import in_words as identity_in_words
+from tractexp.record.identity import Identity, distinct, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
@@ -81,8 +81,9 @@ def report(fit: "Identification") -> Report:
     """The page: what the summary says, and what one sees of it."""
     result, details = fit.result, fit.details
     uncertainty, together = details.uncertainty, details.agreement
-    names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
-    page = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
+    names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
+    lead = "; ".join([*map(str, distinct(of)), f"{result.optimizer}, seed {result.seed}."])
+    page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
         as_sentence(fit.headline),
         f"{as_sentence(result.acceptance)}{_of_currents(result)}",
@@ -328,7 +329,7 @@ def _origin(result: Any, command: str) -> list[list[str]]:
     rows = [["command", command]] if command else []
     rows.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
     rows += [
-        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [identity_in_words(r), f"SHA-256 {r['sha256']}"]))]
+        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [str(Identity.of(r)), f"SHA-256 {r['sha256']}"]))]
         for r in result.records
     ]
     return rows
