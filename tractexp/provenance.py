@@ -76,19 +76,35 @@ def digest(record: Any) -> str:
     return total.hexdigest()
 
 
+OF_LOAD = ("data", "model", "domain")  # groups
 _started: list[str] = []
+_placed: list[Path] = []
 
 
 def started(arguments: list[str]) -> None:
     """Remember the command line that this process was started by."""
     _started[:] = ["tractexp", *arguments]
+    _placed.clear()
 
 
-def again(*settings: str, of: Collection[str] = ("data", "model", "domain")) -> str:
+def placed(folder: Path) -> None:
+    """Remember the folder of this run, which `tractexp again` takes."""
+    here = Path.cwd()
+    _placed[:] = [folder.relative_to(here) if folder.is_relative_to(here) else folder]
+
+
+def again(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     """The command that does something else with the settings of this run in some groups: its records and its load.
 
-    The command line of a sweep has several of each, so that its jobs repeat none.
+    Whole, or by the folder of this run where that is shorter. The command line of a sweep has several of each, so that
+    its jobs repeat none.
     """
+    whole = _repeated(settings, of)
+    by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if of == OF_LOAD]
+    return min(whole, *by_folder, key=len) if by_folder else whole
+
+
+def _repeated(settings: Collection[str], of: Collection[str]) -> str:
     arguments, others = _started[1:], {setting.partition("=")[0] for setting in settings}
     if {"-m", "--multirun"} & {*arguments}:
         arguments = []
