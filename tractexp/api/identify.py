@@ -19,7 +19,7 @@ from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
-from tractexp.progress import Progress, tell
+from tractexp.progress import Progress, counter, tell
 from tractexp.wording import epsilon
 
 if TYPE_CHECKING:
@@ -120,9 +120,9 @@ class Identification(Written):
     behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: FitSpec, found: "SearchResult") -> "Identification":
+    def of(cls, setup: FitSpec, found: "SearchResult", progress: Progress = False) -> "Identification":
         """Judge what a search found."""
-        result, details = _concluded(setup, found)
+        result, details = _concluded(setup, found, progress)
         return cls(result, setup, found, details)
 
     @functools.cached_property
@@ -370,12 +370,12 @@ def identify(
     found = None
     try:
         found = setup.found(progress)
-        return Identification.of(setup, found)
+        return Identification.of(setup, found, progress)
     except KeyboardInterrupt as stop:
         raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
 
 
-def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetails]:
+def _concluded(setup: FitSpec, found: "SearchResult", progress: Progress = False) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
@@ -391,7 +391,8 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     estimated = estimate(problem, found.values)
     uncertainty = estimated.uncertainty
     if setup.check_intervals:
-        uncertainty = with_rivals(checked(uncertainty))
+        profiled = checked(uncertainty, counter("points at most on the profiles", progress))
+        uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     result, fits = conclude(
         problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )

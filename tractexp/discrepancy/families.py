@@ -41,7 +41,7 @@ def against_members(
     for k, fit in enumerate(fits[:EXAMINED]):
         if not worth(fit, tests.fit, context.criteria.family_p):
             continue
-        context.kernels.family.compile_members(fit.names, context.effort.say, whole=True)
+        context.kernels.family.compile_members(fit.names, context.effort, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit)]
@@ -57,7 +57,7 @@ def member_fits(
     if not members or not context.domain.calibrated:
         return []
     context.effort.say(f"trying {len(members)} other places and laws")
-    kernels.compile_members([m.name for m in members], context.effort.say)
+    kernels.compile_members([m.name for m in members], context.effort)
     return wide_refits(context, noise, [starts(context, member, refits) for member in members], NEAREST)
 
 

@@ -138,10 +138,11 @@ def wide_refits(
     context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
-    begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted))
+    begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted), context.effort.parts)
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
-    return best_of(itertools.chain(*each_apart(lambda starts: wide_refit(context, noise, starts, faults), again)))
+    search = lambda starts: wide_refit(context, noise, starts, faults)  # noqa: E731
+    return best_of(itertools.chain(*each_apart(search, again, context.effort.parts)))
 
 
 def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:

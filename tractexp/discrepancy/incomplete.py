@@ -93,7 +93,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
         lowered = weighed.bare.deviance - fit.deviance
         return Rival(fit, lowered, fit.cost - chosen[0].cost, 0.0, rejected=False, tests=tests)
 
-    retained = each_apart(rival, chosen)
+    retained = each_apart(rival, chosen, explained.base.context.effort.parts)
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
     return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 
@@ -138,7 +138,7 @@ def _compiled(weighed: HeldOut, sets: Iterable[Names]) -> None:
     """Compile what the tests of members of families need."""
     context = weighed.survivors.explanations.base.context
     members = [name for names in sets for name in names if name not in context.catalogue.of_load]
-    context.kernels.family.compile_members(members, context.effort.say, whole=True)
+    context.kernels.family.compile_members(members, context.effort, whole=True)
 
 
 def _assessed(predicted: ErrorPredictions, one: PredictionError) -> Assessment:

@@ -195,7 +195,7 @@ def investigate(
         )
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
-        Family(model, missing).compile(effort.say)
+        Family(model, missing).compile(effort)
 
         records = Records.of(train)
         base = base_fit(Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))

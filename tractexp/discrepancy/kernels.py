@@ -7,13 +7,14 @@ the kernel of everything. All give the same response up to rounding.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.cores import side_by_side
+from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.injection import Injection
 from tractexp.domain import domain_of
 from tractexp.identification.likelihood import Likelihood
@@ -84,22 +85,25 @@ class Family:
                     return group, False
         return (self.short, True) if load <= self.short else None
 
-    def compile(self, say: Callable[[str], None]) -> None:
+    def compile(self, effort: Effort) -> None:
         """Compile what is not in the cache yet, side by side; say what comes after it where it was long."""
         if compile_missing(
-            self._models(), lambda: say("compiling kernels, once for this base model and these channels")
+            self._models(),
+            lambda: effort.say("compiling kernels, once for this base model and these channels"),
+            effort.parts,
         ):
-            say("fitting the base model")
+            effort.say("fitting the base model")
 
     def joins(self, name: str) -> bool:
         """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
         return self.whole.acceptance(self.catalogue[name].effect).refusal is None
 
-    def compile_members(self, names: Iterable[str], say: Callable[[str], None], *, whole: bool = False) -> None:
+    def compile_members(self, names: Iterable[str], effort: Effort, *, whole: bool = False) -> None:
         """Compile what members of families need, side by side: a kernel each, or with everything where `whole`."""
         load = self.catalogue.of_load
         models = (self.with_effects((n, *load), True) if whole else self.with_effects((n,)) for n in names)
-        compile_missing(models, lambda: say("compiling kernels of families, once for this model"))
+        tell = lambda: effort.say("compiling kernels of families, once for this model")  # noqa: E731
+        compile_missing(models, tell, effort.parts)
 
     def _models(self) -> Iterator[Model]:
         """The largest first."""

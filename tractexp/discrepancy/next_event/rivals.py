@@ -46,7 +46,7 @@ def event_for(
     )  # fmt: skip
     _check(missing, named)
     with Effort(tell).audible() as effort:
-        Family(model, missing).compile(effort.say)
+        Family(model, missing).compile(effort)
         context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")

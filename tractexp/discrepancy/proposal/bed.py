@@ -3,7 +3,7 @@
 A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from tractexp.discrepancy.catalogue import Candidate, Catalogue
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.coordinates import Coordinates
+from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, shape_of
@@ -32,9 +33,10 @@ class Terms(Family):
     def key(self, names: Iterable[str], pushed: bool = False) -> Key:
         return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), pushed
 
-    def compile_kinds(self, say: Callable[[], None]) -> None:
+    def compile_kinds(self, effort: Effort) -> None:
         """Compile both kernels, side by side, where the cache lacks them."""
-        compile_missing((self.with_effects((kind,)) for kind in KINDS), say)
+        tell = lambda: effort.say("compiling the library of terms, once for this model")  # noqa: E731
+        compile_missing((self.with_effects((kind,)) for kind in KINDS), tell, effort.parts)
 
 
 def kind_of(name: str) -> str:
@@ -73,7 +75,7 @@ def context_of_terms(original: Context) -> Context:
     )  # fmt: skip
     terms = context.kernels.family
     assert isinstance(terms, Terms)
-    terms.compile_kinds(lambda: original.effort.say("compiling the library of terms, once for this model"))
+    terms.compile_kinds(original.effort)
     return context
 
 
