@@ -41,9 +41,8 @@ class Sampled(Written):
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 
-        return self.behind or sample(
-            self.fit.details.uncertainty, *(self.settings[key] for key in ("walkers", "steps", "seed"))
-        )
+        s = self.settings
+        return self.behind or sample(self.fit.details.uncertainty, s["walkers"], s["steps"], s["seed"])
 
     @property
     def draws(self) -> dict[str, np.ndarray]:
