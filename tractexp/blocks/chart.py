@@ -6,18 +6,15 @@ along. Nothing is drawn here and that package is not imported, so that a page co
 
 import base64
 import functools
-import importlib.util
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tractexp import quoting
-from tractexp.blocks import style
-from tractexp.errors import UserError
+from tractexp.blocks import plotly, style
 
 MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
@@ -162,20 +159,11 @@ addEventListener("beforeprint", () => charts.forEach(chart => chart.data && Plot
 """
 
 
-def library() -> Path:
-    """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
-    spec = importlib.util.find_spec("plotly")
-    for folder in (spec and spec.submodule_search_locations) or ():
-        if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
-            return path
-    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
-
-
 @functools.cache
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = DRAW.replace("SETTINGS", json.dumps(SETTINGS)).replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
-    return library().read_text(encoding="utf-8") + "\n" + drawing
+    return plotly.code() + "\n" + drawing
 
 
 class Chart:
