@@ -20,7 +20,7 @@ from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
-from tractexp.wording import epsilon
+from tractexp.wording import epsilon, joined
 
 if TYPE_CHECKING:
     from tractexp.exchange.operating_point import OperatingPoint
@@ -300,7 +300,17 @@ class Identification(Written):
         end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
         errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
         end += f" {self.result.objective:.4g}), {errors},"
-        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s"
+        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s{self._apart}"
+
+    @property
+    def _apart(self) -> str:
+        """Where the search's end differs from the estimate, as the end of a sentence; "" where it does not."""
+        if not (away := self.astray):
+            return ""
+        ratio = self.result.search["objective"] / self.result.objective if self.result.objective else float("inf")
+        why = f"it stopped short of the minimum, at {ratio:.3g} times its objective" if ratio > 1 else "it is elsewhere"
+        lie = "lies" if len(away) == 1 else "lie"
+        return f"; its {joined(away)} {lie} outside the 95 % interval of the estimate: {why}"
 
     def to_dict(self) -> dict[str, Any]:
         found = None if self.found is None else asdict(self.found)

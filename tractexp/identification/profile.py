@@ -17,7 +17,16 @@ import numpy as np
 
 from tractexp.identification.descent import descend
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, ParameterVerdict, size
+from tractexp.identification.verdict import (
+    BOUND,
+    IDENTIFIED,
+    PROFILED,
+    UNIDENTIFIED,
+    WEAK,
+    WITHIN,
+    ParameterVerdict,
+    size,
+)
 from tractexp.progress import Counting, uncounted
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
@@ -101,7 +110,6 @@ def revised(
     So is another valley, `elsewhere`.
     """
     a, b = profile.interval
-    detail = "; ".join([f"profile {a:.4g} .. {b:.4g}", *([profile.verdict] if profile.verdict else [])])
     if verdict.word == UNIDENTIFIED and "leave the record unchanged" in verdict.detail:
         return verdict
     value = (a + b) / 2
@@ -114,7 +122,8 @@ def revised(
         word = WEAK
     else:
         word = IDENTIFIED
-    return ParameterVerdict(word, f"{verdict.detail}; {detail}")
+    detail = "; ".join(filter(None, (verdict.detail, profile.verdict)))
+    return ParameterVerdict(word, detail, f"{a:.4g} .. {b:.4g} {PROFILED}")
 
 
 def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:

@@ -65,7 +65,8 @@ def _moved(uncertainty: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterat
             abs(far - value) <= WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j]),
         )
         word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
-        yield name, ParameterVerdict(word, f"{verdict.detail}; with {by} it is {far:.4g}")
+        there = f"with {by} it is {far:.4g}"
+        yield name, replace(verdict, word=word, detail="; ".join(filter(None, (verdict.detail, there))))
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
