@@ -16,6 +16,7 @@ from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
+from tractexp.report import unfitted
 from tractexp.wording import as_sentence, change, degrees, figure, share
 
 MOST = 400_000  # samples of waveforms that a page holds: a megabyte
@@ -105,6 +106,7 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
         page.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
+        page.items([as_sentence(said) for said in unfitted.sentences([entry])])
     else:
         page.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
         for name, command in commands:
