@@ -46,3 +46,4 @@ def test_mlflow_has_one_experiment_for_a_station_and_names_load_dip_and_model(jo
     with closing(sqlite3.connect(job[0] / "outputs" / "mlflow.db")) as base:
         assert ("station synthetic stand-in; not measured",) in base.execute("select name from experiments").fetchall()
         assert base.execute("select name from runs").fetchall() == [(f"{LOAD}, dip 1, third_order_exponential",)]
+        assert ("load", f"{LOAD}, dip 1") in base.execute("select key, value from tags").fetchall()

@@ -190,8 +190,9 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     told = list(dict.fromkeys(map(_source, flat)))
     with staged(progress) as stage:
         views = []
-        for source in told:
-            stage(f"reading {source if isinstance(source, str) else source.name}")
+        for k, source in enumerate(told, start=1):
+            of = f"{k} of {len(told)}: " * (len(told) > 1)
+            stage(f"reading {of}{source if isinstance(source, str) else source.name}")
             views.append(_view(source, settings))
         stage("measuring the quality of the channels")
         content = files.plain({"files": [_content(view) for view in views]})

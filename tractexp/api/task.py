@@ -25,6 +25,7 @@ SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the set
 LOAD = ("model.motor", "model.static", "model.effects", "model.integration")
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain")  # arguments that the model's configuration holds
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
+LABEL = "load"  # the tag with station, load and dips
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 OMITTED: Any = object()  # of an argument: its default stands
 R = TypeVar("R")
@@ -323,12 +324,12 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
-        parts |= {"variant": self.variant, "seed": str(self.seed)}
+        parts |= {"variant": self.variant, "seed": str(self.seed), LABEL: self.label}
         run = tracking.TrackedRun(
             experiment=self.experiment,
             name=", ".join(filter(None, (self.label, name))),
             parameters={**tracking.flatten(self.config), **values},
-            tags={**parts, "git_commit": provenance.commit()},
+            tags={key: text for key, text in parts.items() if text} | {"git_commit": provenance.commit()},
             parent=self.sweep,
             **content,
         )

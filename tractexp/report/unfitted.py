@@ -21,8 +21,8 @@ DIPS = (
     " is fitted), with 0.2 s and more before it and 1 s after"
 )
 AMBIENT = (
-    "from a change of taps, or ten minutes of RMS values each second, the same exponents follow as slopes of ln P and"
-    " ln Q over ln U"
+    "static exponents follow from a change of taps before and after, and from ten minutes of RMS values each second as"
+    " slopes of ln P and ln Q over ln U"
 )
 
 
