@@ -41,8 +41,8 @@ class QuietNoise:
         off = [_at_voltage(context, context.records.off_by(k), unit) - calm for k in range(most)]
         return cls(context, np.nan_to_num(np.array(off)))
 
-    def of_fit(self, unit: np.ndarray, names: Sequence[str] | None = None) -> Noise:
-        """The noise of the quiet residuals at coordinates (D,), of a fit with these effects, by default of any."""
+    def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
+        """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
         return self.of(unit, self.context.residuals(unit[None], names)[0])
 
     def of(

@@ -53,18 +53,15 @@ class Survivors:
 
 def survivors(explained: Explanations, seed: int) -> Survivors:
     """Test every refitted set of the chosen size against the chosen one."""
-    everyone, last, context = rivals(explained), explained.last, explained.base.context
+    everyone, last = rivals(explained), explained.last
     left = [r for r in everyone if not r.rejected][:MOST]
-    members = [n for r in left[1:] for n in r.fit.names if n not in context.catalogue.of_load]
-    if members:
-        context.kernels.family.compile_members(members, context.effort, whole=True)
 
     def tested(k: int) -> Rival:
         fit = left[k].fit
         tests = last if k == 0 else examined(explained.base.quiet, fit, last.noise, seed + 100 + k, plain=True)
         return replace(left[k], tests=tests)
 
-    retained = each_apart(tested, range(len(left)), context.effort.parts)
+    retained = each_apart(tested, range(len(left)), explained.base.context.effort.parts)
     by_name = {r.fit.names: r for r in retained}
     return Survivors(explained, tuple(retained), tuple(by_name.get(r.fit.names, r) for r in everyone))
 
