@@ -310,7 +310,7 @@ class Identification(Written):
         ratio = self.result.search["objective"] / self.result.objective if self.result.objective else float("inf")
         why = f"it stopped short of the minimum, at {ratio:.3g} times its objective" if ratio > 1 else "it is elsewhere"
         lie = "lies" if len(away) == 1 else "lie"
-        return f"; its {joined(away)} {lie} outside the 95 % interval of the estimate: {why}"
+        return f"; its {joined(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
         found = None if self.found is None else asdict(self.found)
