@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 # The equations of a model, without what is known of its parameters
-LOAD = ("model.motor", "model.static", "model.effects", "model.integration")
+LOAD = ("model.motor", "model.static", "model.effects", "model.integration", "model.domain")
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain")  # arguments that the model's configuration holds
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
 LABEL = "load"  # the tag with station, load and dips

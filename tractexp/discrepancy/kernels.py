@@ -20,6 +20,7 @@ from tractexp.identification.problem import Problem
 from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
+from tractexp.noise import Noise
 from tractexp.record import Event
 
 Key = tuple[frozenset[str], bool]  # load effects, and whether the other effects and the pushes are beside them
@@ -133,4 +134,7 @@ class Kernels:
 
     def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
         before = len(self._column) + np.arange(2 * len(self.events))
-        return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)
+        unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
+        return Likelihood.of(problem, unweighted), np.r_[[self._column[n] for n in problem.space.names], before].astype(
+            int
+        )
