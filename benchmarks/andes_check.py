@@ -9,19 +9,16 @@ import argparse
 import importlib.util
 import json
 import os
-import subprocess
 import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
-from tractexp import files
 from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import build, get
+from tractexp_plugins.formats.andes import respond
 
 CAGES = {"rs": 1e-6, "xs": 0.1, "xm": 3.0, "rr1": 0.02, "xr1": 0.12, "Hm": 0.9, "c1": 0.5, "c2": 0.0, "c3": 0.0}
 MOTORS = {"Motor3": ("electromechanical", CAGES), "Motor5": ("double_cage", CAGES | {"rr2": 0.1, "xr2": 0.2})}
@@ -43,7 +40,6 @@ STATICS = {
 }  # fmt: skip
 FREQUENCY = 50.0
 OMEGA = 2 * np.pi * FREQUENCY
-GENERATED = Path.home() / ".andes"  # the folder of that code
 
 
 def interpreter() -> str | None:
@@ -61,22 +57,12 @@ def dip(step: float, length: float = 1.2, depth: float = 0.4) -> np.ndarray:
 
 
 def andes(tables: dict, voltage: np.ndarray, step: float) -> dict[str, np.ndarray]:
-    """Response of a load's tables in ANDES (see andes_run.py)."""
+    """Response of a load's tables in ANDES (see plugins/formats/_andes_run.py)."""
     python = interpreter()
     if python is None:
         raise SystemExit("ANDES is not installed here; name a Python that has it in TRACTEXP_ANDES_PYTHON")
-    with tempfile.TemporaryDirectory() as folder:
-        load, played, target = (Path(folder) / name for name in ("load.json", "dip.json", "response.npz"))
-        load.write_text(json.dumps(tables))
-        played.write_text(json.dumps({"step": step, "frequency": FREQUENCY, "voltage": voltage.tolist()}))
-        program = Path(__file__).with_name("andes_run.py")
-        GENERATED.mkdir(exist_ok=True)
-        with files.held(GENERATED / "tractexp.lock", 300):
-            done = subprocess.run([python, program, load, played, target], capture_output=True, text=True)
-        if done.returncode:
-            raise RuntimeError(f"ANDES: {done.stderr[-2000:]}{done.stdout[-2000:]}")
-        with np.load(target) as content:
-            return dict(content)
+    told = {"step": step, "frequency": FREQUENCY, "voltage": voltage.tolist()}
+    return respond(python, json.dumps(tables), told)
 
 
 def ours(model, parameters: dict, theirs: dict, step: float) -> tuple[np.ndarray, np.ndarray]:

@@ -192,7 +192,7 @@ def simulate(load: Load, fault: Fault) -> dict[str, np.ndarray]:
 
     The static load's terms (power, current, impedance) are beside them. RuntimeError where ANDES does not converge.
     """
-    from andes_run import start_running
+    from tractexp_plugins.formats._andes_run import start_running
 
     case = system(load, fault)
     motor = getattr(case, load.kind)

@@ -83,6 +83,10 @@ def _asked(arguments: list[str]) -> int:
         credentials.check(key if equals else "what is given", argument)
     if arguments[:1] and (place := COMMANDS.get(arguments[0])):
         return _command(place, arguments[1:])
+    if arguments[:1] == ["again"]:
+        from tractexp.cli.again import again
+
+        return _run(again(arguments[1:]))
     if arguments[:1] and _is_file(arguments[0]):
         return _command(COMMANDS["look"], arguments)
     if {"--help", "-h"} & {*arguments}:

@@ -9,7 +9,7 @@ import itertools
 import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
 from tractexp.wording import one_line, shown
@@ -19,6 +19,14 @@ FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after s
 BLINK = 0.15  # s between two pictures of a bar in a notebook
 
 Progress = Callable[[str], None] | bool | None  # of a call: None shows it, False does not, a callable gets each line
+
+
+Counting = AbstractContextManager[Callable[[], None]]  # gives what is to be called at the end of each part
+
+
+def uncounted(total: int) -> Counting:
+    """Nobody counts the parts."""
+    return nullcontext(lambda: None)
 
 
 @functools.cache
@@ -97,15 +105,20 @@ def counting(what: str, total: int, progress: Progress = None) -> Iterator[Calla
     yield count
 
 
+def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
+    """`counting` of as many parts as will be said; a callable, which is told what begins, is told of none."""
+    return lambda total: counting(what, total, None if callable(progress) else progress)
+
+
 @contextmanager
 def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
     """Yield a function for the lines of the stages: the newest stands on a live line; a log file has each."""
-    from rich.progress import TextColumn, TimeElapsedColumn
+    from rich.progress import SpinnerColumn, TextColumn
 
     if callable(progress) or progress is False:
         yield progress or (lambda line: None)
     elif _lively():
-        with _live([TimeElapsedColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage="") as update:
+        with _live([SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage="") as update:
             yield lambda line: update(stage=one_line(line))
     else:
         yield lambda line: say(f"  {line}")

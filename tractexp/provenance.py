@@ -4,7 +4,7 @@ import functools
 import hashlib
 import re
 import subprocess
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -60,34 +60,6 @@ def folders() -> set[Path]:
     return {PACKAGE, *(Path(path) for package in plugin.packages() for path in package.__path__)}
 
 
-def identity(record: Any) -> dict[str, Any]:
-    """The identity of a `Record`: sha256, source, base and, where another one, that of its file.
-
-    Kilovolts and MVA are null where nobody said what one per unit is.
-    """
-    in_mva = record.file_base.in_mva
-    source = {"file": record.source, **record.identity}
-    content = {"sha256": digest(record), "source": source, "base": _base(record.base, in_mva)}
-    return content | ({} if record.original_base is None else {"given_base": _base(record.original_base, in_mva)})
-
-
-def in_words(content: Mapping[str, Any]) -> str:
-    """The `identity` of a record as text: where it is from and what one per unit is; "" in early results."""
-    source, said = content.get("source", {}), []
-    said += [f"{key} {text}" * (key != "file") or text for key, text in source.items() if text]
-    for key, name in (("base", "per unit of"), ("given_base", "in the file of")):
-        base = content.get(key, {})
-        sizes = [f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)]
-        said += [f"{name} {' and '.join(sizes)}"] if sizes else []
-    return "; ".join(said)
-
-
-def _base(base: Any, in_mva: bool) -> dict[str, Any]:
-    voltage = None if base.voltage == 1.0 else base.voltage
-    power = base.power if in_mva else None
-    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
-
-
 def digest(record: Any) -> str:
     """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
     if record.digest:
@@ -104,19 +76,35 @@ def digest(record: Any) -> str:
     return total.hexdigest()
 
 
+OF_LOAD = ("data", "model", "domain")  # groups
 _started: list[str] = []
+_placed: list[Path] = []
 
 
 def started(arguments: list[str]) -> None:
     """Remember the command line that this process was started by."""
     _started[:] = ["tractexp", *arguments]
+    _placed.clear()
 
 
-def again(*settings: str, of: Collection[str] = ("data", "model", "domain")) -> str:
+def placed(folder: Path) -> None:
+    """Remember the folder of this run, which `tractexp again` takes."""
+    here = Path.cwd()
+    _placed[:] = [folder.relative_to(here) if folder.is_relative_to(here) else folder]
+
+
+def again(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     """The command that does something else with the settings of this run in some groups: its records and its load.
 
-    The command line of a sweep has several of each, so that its jobs repeat none.
+    Whole, or by the folder of this run where that is shorter. The command line of a sweep has several of each, so that
+    its jobs repeat none.
     """
+    whole = _repeated(settings, of)
+    by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if of == OF_LOAD]
+    return min(whole, *by_folder, key=len) if by_folder else whole
+
+
+def _repeated(settings: Collection[str], of: Collection[str]) -> str:
     arguments, others = _started[1:], {setting.partition("=")[0] for setting in settings}
     if {"-m", "--multirun"} & {*arguments}:
         arguments = []

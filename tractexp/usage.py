@@ -42,6 +42,7 @@ The commonest
       identify a load from a dip (columns t,U,P,Q): how well it fits, how sure each parameter is
   tractexp task=discrepancy data=csv 'data.train=[dip1.csv,dip2.csv]' 'data.validate=[dip3.csv]'
       name the effect that the model lacks, and show the gap shrink
+  tractexp again RUN_FOLDER task=discrepancy         an earlier run with other settings on top
   tractexp ui
       look at everything that was logged, in a browser on this computer only
   tractexp doctor

@@ -13,7 +13,7 @@ from tractexp.plugin import discover
 
 DOCS = Path(__file__).parents[1]
 MOST = 8  # examples on a page
-SUBCOMMANDS = ("look", "list", "new", "ui", "sync", "doctor")  # which are no tasks
+SUBCOMMANDS = ("look", "again", "list", "new", "ui", "sync", "doctor")  # which are no tasks
 
 
 def write(folder: Path) -> list[Path]:

@@ -1,12 +1,23 @@
 """ANDES case file."""
 
+import contextlib
+import importlib.util
 import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
 
-from tractexp.extend import plugin
-from tractexp.extend.formats import Format
+from tractexp.extend import UserError, plugin
+from tractexp.extend.formats import Format, Simulated, TCircuit, dip, held
 
-SMALLEST = 1e-6  # pu: ANDES reads a resistance of 0 as "not given" and takes 0.01
+from ._motor import SMALLEST, restored
+
 SYSTEM = 100.0  # MVA, the system base of ANDES
+STEP = 1e-3  # s
+LONGEST = 300.0  # s: its first run on a machine generates code, and one process at a time does
+GENERATED = Path.home() / ".andes"  # the folder of that code
 
 
 @plugin
@@ -14,9 +25,9 @@ class Andes(Format):
     """Tables of an ANDES case in JSON: the bus, the motor, and the static load with the PQ it replaces.
 
     `electromechanical`, and `stator_flux` without its transients, is Motor3 and `double_cage` Motor5, on a machine base
-    equal to that of the export, with constant load torque (c1 = T_m) and the T-circuit of `tractexp.exchange.circuit`;
-    `exponential` and `exponential_frequency` are FLoad, the other static loads ZIP. Add the tables to a case and
-    connect the bus.
+    equal to that of the export, with constant load torque (c1, which ANDES reads per unit of the system) and the
+    T-circuit of `tractexp.exchange.circuit`; `exponential` and `exponential_frequency` are FLoad, the other static
+    loads ZIP. Add the tables to a case and connect the bus.
 
     Not to be confused with a complete case: there is no source in it.
 
@@ -30,7 +41,7 @@ class Andes(Format):
     effects = ("stator_resistance",)
 
     def text(self, load):
-        bus = {"idx": load.bus, "name": "traction load", "Vn": load.voltage, "v0": load.before["U0"]}
+        bus = {"idx": load.bus, "name": load.name, "Vn": load.voltage, "v0": load.before["U0"]}
         tables = {"Bus": [bus]}
         if "P_motor" in load.before:
             tables |= self._motor(load)
@@ -43,12 +54,41 @@ class Andes(Format):
         start = "ANDES starts its power flow at standstill; where it does not converge, start the motor"
         return [*([f"{start} at the slip {slip:.5g}"] if slip else []), *self.omissions(load)]
 
+    def read_back(self, text, load):
+        tables, motor, static = json.loads(text), None, (0.0, 0.0)
+        for row in (*tables.get("Motor3", ()), *tables.get("Motor5", ())):
+            circuit = TCircuit(load.omega_n, *(row.get(key) for key in ("rs", "xs", "xm", "rr1", "xr1", "rr2", "xr2")))
+            motor = circuit, row["Hm"], row["c1"] * SYSTEM / load.power
+        for row in tables.get("PQ", ()):
+            static = tuple(SYSTEM / load.power * row[key] for key in ("p0", "q0"))
+        law = {}
+        for row in tables.get("FLoad", ()):
+            law |= {"p_v": row["ap"], "q_v": row["aq"], "p_f": row["bp"], "q_f": row["bq"]}
+        for row in tables.get("ZIP", ()):
+            law |= {"a_Z": row["kpz"], "a_I": row["kpi"], "b_Z": row["kqz"], "b_I": row["kqi"]}
+            law = {name: percent / 100 for name, percent in law.items()}
+        return restored(load, motor, law, static)
+
+    def simulated(self, text, load):
+        """The response in ANDES, in a process of its own: of this Python, or of the one in TRACTEXP_ANDES_PYTHON."""
+        import numpy as np
+
+        python = sys.executable if importlib.util.find_spec("andes") else os.environ.get("TRACTEXP_ANDES_PYTHON")
+        if not python:
+            return None
+        told = {"step": STEP, "frequency": load.result.before["frequency"], "voltage": dip(STEP).tolist()}
+        found = respond(python, text, told)
+        speed = np.gradient(found["angle"], STEP, edge_order=2)
+        P, Q = (SYSTEM / load.power * found[power] for power in "PQ")
+        return Simulated(f"ANDES {found['version']}", STEP, found["U"], speed, P, Q)
+
     def _motor(self, load):
         c = load.circuit
         row = {
             "idx": "motor", "bus": load.bus, "Sn": load.power, "Vn": load.voltage,
             "fn": load.result.before["frequency"], "rs": max(c.R_s, SMALLEST), "xs": c.X_s, "xm": c.X_m,
-            "rr1": c.R_1, "xr1": c.X_1, "Hm": load.inertia, "c1": load.values["T_m"], "c2": 0.0, "c3": 0.0,
+            "rr1": c.R_1, "xr1": c.X_1, "Hm": load.inertia,
+            "c1": load.values["T_m"] * load.power / SYSTEM, "c2": 0.0, "c3": 0.0,
         }  # fmt: skip
         if c.X_2 is None:
             return {"Motor3": [row]}
@@ -68,3 +108,29 @@ class Andes(Format):
         a_Z, a_I, b_Z, b_I = shares or (value(name) for name in ("a_Z", "a_I", "b_Z", "b_I"))
         named = {"kpz": a_Z, "kpi": a_I, "kpp": 1 - a_Z - a_I, "kqz": b_Z, "kqi": b_I, "kqp": 1 - b_Z - b_I}
         return {"PQ": [pq], "ZIP": [{"idx": "law", "pq": "static", **{k: 100.0 * v for k, v in named.items()}}]}
+
+
+def respond(python, tables, told):
+    """What ANDES has the load of these tables draw along a dip: U, angle, P, Q (N,), P and Q on its base.
+
+    Raises `UserError` where it fails.
+    """
+    import numpy as np
+
+    with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
+        load, played, target = (Path(folder) / name for name in ("load.json", "dip.json", "response.npz"))
+        load.write_text(tables)
+        played.write_text(json.dumps(told))
+        program = Path(__file__).with_name("_andes_run.py").read_text(encoding="utf-8")
+        try:
+            GENERATED.mkdir(exist_ok=True)
+            stack.enter_context(held(GENERATED / "tractexp.lock", LONGEST))
+            command = [python, "-c", program, load, played, target]  # by its text: this module has ANDES's own name
+            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, cwd=folder)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise UserError(f"not played back in ANDES: {error}") from error
+        if done.returncode:
+            last = (done.stderr or done.stdout).strip().rpartition("\n")[2]
+            raise UserError(f"not played back in ANDES: {last or 'it said nothing'}")
+        with np.load(target) as content:
+            return dict(content)

@@ -3,7 +3,7 @@
 import re
 
 from tractexp.extend import UserError, plugin
-from tractexp.extend.formats import Format, quoting
+from tractexp.extend.formats import Format, Restored, quoting
 
 
 @plugin
@@ -51,6 +51,14 @@ class Modelica(Format):
         lines += [f"  Real {symbol};" for symbol in eq.steps]
         lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
         return "\n".join(lines) + "\n"
+
+    def read_back(self, text, load):
+        told = {name: float(value) for name, value in re.findall(r"parameter Real (\w+) = ([-+.\de]+) ", text)}
+        model = {key: load.result.model[key] for key in ("motor", "static", "effects", "integration")
+                 if key in load.result.model}  # fmt: skip
+        parameters = {p.name: told[p.name] for p in load.model.parameters}
+        static = load.before.get("P_static", 0.0), load.before.get("Q_static", 0.0)
+        return Restored(model, parameters, static)
 
 
 RECORD = "the record's base"  # as parameters tell what they are on

@@ -1,7 +1,9 @@
 """PSS/E dynamics data: CIM5BL and IEELBL."""
 
 from tractexp.extend import plugin
-from tractexp.extend.formats import Format
+from tractexp.extend.formats import Format, TCircuit
+
+from ._motor import restored
 
 
 @plugin
@@ -50,6 +52,29 @@ class PsseDyr(Format):
                 P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")
                 lines.append(f"load '{identifier}' of bus {load.bus} in the power flow: {P:.6g} MW, {Q:.6g} Mvar")
         return lines
+
+    def read_back(self, text, load):
+        motor, law, static = None, {}, (0.0, 0.0)
+        for record in text.split("/")[:-1]:
+            _, model, _, *rest = (field.strip() for field in record.replace("\n", " ").split(","))
+            c = [float(constant) for constant in rest]
+            if model == "'CIM5BL'":
+                cages = c[4:6] + (c[6:8] if c[7] else [None, None])
+                motor = TCircuit(load.omega_n, *c[1:4], *cages), c[14], load.values["T_m"]
+            else:
+                static = load.before["P_static"], load.before["Q_static"]  # in the power flow: see the notes
+                law = self._law(load, c)
+        return restored(load, motor, law, static)
+
+    def _law(self, load, c):
+        """Parameters of the static load from the constants of its record."""
+        static, U0 = load.result.model["static"]["name"], load.before["U0"]
+        if static == "exponential":
+            return {"p_v": c[8], "q_v": c[11]}
+        if static == "zip":
+            shares = [c[k] * U0 ** c[8 + k] for k in range(6)]
+            return dict(zip(("a_Z", "a_I", "b_Z", "b_I"), (*shares[0:2], *shares[3:5]), strict=True))
+        return {}
 
     def _terms(self, load):
         """Three (coefficient, exponent) for P, then for Q, in powers of U/U_0."""

@@ -263,8 +263,8 @@ def test_an_interval_that_reaches_past_the_bounds_says_so():
     )
     half = np.array([0.02])
     inside, past = (judge(information, np.array([0.0]), np.array([upper]), half, 1.96)["T_m"] for upper in (1.0, 0.51))
-    assert (inside.word, inside.detail) == (IDENTIFIED, "± 4 %")
-    assert (past.word, past.detail) == (IDENTIFIED, "± 4 %; the interval reaches past its bounds")
+    assert str(inside) == f"{IDENTIFIED} (± 4 %)"
+    assert str(past) == f"{IDENTIFIED} (± 4 %; the interval reaches past its bounds)"
 
 
 def test_stator_transients_the_model_lacks_are_noticed():

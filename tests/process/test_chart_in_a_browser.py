@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from browser import BROWSER, Worked, drawn
 
-from tractexp.blocks import Report
+from tractexp.blocks import Report, plotly
 from tractexp.blocks.block import Markup
-from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart import Chart, script
 
 BLUE = "#0072B2"
 
@@ -44,6 +44,23 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     widths = [float(w) for w in re.findall(r'class="main-svg"[^>]*?width="([\d.]+)"', dom)]
     assert widths
     assert max(widths) <= width
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_a_chart_is_drawn_by_the_parts_of_the_library_as_by_the_whole(tmp_path, monkeypatch):
+    x = np.linspace(0, 1, 50)
+    chart = Chart("t [s]", ["U", "P"]).line("U", x, x**2, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1).edge(0.2)
+    bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE)
+    page, drawings = Report("charts").charts([chart, bars], "two"), []
+    for code in (plotly.code(), plotly.library().read_text(encoding="utf-8")):
+        monkeypatch.setattr(plotly, "code", lambda code=code: code)
+        script.cache_clear()
+        dom, complaints = drawn(page, tmp_path)
+        assert complaints == []
+        drawings.append(re.findall(r' d="([^"]+)"', re.sub(r"(?s)<script>.*?</script>", "", dom)))
+    script.cache_clear()
+    assert len(drawings[0]) > 20
+    assert drawings[0] == drawings[1]
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")

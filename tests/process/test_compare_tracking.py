@@ -29,7 +29,7 @@ EXPERIMENT = "identify tibet_50pct"
 SCREENSHOT = Path(__file__).parents[2] / "outputs" / "mlflow_comparison.png"
 
 
-def log(uri, run, parent=None, variant=None):
+def log(uri, run, parent=None, variant=None, **tags):
     """Log a run as `task=identify` does: the estimate, half as far off as the search that it is polished from."""
     ended = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
     ended |= {"seconds": run.seconds[-1], "simulations": run.simulations[-1]}
@@ -50,6 +50,7 @@ def log(uri, run, parent=None, variant=None):
             "data": run.data,
             "seed": str(run.seed),
             "variant": variant,
+            **tags,
         },
         parent=parent,
     )
@@ -159,10 +160,10 @@ def test_a_run_that_failed_in_mlflow_is_a_failure(filled):
         load.from_logged([], "the filter")
 
 
-def viewed(uri):
+def viewed(uri, mode="CHART"):
     """The view that is stored in the newest experiment."""
     page = comparison_view(uri)
-    experiment = re.fullmatch(r"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode=CHART", page)[1]
+    experiment = re.fullmatch(rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}", page)[1]
     from mlflow import MlflowClient
 
     kind, _, packed = MlflowClient(uri).get_experiment(experiment).tags[TAG].partition(";")
@@ -183,6 +184,22 @@ def test_the_view_groups_by_variant_and_draws_fitness_curves(filled):
     columns = [name.strip("`") for name in state["selectedColumns"]]
     for name in ("objective", "epsilon_p", "epsilon_q", "search_objective"):
         assert f"metrics.`{name}" in columns
+
+
+def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error(uri):
+    """Averages over loads would mean nothing."""
+    for run, feeder in zip(
+        samples({"issa": 1.0}, seeds=range(2)), ("North, T1, dip 1", "North, T2, dip 1"), strict=True
+    ):
+        log(uri, run, load=feeder)
+    assert comparison_view(uri).endswith("&compareRunsMode=TABLE")
+    state = viewed(uri, "TABLE")
+    assert state["groupBy"] is None
+    assert state["orderByKey"] == "metrics.`model_error`"
+    assert [column.split("`")[1] for column in state["selectedColumns"]][:4] == [
+        "model_error", "model_error_held_out", "epsilon_p", "epsilon_q",
+    ]  # fmt: skip
+    assert "tags.`load`" in state["selectedColumns"]
 
 
 def test_two_settings_of_one_optimizer_are_two_groups_of_the_view(uri):

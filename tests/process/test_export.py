@@ -12,9 +12,13 @@ from command_line import run_command
 from scipy.integrate import solve_ivp
 from scipy.interpolate import Akima1DInterpolator
 
+import tractexp
+from tractexp.api.export import Exported
+from tractexp.api.identify import Identification
 from tractexp.errors import UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Identified
+from tractexp.exchange.playback import played
 from tractexp.model.drive import Drive, Excitation
 from tractexp.plugin import build, discover
 
@@ -59,6 +63,8 @@ def test_the_circuit_of_two_cages_gives_back_what_was_identified(seed):
     T, X, C = rng.uniform(0.01, 0.5), rng.uniform(0.05, 1.5), rng.uniform(0.3, 0.99)
     T2, X2 = rng.uniform(0.001, 0.05), X * rng.uniform(0.05, 0.98)
     c = TCircuit.double(T, X, C, T2, X2, OMEGA)
+    known = {"T_prime": T, "X_prime": X, "C": C, "T_second": T2, "X_second": X2}
+    assert c.parameters() == pytest.approx(known, rel=1e-9)
     assert pytest.approx(X / (1 - C), rel=1e-9) == c.X
     assert c.X_prime == pytest.approx(X, rel=1e-9)
     assert c.X_second == pytest.approx(X2, rel=1e-9)
@@ -91,6 +97,7 @@ def test_the_andes_tables_hold_the_load(motor, static):
     assert tables["PQ"][0]["p0"] == pytest.approx((1.0 - drawn) / 2, rel=1e-9)  # 50 MVA on ANDES's 100
     if motor == "electromechanical":
         assert tables["Motor3"][0]["Hm"] == pytest.approx(0.006 * OMEGA / 2)
+        assert tables["Motor3"][0]["c1"] == pytest.approx(VALUES["T_m"] / 2)  # ANDES does not convert it
 
 
 def dyr(text):
@@ -223,7 +230,8 @@ def test_every_format_says_how_it_reads_its_standard():
 
 def test_the_command_writes_one_file_or_nothing(tmp_path):
     identified().result.write(tmp_path / "result.json")
-    for name, suffix in (("andes", "json"), ("psse_dyr", "dyr"), ("modelica", "mo")):
+    formats = (("andes", "json"), ("psse_dyr", "dyr"), ("modelica", "mo"), ("powerfactory", "dgs"))
+    for name, suffix in formats:
         done = run_command("task=export", "task.parameters=result.json", f"task.format={name}", f"hydra.run.dir={name}",
                         cwd=tmp_path)  # fmt: skip
         assert done.returncode == 0, done.stderr
@@ -241,6 +249,137 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
         assert sentence in done.stderr
         assert done.stderr.count("\n") == 1
         assert not (tmp_path / "none").exists()
+
+
+def dgs(text):
+    """{class: rows} of a DGS text, by its own rules: a head of columns and their kinds, then a row a line."""
+    tables, rows, columns = {}, [], []
+    for line in text.splitlines():
+        if line.startswith("$$"):
+            name, *columns = line[2:].split(";")
+            rows = tables.setdefault(name, [])
+        elif not line.startswith("*"):
+            cells = line.split(";")
+            assert len(cells) == len(columns)
+            kinds = {"i": int, "r": float, "p": str, "a": str}
+            heads = [re.fullmatch(r"([\w:]+)\(([irpa])(?::\d+)?\)", column) for column in columns]
+            rows.append({h[1]: kinds[h[2]](cell) for h, cell in zip(heads, cells, strict=True)})
+    return tables
+
+
+@pytest.mark.parametrize("effects", [(), ("stator_resistance",)])
+def test_the_powerfactory_file_holds_the_load(effects):
+    load = identified(effects=effects, power=50.0, voltage=27.5)
+    tables = dgs(write("powerfactory", load))
+    assert tables["General"] == [{"ID": "1", "Descr": "Version", "Val": "5.0"}]
+    numbers = [row["ID"] for rows in tables.values() for row in rows]
+    assert len({*numbers}) == len(numbers)
+    pointed = {row[key] for rows in tables.values() for row in rows for key in ("fold_id", "typ_id", "obj_id")
+               if row.get(key)}  # fmt: skip
+    assert pointed <= {*numbers}
+    (motor,), (of_type,), (static,), (law,) = (tables[name] for name in ("ElmAsm", "TypAsmo", "ElmLod", "TypLod"))
+    assert (of_type["pgn"], of_type["ugn"], of_type["frequ"]) == (50_000.0, 27.5, 50.0)
+    X = of_type["xstr"] + of_type["xm"]
+    behind = of_type["xm"] * of_type["xrtrA"] / (of_type["xm"] + of_type["xrtrA"])
+    assert of_type["xstr"] + behind == pytest.approx(VALUES["X_prime"], rel=1e-7)
+    assert 1 - (of_type["xstr"] + behind) / X == pytest.approx(VALUES["C"], rel=1e-7)
+    assert of_type["rstr"] == (0.02 if effects else 0.0)
+    stored = 0.5 * of_type["J"] * (OMEGA / of_type["nppol"]) ** 2 / 50e6  # s
+    assert stored == pytest.approx(VALUES["M"] * OMEGA / 2, rel=1e-7)
+    assert motor["pgini"] + static["plini"] == pytest.approx(50.0, rel=1e-7)
+    assert motor["qgini"] + static["qlini"] == pytest.approx(30.0, rel=1e-7)
+    assert (law["aP"], law["kpu0"], law["aQ"], law["kqu0"]) == (1.0, VALUES["p_v"], 1.0, VALUES["q_v"])
+    assert static["u0"] == BEFORE["U0"]
+
+
+def test_a_zip_load_is_the_polynomial_of_powerfactory():
+    (law,) = dgs(write("powerfactory", identified("none", "zip")))["TypLod"]
+    v = np.array([0.5, 0.8, 1.0])
+    for side, names in (("a", ("aP", "bP", "kpu0", "kpu1", "kpu")), ("b", ("aQ", "bQ", "kqu0", "kqu1", "kqu"))):
+        a, b, e0, e1, e = (law[name] for name in names)
+        Z, current = VALUES[f"{side}_Z"], VALUES[f"{side}_I"]
+        assert a * v**e0 + b * v**e1 + (1 - a - b) * v**e == pytest.approx(
+            Z * v**2 + current * v + (1 - Z - current), rel=1e-9
+        )
+
+
+PLAYED = [
+    (name, motor, static, effects)
+    for name in ("andes", "psse_dyr", "powerfactory", "modelica")
+    for motor, static, effects in (
+        ("electromechanical", "exponential", ()), ("electromechanical", "zip", ("stator_resistance",)),
+        ("double_cage", "constant_impedance", ()), ("none", "zip", ()),
+    )
+    if (name, motor) != ("powerfactory", "double_cage")
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "motor", "static", "effects"), PLAYED)
+def test_an_export_played_back_by_its_own_numbers_follows_the_fit(name, motor, static, effects, monkeypatch):
+    form, load = build("format", {"name": name}), identified(motor, static, effects, power=47.0, ratio=0.7)
+    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    agreement, notes = played(form, form.text(load), load)
+    assert notes == []
+    assert agreement.moved[0] > 0.15
+    assert agreement.share < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("name", "right", "wrong"),
+    [("andes", '"Hm": ', '"Hm": 9'), ("psse_dyr", "'CIM5BL', 'M', 1, 0,", "'CIM5BL', 'M', 1, 0.05,"),
+     ("powerfactory", ";AS;55", ";AS;45"), ("modelica", "Real T_prime = 0.1", "Real T_prime = 0.3")],
+)  # fmt: skip
+def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(name, right, wrong, monkeypatch):
+    form, load = build("format", {"name": name}), identified()
+    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    text = form.text(load)
+    assert right in text
+    assert played(form, text.replace(right, wrong, 1), load)[0].share > 0.01
+
+
+def test_what_a_format_leaves_out_is_in_the_agreement(monkeypatch):
+    """The stator's transients, which the machines of ANDES lack."""
+    form, load = build("format", {"name": "andes"}), identified("stator_flux")
+    monkeypatch.setattr(type(form), "simulated", lambda *_: None)
+    assert played(form, form.text(load), load)[0].share > 1e-4
+
+
+def test_an_export_says_its_load_base_powers_and_agreement(tmp_path):
+    result = dataclasses.replace(
+        identified().result,
+        records=[{"name": "a", "role": "train", "source": {"file": "a.cfg", "station": "North", "load": "T2"},
+                  "base": {"voltage_kV": 27.5, "power_MVA": 40.0}}],
+        own_base={"power": 40.0, "file_power": 40.0, "in_mva": True, "origin": "given"},
+    )  # fmt: skip
+    done = tractexp.export(Identification(result), "powerfactory")
+    said = "\n".join(done.notes)
+    for part in ("station North; load T2", "per unit of 40 MVA and 27.5 kV", "at 26.95 kV: load 40 MW and 24 Mvar",
+                 "motor 22 MW", "played back by our own simulator", "not tried in PowerFactory"):  # fmt: skip
+        assert part in said, part
+    assert done.agreement < 1e-6
+    assert (dgs(done.text)["TypAsmo"][0]["pgn"], dgs(done.text)["ElmTerm"][0]["uknom"]) == (40_000.0, 27.5)
+    assert Exported.load(done.save(tmp_path / "export.json")).agreement == done.agreement
+    assert "played back" not in "".join(tractexp.export(Identification(result), "modelica", playback=False).notes)
+
+
+def test_a_file_of_a_load_without_a_steady_state_is_no_refusal_but_said(monkeypatch):
+    form, load = build("format", {"name": "powerfactory"}), identified()
+    text = form.text(load).replace(";AS;55", ";AS;955")
+    agreement, notes = played(form, text, load)
+    assert agreement is None
+    assert notes[0].startswith("not played back: no steady state")
+
+
+def test_where_the_simulator_fails_ours_plays_the_file_back_and_it_is_said(monkeypatch):
+    form, load = build("format", {"name": "andes"}), identified()
+
+    def fails(*_):
+        raise UserError("not played back in ANDES: it said nothing")
+
+    monkeypatch.setattr(type(form), "simulated", fails)
+    agreement, notes = played(form, form.text(load), load)
+    assert notes == ["not played back in ANDES: it said nothing"]
+    assert agreement.by.startswith("our own simulator")
 
 
 @pytest.fixture
@@ -263,6 +402,18 @@ def test_an_exported_load_responds_in_andes_as_it_does_here(motor, static):
     found = andes_check.round_trip(motor, static, 1e-3)
     assert found["swing_P"] > 0.2
     assert max(found["P"], found["Q"]) < 1e-3
+
+
+@pytest.mark.usefixtures("has_andes")
+def test_an_export_to_andes_is_played_back_there():
+    """At another voltage, power and bus number than ANDES's own."""
+    load = identified(effects=("stator_resistance",), bus=12, power=30.0, voltage=27.5)
+    form = build("format", {"name": "andes"})
+    agreement, notes = played(form, form.text(load), load)
+    assert notes == []
+    assert agreement.by.startswith("ANDES ")
+    assert agreement.moved[0] > 0.15
+    assert agreement.share < 1e-3
 
 
 def test_what_a_model_is_not_good_for_is_said_when_it_is_exported(tmp_path):

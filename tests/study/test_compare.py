@@ -497,7 +497,7 @@ def test_every_run_that_finished_is_drawn():
     assert {round(y) for _, y in points} == {0, 1}
 
 
-def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
+def test_every_runs_parameters_are_drawn_as_wide_as_they_scatter(polished, problem):
     from tractexp.studies.comparison.charts import parameters
 
     runs, found = polished
@@ -507,9 +507,11 @@ def test_every_runs_parameters_are_drawn_over_their_bounds(polished, problem):
     assert len(drawn(chart, "in the floor&#x27;s valley")) == 6 * n
     assert len(drawn(chart, "elsewhere")) == n
     assert layout["xaxis"]["ticktext"] == ["a", "b"]
-    for k, (low, high) in enumerate(zip(problem.space.lower, problem.space.upper, strict=True)):
+    for k, name in enumerate(problem.space.names):
         shown = layout["yaxis" + (str(k + 1) if k else "")]["range"]
-        assert shown[0] < low < high < shown[1]
+        ends = [found.parameters[name], *(run.parameters[name] for run in found.reached)]
+        assert shown[0] < min(ends) <= max(ends) < shown[1]
+        assert shown[1] - shown[0] == pytest.approx(1.16 * np.ptp(ends) or 2e-3 * abs(ends[0]))
     levels = sorted(shape["y0"] for shape in layout["shapes"])
     assert levels == sorted(found.parameters.values())
 

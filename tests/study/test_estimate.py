@@ -8,6 +8,7 @@ import pytest
 import uncertainty as study
 
 import tractexp
+from tractexp.blocks import Table
 from tractexp.identification import adequacy
 from tractexp.identification.adequacy import Grade, Surprise, graded
 from tractexp.identification.descent import Descent
@@ -18,6 +19,7 @@ from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
 from tractexp.noise import Noise
+from tractexp.report.identify import ended
 
 TRUTH = study.TYPICAL
 
@@ -78,6 +80,36 @@ def test_result_json_tells_estimate_search_and_origin(fit, tmp_path):
     assert len(record["sha256"]) == 64
     assert told["starts"][0]["above"] == 0.0
     assert {start["from"] for start in told["starts"]} == {"box", "beside the best", "search"}
+
+
+def test_result_and_page_hold_correlations_and_the_number_of_samples(fit, tmp_path):
+    """As the fit reports that users know from elsewhere do."""
+    known = json.loads(fit.result.write(tmp_path / "result.json").read_text())["uncertainty"]
+    d = len(fit.details.uncertainty.names)
+    assert known["names"] == list(fit.details.uncertainty.names)
+    matrix = np.array(known["correlation"])
+    assert matrix.shape == (d, d)
+    assert np.diag(matrix) == pytest.approx(np.ones(d))
+    (record,) = (fit.event.record for fit in fit.details.fits)
+    compared = np.isfinite(record.P).sum() + np.isfinite(record.Q).sum()
+    assert (known["samples"], known["parameters"]) == (compared, d)
+    assert compared - d - 2 <= known["freedom"] <= compared - d  # P0 and Q0 may be estimated, too
+    assert f"{compared} samples compared, {d} parameters searched" in repr(fit)
+    table = next(b for b in fit.report().blocks if isinstance(b, Table) and b.columns[:1] == ["correlation"])
+    assert table.rows[1][1] == f"{matrix[1, 0]:+.3f}"
+
+
+def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_where_they_differ(fit):
+    table = ended(fit)
+    by_name = {row[0]: row for row in table.rows}
+    assert by_name["objective"][1:3] == [fit.result.search["objective"], fit.result.objective]
+    assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.astray}
+    far = replace(fit.result, search=fit.result.search | {"objective": 2 * fit.result.objective, "parameters": {
+        **fit.result.search["parameters"], "T_m": 10.0}})  # fmt: skip
+    away = replace(fit, result=far, behind=fit.behind)
+    assert {row[0] for row in ended(away).rows if row[4]} >= {"T_m"}
+    assert "T_m" in away.end_of_search
+    assert "it stopped short of the minimum, at 2 times its objective" in away.end_of_search
 
 
 def test_equal_numbers_have_equal_digests_and_others_have_not():

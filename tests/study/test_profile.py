@@ -15,6 +15,7 @@ from tractexp.identification.profile import End, LikelihoodProfile, checked, pro
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
 from tractexp.report import posterior
+from tractexp.report.identify import brief
 from tractexp.report.profile import meaning, report
 
 
@@ -203,3 +204,16 @@ def test_the_page_says_where_curvature_misleads(quiet):
         ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
     ):
         assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence
+
+
+def test_a_verdict_tells_the_interval_of_the_profile_and_no_symmetric_one():
+    """The profile's interval is lopsided: half of the curvature's would mislead."""
+    by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)", "± 26 %")
+    profile = LikelihoodProfile(
+        "C", np.array([0.3, 0.5, 0.9]), np.array([5.0, 0.0, 5.0]), (0.31, 0.88), (End.CLOSED, End.CLOSED), ()
+    )
+    verdict = str(revised(by_curvature, profile, 0.0, 1.0))
+    assert verdict == "weakly identified: 0.31 .. 0.88 by its profile; trades against T_m (correlation 0.98)"
+    assert brief(verdict) == "weakly identified"
+    assert brief("identified (0.31 .. 0.33 by its profile)") == "identified"
+    assert brief("identified (± 3 %)") == "identified (± 3 %)"

@@ -130,7 +130,7 @@ def test_a_study_finds_what_an_identification_does(dips, model, generalised):
 def test_a_study_tells_what_it_reads_and_each_search(dips, capsys):
     lines = []
     tractexp.generalise(dips[1], validate=dips[0], optimizers=["issa_no_levy", "pso"], budget=50, progress=lines.append)
-    assert [line for line in lines if not line.startswith("  note")] == [
+    assert [line for line in lines if not line.startswith("  ")] == [
         f"fit: {dips[1]!r}", f"validate: {dips[0]!r}", lines[-3], "issa_no_levy, seed 0", "pso, seed 0",
     ]  # fmt: skip
     assert lines[-3].startswith("model: electromechanical motor and exponential static load, 7 parameters")

@@ -1,8 +1,11 @@
 """What an investigation says while it works: each step, and that a long one goes on."""
 
+import re
 import time
+from contextlib import nullcontext
 
 from tractexp.discrepancy import effort
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.effort import Effort
 
 
@@ -29,3 +32,26 @@ def test_a_part_names_its_step_to_the_same_listener():
     with Effort(lines.append).audible() as spent:
         spent.anew().say("judging")
     assert lines == ["judging"]
+
+
+def test_a_long_step_says_how_many_parts_and_how_long_they_take_but_no_time_spent(monkeypatch):
+    monkeypatch.setattr(effort, "SILENCE", 0.04)
+    lines = []
+    with Effort(lines.append).audible() as spent:
+        spent.say("fitting")
+        with spent.anew().parts(4) as ended, spent.parts(9):  # a part of a part
+            ended()
+            while len(lines) < 3:
+                time.sleep(0.01)
+        said = len(lines)
+        while len(lines) <= said:
+            time.sleep(0.01)
+    assert re.fullmatch(r"  still fitting: 1 of 4, about \d+ s left", lines[2])
+    assert lines[-1] == "  still fitting"
+
+
+def test_independent_items_are_counted_as_they_end():
+    ended = []
+    found = each_apart(lambda x: x + 1, [1, 2, 3], lambda total: nullcontext(lambda: ended.append(total)))
+    assert found == [2, 3, 4]
+    assert ended == [3, 3, 3]

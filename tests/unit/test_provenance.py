@@ -31,6 +31,18 @@ def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
     assert command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
 
 
+def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
+    arguments = ["data=comtrade", "data.path=station.cfg", "data.train=[1]", "data.validate=[2]", "domain=waves"]
+    monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
+    monkeypatch.setattr(provenance, "_placed", [])
+    monkeypatch.chdir(tmp_path)
+    provenance.placed(tmp_path / "outputs" / "run")
+    assert provenance.again("task=discrepancy") == "tractexp again outputs/run task=discrepancy"
+    assert provenance.again("model=extended", of=("data",)).startswith("tractexp model=extended data=comtrade")
+    monkeypatch.setattr(provenance, "_started", ["tractexp", "data=tibet"])
+    assert provenance.again("task=discrepancy") == "tractexp task=discrepancy data=tibet"
+
+
 @pytest.mark.parametrize(("inside", "line"), [(True, 2), (False, 0)])
 def test_a_plugin_that_fails_is_named_by_file_and_line(tmp_path, inside, line):
     folder = Path(plugin.packages()[0].__path__[0]) if inside else tmp_path

@@ -233,7 +233,7 @@ class Investigation(Written):
     def report(self) -> Report:
         from tractexp.report import discrepancy
 
-        return discrepancy.report(self.steps, self.content, ", ".join(e.record.name for e in self.question.train))
+        return discrepancy.report(self.steps, self.content, self.result.identities)
 
     def to_dict(self) -> dict[str, Any]:
         return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
@@ -432,4 +432,5 @@ class Discrepancy(Task, call=investigate):
         return {
             "name": f"{result.verdict} {' '.join(result.names)}".strip(), "metrics": metrics, "children": children,
             "description": quoting.markdown(result.reason), "model": job.folder / "result.json",
+            "records": result.result.records,
         }  # fmt: skip

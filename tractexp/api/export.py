@@ -33,6 +33,8 @@ class Exported(Outcome):
     title: str
     text: str
     notes: tuple[str, ...]
+    # how far the file, played back, is off the fit, over what its power moves; None where nothing plays it back
+    agreement: float | None = None
 
     def write(self, path: Path | str) -> Path:
         """Write the file, whole or not at all."""
@@ -46,12 +48,12 @@ class Exported(Outcome):
         return report.text(*self.text.splitlines())
 
     def to_dict(self) -> dict[str, Any]:
-        return {key: getattr(self, key) for key in ("format", "suffix", "title", "text", "notes")}
+        return {key: getattr(self, key) for key in ("format", "suffix", "title", "text", "notes", "agreement")}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         recorded = {key: content[key] for key in ("format", "suffix", "title", "text")}
-        return cls(**recorded, notes=tuple(content["notes"]))
+        return cls(**recorded, notes=tuple(content["notes"]), agreement=content.get("agreement"))
 
 
 @public
@@ -64,15 +66,20 @@ def export(
     voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
     base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
     doubtful: bool = False,  # export also a model that is no physical load
+    playback: bool = True,  # play a dip through the file, in its simulator where that is installed
 ) -> Exported:
     """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
 
     The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line to line], by
     default what the record says, else 100 and 110. `base` "own" writes values on the base of the fit, "file" on that of
-    the record's file, where it was another. Raises `UserError` where the format cannot represent a part of the model,
-    and for a model that is no physical load unless `doubtful`.
+    the record's file, where it was another. With `playback` a dip is played through the file (in ANDES where that is
+    installed, else by our own simulator from the file's numbers), and the notes say how well it follows the fit.
+    Raises `UserError` where the format cannot represent a part of the model, and for a model that is no physical load
+    unless `doubtful`.
     """
     from tractexp.exchange.format import Identified
+    from tractexp.exchange.playback import played
+    from tractexp.record.identity import distinct
 
     for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
         if value is not None:
@@ -93,10 +100,25 @@ def export(
     form.check_parts(identified)
     text = form.text(identified)
     notes = [
+        *map(str, distinct(fit.result.identities)),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
+        _powers(identified),
         *form.notes(identified),
     ]
-    return Exported(format, form.suffix, identified.model.title, text, tuple(notes))
+    agreement, more = played(form, text, identified) if playback else (None, [])
+    if agreement is not None:
+        more.append(agreement.said(identified.power, ("MW", "Mvar")))
+    share = None if agreement is None else agreement.share
+    return Exported(format, form.suffix, identified.model.title, text, (*notes, *more), share)
+
+
+def _powers(load: "Identified") -> str:
+    """What the load and its parts draw before the dip, in a sentence."""
+    before, scale = load.before, load.power
+    rows = {"load": (load.ratio * load.result.before["P0"], load.ratio * load.result.before["Q0"])}
+    rows |= {part: (before[f"P_{part}"], before[f"Q_{part}"]) for part in ("motor", "static") if f"P_{part}" in before}
+    said = [f"{part} {scale * P:.5g} MW and {scale * Q:.5g} Mvar" for part, (P, Q) in rows.items()]
+    return f"before the dip, at {load.result.before['U0'] * load.voltage:.5g} kV: {'; '.join(said)}"
 
 
 def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -> str:

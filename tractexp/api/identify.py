@@ -19,8 +19,8 @@ from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
-from tractexp.progress import Progress, tell
-from tractexp.wording import epsilon
+from tractexp.progress import Progress, counter, tell
+from tractexp.wording import epsilon, joined
 
 if TYPE_CHECKING:
     from tractexp.exchange.operating_point import OperatingPoint
@@ -121,9 +121,9 @@ class Identification(Written):
     behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: FitSpec, found: "SearchResult") -> "Identification":
+    def of(cls, setup: FitSpec, found: "SearchResult", progress: Progress = False) -> "Identification":
         """Judge what a search found."""
-        result, details = _concluded(setup, found)
+        result, details = _concluded(setup, found, progress)
         return cls(result, setup, found, details)
 
     @functools.cached_property
@@ -306,7 +306,17 @@ class Identification(Written):
         end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
         errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
         end += f" {self.result.objective:.4g}), {errors},"
-        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s"
+        return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s{self._apart}"
+
+    @property
+    def _apart(self) -> str:
+        """Where the search's end differs from the estimate, as the end of a sentence; "" where it does not."""
+        if not (away := self.astray):
+            return ""
+        ratio = self.result.search["objective"] / self.result.objective if self.result.objective else float("inf")
+        why = f"it stopped short of the minimum, at {ratio:.3g} times its objective" if ratio > 1 else "it is elsewhere"
+        lie = "lies" if len(away) == 1 else "lie"
+        return f"; its {joined(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
         found = None if self.found is None else asdict(self.found)
@@ -381,12 +391,12 @@ def identify(
     found = None
     try:
         found = setup.found(progress)
-        return Identification.of(setup, found)
+        return Identification.of(setup, found, progress)
     except KeyboardInterrupt as stop:
         raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
 
 
-def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetails]:
+def _concluded(setup: FitSpec, found: "SearchResult", progress: Progress = False) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
@@ -403,7 +413,8 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     estimated = estimate(problem, found.values)
     uncertainty = estimated.uncertainty
     if setup.check_intervals:
-        uncertainty = with_rivals(checked(uncertainty))
+        profiled = checked(uncertainty, counter("points at most on the profiles", progress))
+        uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     result, fits = conclude(
         problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )
@@ -477,8 +488,11 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
         "fitness": (np.flatnonzero(valid), best),
         "fitness_by_simulations": at_common_steps(history.simulations[valid], best),
     }
+    searched = f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
+    if job.label:
+        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.in_sweep])
     return {
-        "name": f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}",
+        "name": searched,
         "values": result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
         "metrics": metrics, "curves": curves, "seconds": result.seconds, "description": fit.headline,
         "records": result.records, "model": job.folder / "result.json" if predictor else None,

@@ -19,6 +19,7 @@ from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import tell
 from tractexp.record import Event, OwnBase
+from tractexp.record.identity import Identity
 
 if TYPE_CHECKING:
     from tractexp.identification.linear_network import BlackBox
@@ -175,7 +176,9 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
         "sentence": sentence, "poles": box.poles, "chosen_by": box.chosen_by or f"task.poles={of.order}",
         "model_error": error,
         "events": [fit.to_dict() for fit in fits], "by_poles": by_poles,
-        "records": [{"role": f.role, "name": f.event.record.name} | provenance.identity(f.event.record) for f in fits],
+        "records": [
+            {"role": f.role, "name": f.event.record.name} | Identity.at(f.event.record).to_dict() for f in fits
+        ],
         "tractexp_version": provenance.version(), "commit": provenance.commit(),
     }  # fmt: skip
 

@@ -188,8 +188,9 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     distinct = list(dict.fromkeys(map(_source, flat)))
     with staged(progress) as stage:
         views = []
-        for source in distinct:
-            stage(f"reading {source if isinstance(source, str) else source.name}")
+        for k, source in enumerate(distinct, start=1):
+            of = f"{k} of {len(distinct)}: " * (len(distinct) > 1)
+            stage(f"reading {of}{source if isinstance(source, str) else source.name}")
             views.append(_view(source, settings))
         stage("measuring the quality of the channels")
         content = files.plain({"files": [_content(view) for view in views]})

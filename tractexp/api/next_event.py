@@ -12,6 +12,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.progress import Progress, telling
+from tractexp.record.identity import title_of
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.next_event.choose import NextEvent
@@ -57,7 +58,7 @@ class Recommended(Written):
     def report(self) -> Report:
         from tractexp.report import next_event
 
-        return next_event.report(self.event, ", ".join(e.record.name for e in self.setup.train))
+        return next_event.report(self.event, title_of(e.record for e in self.setup.train))
 
     def to_dict(self) -> dict[str, Any]:
         rivals = [list(names) for names in self.rivals]

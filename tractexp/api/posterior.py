@@ -18,6 +18,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
+from tractexp.progress import counter
 
 if TYPE_CHECKING:
     from tractexp.identification.posterior import PosteriorSample
@@ -40,7 +41,8 @@ class Sampled(Written):
         """The sample; of a loaded result it is drawn again, from the same seed."""
         from tractexp.identification.posterior import sample
 
-        return self.behind or sample(self.fit.details.uncertainty, **self.settings)
+        s = self.settings
+        return self.behind or sample(self.fit.details.uncertainty, s["walkers"], s["steps"], s["seed"])
 
     @property
     def draws(self) -> dict[str, np.ndarray]:
@@ -87,12 +89,15 @@ class Sampled(Written):
 
 
 @public
-def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None) -> Sampled:
+def posterior(
+    fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None, progress: Any = None
+) -> Sampled:
     """Sample the posterior of an identification's free parameters under a flat prior within their bounds.
 
     `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away; `seed` is by default
-    that of the identification. Raises `UserError` without the extra [posterior], for fewer walkers than twice the
-    coordinates, and for an identification of which only a `result.json` is known.
+    that of the identification. `progress`: None shows how far it is, False does not. Raises `UserError` without the
+    extra [posterior], for fewer walkers than twice the coordinates, and for an identification of which only a
+    `result.json` is known.
     """
     from tractexp.identification.posterior import sample
 
@@ -101,7 +106,8 @@ def posterior(fit: Identification, *, walkers: int = 48, steps: int = 2000, seed
     settings = {"walkers": walkers, "steps": steps, "seed": fit.spec.seed if seed is None else seed}
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    drawn = sample(uncertainty, **settings)
+    count = counter("steps of the walkers", progress)
+    drawn = sample(uncertainty, settings["walkers"], settings["steps"], settings["seed"], count)
     content = {
         "intervals": dict(zip(drawn.names, drawn.intervals.tolist(), strict=True)),
         "autocorrelation": drawn.autocorrelation,

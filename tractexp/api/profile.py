@@ -16,6 +16,7 @@ from tractexp.errors import check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
+from tractexp.progress import counter
 
 if TYPE_CHECKING:
     from tractexp.identification.profile import Profiles
@@ -91,18 +92,19 @@ class Profiled(Written):
 def profile(
     fit: Identification, *,
     points: int = 24,  # at most so many on either side of the optimum
+    progress: Any = None,
 ) -> Profiled:  # fmt: skip
     """Find the best fit for each value of each free parameter of an identification in turn.
 
-    `points` (3 to 1000) is how many values are tried on either side of the optimum at most. Raises `UserError` for an
-    identification of which only a `result.json` is known.
+    `points` (3 to 1000) is how many values are tried on either side of the optimum at most. `progress`: None shows how
+    far it is, False does not. Raises `UserError` for an identification of which only a `result.json` is known.
     """
     from tractexp.identification.profile import profiles
 
     check_range("task.points", points, 3, 1000)
     uncertainty = fit.details.uncertainty
     started = time.perf_counter()
-    scan = profiles(uncertainty, points)
+    scan = profiles(uncertainty, points, parts=counter("points at most on the profiles", progress))
     content = _content(scan, time.perf_counter() - started)
     verdicts = {name: str(verdict) for name, verdict in scan.verdicts.items()}
     intervals = {p.name: list(p.interval) for p in scan.profiles}

@@ -11,6 +11,7 @@ from tractexp.api.read import Dips, dips_together, event_from_dict, event_to_dic
 from tractexp.errors import check_range
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
+from tractexp.record.identity import Identity
 from tractexp.wording import shown_in_words
 
 if TYPE_CHECKING:
@@ -106,8 +107,12 @@ class Setup(Given):
 
 
 def recorded(train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate") -> Iterator[str]:
-    """What is read, a sentence for each event and each of its notes."""
+    """What is read, a sentence for each event and each of its notes, and of each recording which load it is of."""
+    said: list[Identity] = []
     for role, group in (("fit", train), (held_out, validate)):
         for event in group:
             yield f"{role}: {describe(event)}"
+            if event.record.source and (identity := Identity.at(event.record).recording) not in said:
+                said.append(identity)
+                yield f"  record: {identity}"
             yield from (f"  note: {note}" for note in event.record.notes)

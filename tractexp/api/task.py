@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import UnionType
-from typing import Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, TypeVar, Union, get_args, get_origin
 
 from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
@@ -16,6 +16,9 @@ from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.plugin import Plugin, build
 from tractexp.progress import console, say
+
+if TYPE_CHECKING:
+    from tractexp.record.identity import Identity
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 # The equations of a model, without what is known of its parameters but that they may be held to what machines are
@@ -26,6 +29,7 @@ LOAD = (
 # Arguments that the model's configuration holds
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
+LABEL = "load"  # the tag with station, load and dips
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 OMITTED: Any = object()  # of an argument: its default stands
 R = TypeVar("R")
@@ -94,6 +98,12 @@ class Task(Plugin):
     def needless(self) -> tuple[str, ...]:
         """The parts of `reads` that are not read with the settings it has."""
         return ()
+
+    @classmethod
+    def takes_records(cls) -> bool:
+        """Whether its call is given records."""
+        arguments = inspect.signature(cls.function).parameters if cls.function else {}
+        return any("data" in SOURCES[name].reads for name in arguments if name in SOURCES)
 
     def perform(self, job: "Job", **instead: Any) -> Any:
         """Call with the job's configuration and the task's settings; `instead` replaces arguments."""
@@ -255,10 +265,36 @@ class Job:
         """The optimizer and what else was chosen: runs of one variant differ in their seeds alone."""
         return variant(self.choices["optimizer"], self.given)
 
+    @functools.cached_property
+    def identities(self) -> "list[Identity]":
+        """Which loads the records of a task are of, those fitted first.
+
+        [] for tasks without records, and for data that have a name of their own, as the shipped ones.
+        """
+        from tractexp.plugin import get
+        from tractexp.record.identity import Identity
+
+        named = self.choices["data"] != self.config["data"]["name"]
+        if named or not get("task", self.config["task"]["name"]).takes_records():
+            return []
+        return [Identity.at(event.record) for event in (*self.events.train, *self.events.validate)]
+
+    @property
+    def label(self) -> str:
+        """Station, load and dips, short, as a run's name says them; "" where no file names a load."""
+        from tractexp.record.identity import label
+
+        fitted = self.identities[: len(self.events.train)] if self.identities else []
+        dips = " and ".join(filter(None, (one.dip for one in fitted)))
+        return ", ".join(filter(None, (label(fitted), dips))) if label(fitted) else ""
+
     @property
     def experiment(self) -> str:
-        """The MLflow experiment: named by the configuration, or after task and data."""
-        return self.config["tracking"]["experiment"] or f"{self.choices['task']} {self.choices['data']}"
+        """The MLflow experiment: named by the configuration, or after the station, or after task and data."""
+        stations = {one.station for one in self.identities}
+        station = stations.pop() if len(stations) == 1 else ""
+        named = self.config["tracking"]["experiment"] or (station and f"station {station}")
+        return named or f"{self.choices['task']} {self.choices['data']}"
 
     @property
     def store(self) -> str:
@@ -292,12 +328,12 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
-        parts |= {"variant": self.variant, "seed": str(self.seed)}
+        parts |= {"variant": self.variant, "seed": str(self.seed), LABEL: self.label}
         run = tracking.TrackedRun(
             experiment=self.experiment,
-            name=name,
+            name=", ".join(filter(None, (self.label, name))),
             parameters={**tracking.flatten(self.config), **values},
-            tags={**parts, "git_commit": provenance.commit()},
+            tags={key: text for key, text in parts.items() if text} | {"git_commit": provenance.commit()},
             parent=self.sweep,
             **content,
         )

@@ -6,18 +6,15 @@ along; `chart.js` draws it. Nothing is drawn here and that package is not import
 
 import base64
 import functools
-import importlib.util
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tractexp import files, quoting
-from tractexp.blocks import style
-from tractexp.errors import UserError
+from tractexp.blocks import plotly, style
 
 MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
@@ -39,22 +36,11 @@ TICK = 28  # letters of a trace's name beside its axis
 HELD = 32767  # the greatest of 16 bits; the least stands for a gap
 
 
-def library() -> Path:
-    """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
-    spec = importlib.util.find_spec("plotly")
-    for folder in (spec and spec.submodule_search_locations) or ():
-        if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
-            return path
-    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
-
-
 @functools.cache
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = files.packaged("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
-    return (
-        f"{library().read_text(encoding='utf-8')}\n{drawing.replace('PAPER', str(PAPER)).replace('SHOWN', str(SHOWN))}"
-    )
+    return f"{plotly.code()}\n{drawing.replace('PAPER', str(PAPER)).replace('SHOWN', str(SHOWN))}"
 
 
 class Chart:

@@ -23,11 +23,15 @@ def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str
 
 def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str] = ()) -> None:
     """Raise `UserError` for the first setting chosen that a task (class or instance) does not read."""
-    read = [part for part in (*ALWAYS, *task.reads) if part not in needless]
     for key, value in chosen.items():
-        if not any(_overlap(OF.get(key, key), part) for part in read):
+        if not reads(task, key, needless):
             instead = (task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part))
             raise UserError(f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}")
+
+
+def reads(task: Any, key: str, needless: Collection[str] = ()) -> bool:
+    """Whether a task (class or instance) reads a setting, or any task does."""
+    return any(_overlap(OF.get(key, key), part) for part in (*ALWAYS, *task.reads) if part not in needless)
 
 
 def _overlap(a: str, b: str) -> bool:

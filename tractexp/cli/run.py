@@ -4,7 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from tractexp import credentials
+from tractexp import credentials, provenance
 from tractexp.api.task import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
@@ -26,6 +26,7 @@ def run(config: Any) -> None:
         plain: Any = OmegaConf.to_container(config, resolve=True)
         credentials.check("", plain)
         begin = configuration.written(folder, config)
+        provenance.placed(folder)
         perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), begin=begin))
         configuration.concluded(folder)
     except UserError:

@@ -9,6 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from tractexp.kernel.layout import LANES
+from tractexp.progress import Counting, uncounted
 
 FEWEST = 16  # lanes that are worth a call
 Item = TypeVar("Item")
@@ -39,12 +40,24 @@ def _in_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray, p
     return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))
 
 
-def each_apart(function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-    """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others."""
-    if min(cores(), len(items)) < 2:
-        return [function(item) for item in items]
-    with ThreadPoolExecutor(cores()) as pool:
-        return list(pool.map(function, items))
+def each_apart(
+    function: Callable[[Item], Result], items: Sequence[Item], parts: Callable[[int], Counting] = uncounted
+) -> list[Result]:
+    """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others.
+
+    `parts` (`Effort.parts`) counts the items that have ended.
+    """
+    with parts(len(items)) as ended:
+
+        def counted(item: Item) -> Result:
+            result = function(item)
+            ended()
+            return result
+
+        if min(cores(), len(items)) < 2:
+            return [counted(item) for item in items]
+        with ThreadPoolExecutor(cores()) as pool:
+            return list(pool.map(counted, items))
 
 
 @functools.cache

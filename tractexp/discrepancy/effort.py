@@ -5,7 +5,25 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from threading import Event, Lock, Thread
 
+from tractexp.progress import remaining
+
 SILENCE = 4.0  # s after which a line says that a step goes on
+
+
+class Parts:
+    """How many parts of a step have ended, and how long the others take."""
+
+    def __init__(self, total: int):
+        self.total, self.ended = total, 0
+        self._begun, self._lock = time.perf_counter(), Lock()
+
+    def end(self) -> None:
+        with self._lock:
+            self.ended += 1
+
+    def __str__(self) -> str:
+        rest = remaining(time.perf_counter() - self._begun, self.ended / self.total)
+        return f"{self.ended} of {self.total}{rest}"
 
 
 class Effort:
@@ -16,19 +34,29 @@ class Effort:
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
         self.simulations, self._lock = 0, Lock()
         self._tell, self._all = tell, list[Effort]((self,))
-        self._step, self._begun, self._said = "", time.perf_counter(), time.perf_counter()
+        self._step, self._said, self._parts = "", time.perf_counter(), list[Parts]()
 
     def anew(self) -> "Effort":
         """A count of its own for a part of the work, which tells the same listener."""
         part = Effort(self.say)
-        part._all = self._all
+        part._all, part._parts = self._all, self._parts
         self._all.append(part)
         return part
 
     def say(self, line: str) -> None:
         """Name the step that begins."""
-        self._step, self._begun, self._said = line, time.perf_counter(), time.perf_counter()
+        self._step, self._said = line, time.perf_counter()
         self._tell(line)
+
+    @contextmanager
+    def parts(self, total: int) -> Iterator[Callable[[], None]]:
+        """Count the parts of the step at hand: yield what is to be called at the end of each. Parts may have parts."""
+        counted = Parts(total)
+        self._parts.append(counted)
+        try:
+            yield counted.end
+        finally:
+            self._parts.remove(counted)
 
     def spend(self, simulations: int) -> None:
         """Count simulations that are about to run."""
@@ -50,9 +78,10 @@ class Effort:
             while not ended.wait(SILENCE / 4):
                 now = time.perf_counter()
                 if now - self._said >= SILENCE:
-                    more = f"{self.total} simulations, " if self.total > counted else ""
+                    far = [str(part) for part in self._parts[:1]]  # the outermost: the parts of parts come and go
+                    far += [f"{self.total} simulations"] * (self.total > counted)
                     self._said, counted = now, self.total
-                    self._tell(f"  still {self._step or 'at work'}: {more}{now - self._begun:.0f} s")
+                    self._tell(": ".join([f"  still {self._step or 'at work'}", *[", ".join(far)] * bool(far)]))
 
         watcher = Thread(target=watch, name="progress", daemon=True)
         watcher.start()

@@ -147,13 +147,14 @@ def wide_refits(
 
     What is far behind the best of `others` then is given up.
     """
-    begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted))
+    begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted), context.effort.parts)
     begun.sort(key=lambda fits: fits[0].cost)
     if costs := [fit.cost for fit in others]:
         begun = [fits for fits in begun if fits[0].cost <= min(costs) + _far(costs)]
     begun = begun[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
-    return best_of(itertools.chain(*each_apart(lambda starts: wide_refit(context, noise, starts, faults), again)))
+    search = lambda starts: wide_refit(context, noise, starts, faults)  # noqa: E731
+    return best_of(itertools.chain(*each_apart(search, again, context.effort.parts)))
 
 
 def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:

@@ -92,7 +92,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
         lowered = weighed.bare.deviance - fit.deviance
         return Rival(fit, lowered, fit.cost - chosen[0].cost, 0.0, rejected=False, tests=tests)
 
-    retained = each_apart(rival, chosen)
+    retained = each_apart(rival, chosen, explained.base.context.effort.parts)
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
     return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 

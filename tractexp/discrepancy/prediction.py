@@ -167,7 +167,8 @@ def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredic
     noise = residual_noise(context, explained.chosen)
     there = context.on(Records.of(events, context.records.window))
     fits = {f.names: f for f in _fits(explained, noise)}
-    sets = dict(zip(fits, each_apart(lambda f: _predicted(there, f), list(fits.values())), strict=True))
+    predicted = each_apart(lambda f: _predicted(there, f), list(fits.values()), context.effort.parts)
+    sets = dict(zip(fits, predicted, strict=True))
     result = ErrorPredictions(context.catalogue, sets, there, noise)
     best = result.ranked(max(map(len, fits)))[:1]
     subsets = [s for p in best for k in range(1, len(p.names)) for s in itertools.combinations(p.names, k)]

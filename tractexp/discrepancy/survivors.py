@@ -61,7 +61,7 @@ def survivors(explained: Explanations, seed: int) -> Survivors:
         tests = last if k == 0 else examined(explained.base.quiet, fit, last.noise, seed + 100 + k, plain=True)
         return replace(left[k], tests=tests)
 
-    retained = each_apart(tested, range(len(left)))
+    retained = each_apart(tested, range(len(left)), explained.base.context.effort.parts)
     by_name = {r.fit.names: r for r in retained}
     return Survivors(explained, tuple(retained), tuple(by_name.get(r.fit.names, r) for r in everyone))
 

@@ -84,6 +84,14 @@ class TCircuit:
             return 0.0
         return (self.X_2 + _parallel(self.X_m, self.X_1)) / (self.omega_n * self.R_2)
 
+    def parameters(self) -> dict[str, float]:
+        """What an identification finds of such a motor: the inverse of `single` and `double`."""
+        X, X_prime, X_second = self.X, self.X_prime, self.X_second
+        found = {"T_prime": self.T0_prime * X_prime / X, "X_prime": X_prime, "C": (X - X_prime) / X}
+        if self.X_2 is not None:
+            found |= {"T_second": self.T0_second * X_second / X_prime, "X_second": X_second}
+        return found
+
     def impedance(self, slip: float) -> complex:
         """Seen from the terminals at a slip."""
         rotor = complex(self.R_1 / slip, self.X_1)

@@ -1,10 +1,10 @@
 """What an export is: an identified load, and the formats that write it for other simulators."""
 
 from abc import abstractmethod
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import Plugin
+from tractexp.record.identity import label
 from tractexp.record.own_base import scaled
 
 
@@ -45,6 +46,11 @@ class Identified:
         return {name: scaled(value, exponents.get(name, 0), self.ratio) for name, value in parameters.items()}
 
     @property
+    def name(self) -> str:
+        """Station and load, where the record's file names them."""
+        return label(self.result.identities) or "traction load"
+
+    @property
     def omega_n(self) -> float:
         """Nominal synchronous speed [rad/s]."""
         return 2 * np.pi * self.result.before["frequency"]
@@ -74,6 +80,34 @@ class Identified:
         return build(**circuit_values, omega_n=self.omega_n, R_s=self.values.get("R_s", 0.0))
 
 
+@dataclass(frozen=True)
+class Restored:
+    """A load as the numbers of a file describe it, on the base of the export.
+
+    `model` are its parts as a model's configuration names them; `static` is what the static part draws before the
+    event, P and Q.
+    """
+
+    model: Mapping[str, Any]
+    parameters: Mapping[str, float]
+    static: tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Simulated:
+    """What another simulator, named by `by`, had a load draw: U, P and Q (N,) [pu of the export], every `step` [s].
+
+    `speed` (N,) is that of the voltage's angle, relative to nominal [rad/s].
+    """
+
+    by: str
+    step: float
+    U: np.ndarray
+    speed: np.ndarray
+    P: np.ndarray
+    Q: np.ndarray
+
+
 class Format(Plugin):
     """Base of the export formats, chosen by `task.format=NAME`."""
 
@@ -97,6 +131,17 @@ class Format(Plugin):
         if not load.model.motor.within_a_cycle:
             return []
         return ["the stator's transients are not exported: the machine of this format has none"]
+
+    def read_back(self, text: str, load: Identified) -> Restored | None:
+        """The load that the file's own numbers describe; None where the format reads none back."""
+        return None
+
+    def simulated(self, text: str, load: Identified) -> Simulated | None:
+        """A dip that the simulator of this format has played through the file; None where that is not at hand.
+
+        Raises `UserError` where it is, and fails.
+        """
+        return None
 
     def check_parts(self, load: Identified) -> None:
         """Raise `UserError` for a part of the model that this format cannot represent."""

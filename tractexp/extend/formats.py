@@ -1,6 +1,9 @@
-"""The base of export formats, and how each language quotes a text."""
+"""The base of export formats, what their files are read back into, and how each language quotes a text."""
 
 from tractexp import quoting
-from tractexp.exchange.format import Format
+from tractexp.exchange.circuit import TCircuit
+from tractexp.exchange.format import Format, Restored, Simulated
+from tractexp.exchange.playback import dip
+from tractexp.files import held
 
-__all__ = ["Format", "quoting"]
+__all__ = ["Format", "Restored", "Simulated", "TCircuit", "dip", "held", "quoting"]

@@ -1,11 +1,13 @@
 """A sample of the posterior, to confirm intervals where the likelihood is no parabola. Needs the extra [posterior]."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.uncertainty import LEVEL, Uncertainty
+from tractexp.progress import Counting, uncounted
 
 BURN = 0.3  # of the steps are thrown away
 ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own advice)
@@ -33,10 +35,12 @@ class PosteriorSample:
         return self.steps >= ENOUGH * self.autocorrelation
 
 
-def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> PosteriorSample:
+def sample(
+    uncertainty: Uncertainty, walkers: int, steps: int, seed: int, parts: Callable[[int], Counting] = uncounted
+) -> PosteriorSample:
     """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
 
-    P0 and Q0 of each event are sampled along. Raises `UserError` where emcee is not installed.
+    P0 and Q0 of each event are sampled along; `parts` counts the steps. Raises `UserError` where emcee is missing.
     """
     try:
         import emcee
@@ -58,7 +62,9 @@ def sample(uncertainty: Uncertainty, walkers: int, steps: int, seed: int) -> Pos
     start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
     sampler.random_state = np.random.RandomState(seed).get_state()
-    sampler.run_mcmc(start, steps)
+    with parts(steps) as ended:
+        for _ in sampler.sample(start, iterations=steps):
+            ended()
     chain = np.asarray(sampler.get_chain(discard=int(BURN * steps), flat=True))
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     draws = likelihood.values(chain)

@@ -9,7 +9,7 @@ Deviances are told over what a parameter's may rise by, in units of the chi-squa
 of another scatter (`Uncertainty.limits`), one threshold holds for all. Source: Chandler and Bate 2007.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -17,7 +17,17 @@ import numpy as np
 
 from tractexp.identification.descent import descend
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import BOUND, IDENTIFIED, UNIDENTIFIED, WEAK, WITHIN, ParameterVerdict, size
+from tractexp.identification.verdict import (
+    BOUND,
+    IDENTIFIED,
+    PROFILED,
+    UNIDENTIFIED,
+    WEAK,
+    WITHIN,
+    ParameterVerdict,
+    size,
+)
+from tractexp.progress import Counting, uncounted
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back
@@ -100,7 +110,6 @@ def revised(
     So is another valley, `elsewhere`.
     """
     a, b = profile.interval
-    detail = "; ".join([f"profile {a:.4g} .. {b:.4g}", *([profile.verdict] if profile.verdict else [])])
     if verdict.word == UNIDENTIFIED and "leave the record unchanged" in verdict.detail:
         return verdict
     value = (a + b) / 2
@@ -113,10 +122,11 @@ def revised(
         word = WEAK
     else:
         word = IDENTIFIED
-    return ParameterVerdict(word, f"{verdict.detail}; {detail}")
+    detail = "; ".join(filter(None, (verdict.detail, profile.verdict)))
+    return ParameterVerdict(word, detail, f"{a:.4g} .. {b:.4g} {PROFILED}")
 
 
-def checked(uncertainty: Uncertainty) -> Uncertainty:
+def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
     That is for intervals wider than `DOUBTFUL` of the value, and for parameters that have another value in another
@@ -128,7 +138,9 @@ def checked(uncertainty: Uncertainty) -> Uncertainty:
     doubtful |= uncertainty.information.identifiable & uncertainty.elsewhere
     if not doubtful.any():
         return uncertainty
-    result = profiles(uncertainty, names=[n for n, d in zip(uncertainty.names, doubtful, strict=True) if d])
+    result = profiles(
+        uncertainty, names=[n for n, d in zip(uncertainty.names, doubtful, strict=True) if d], parts=parts
+    )
     return replace(
         result.uncertainty,
         verdicts=result.verdicts,
@@ -137,16 +149,22 @@ def checked(uncertainty: Uncertainty) -> Uncertainty:
     )
 
 
-def profiles(uncertainty: Uncertainty, points: int = 24, names: Sequence[str] | None = None) -> Profiles:
+def profiles(
+    uncertainty: Uncertainty,
+    points: int = 24,
+    names: Sequence[str] | None = None,
+    parts: Callable[[int], Counting] = uncounted,
+) -> Profiles:
     """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points` points a side.
 
-    Where a point fits better than the optimum did, everything starts again from there.
+    Where a point fits better than the optimum did, everything starts again from there. `parts` counts the points.
     """
     simulations, restarts, names = 0, 0, names or uncertainty.names
     while True:
         column = np.array([uncertainty.names.index(name) for name in names])
         lanes = _Lanes(uncertainty, column, np.tile(uncertainty.unit, (len(names), 1)), np.zeros(len(names)))
-        simulations += lanes.run(points)
+        with parts(points) as ended:
+            simulations += lanes.run(points, ended)
         curves = [lanes.profile(k) for k in range(len(names))]
         better = lanes.better
         if better is None:
@@ -235,11 +253,12 @@ class _Lanes:
         self.better: np.ndarray | None = None
         self.simulations = 0
 
-    def run(self, points: int) -> int:
+    def run(self, points: int, ended: Callable[[], None] = lambda: None) -> int:
         """At most so many points on every lane, until one is better than the optimum; the simulations spent."""
         for _ in range(points):
             if not self.advance() or self.better is not None:
                 break
+            ended()
         return self.simulations
 
     def advance(self) -> bool:

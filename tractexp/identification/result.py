@@ -23,6 +23,7 @@ from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, OwnBase, Record, find_dips
+from tractexp.record.identity import Identity
 from tractexp.record.own_base import scaled
 
 TRAIN, VALIDATE = "train", "validate"
@@ -151,6 +152,11 @@ class Result:
     def base(self) -> OwnBase:
         """The base of power that the parameters are on, and that of the file."""
         return OwnBase(**self.own_base)
+
+    @property
+    def identities(self) -> list[Identity]:
+        """Which load each record is of, in the order of `records`."""
+        return [Identity.of(record) for record in self.records]
 
     def on_base_of(self, record: Record) -> dict[str, float]:
         """The parameters on the base that a record is on."""
@@ -289,7 +295,7 @@ def conclude(
         optimizer=optimizer,
         search=searched(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
+        records=[{"name": f.event.record.name, "role": f.role} | Identity.at(f.event.record).to_dict() for f in fits],
         own_base=asdict(own),
         parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*estimates.values()), exponents),
         tractexp_version=provenance.version(),

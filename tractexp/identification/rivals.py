@@ -7,7 +7,7 @@ Which structures are tried the plugins say (`Part.rival`); an effect that the eq
 static load that refuses an effect of the model.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +22,7 @@ from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, ParameterV
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
 from tractexp.plugin import discover, get
+from tractexp.progress import Counting, uncounted
 
 STARTS = 5  # of the parameters that the rival alone has
 ITERATIONS = 25
@@ -40,11 +41,13 @@ class RivalStructure:
         return {"name": self.name, "objective_ratio": self.squares, "parameters": self.values}
 
 
-def with_rivals(uncertainty: Uncertainty) -> Uncertainty:
-    """The judgement with the rival structures that fit as well as the model, or better."""
-    candidates = (
-        _fitted(uncertainty, name, model) for name, model in _structures(uncertainty.likelihood.problem.model)
-    )
+def with_rivals(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:
+    """The judgement with the rival structures that fit as well as the model, or better; `parts` counts them."""
+    structures, candidates = list(_structures(uncertainty.likelihood.problem.model)), list[RivalStructure | None]()
+    with parts(len(structures)) as ended:
+        for name, model in structures:
+            candidates.append(_fitted(uncertainty, name, model))
+            ended()
     fits = tuple(rival for rival in candidates if rival is not None)
     return replace(uncertainty, rivals=fits, verdicts=uncertainty.verdicts | dict(_moved(uncertainty, fits)))
 
@@ -62,7 +65,8 @@ def _moved(uncertainty: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterat
             abs(far - value) <= WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j]),
         )
         word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
-        yield name, ParameterVerdict(word, f"{verdict.detail}; with {by} it is {far:.4g}")
+        there = f"with {by} it is {far:.4g}"
+        yield name, replace(verdict, word=word, detail="; ".join(filter(None, (verdict.detail, there))))
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:

@@ -119,6 +119,12 @@ class Uncertainty:
             ends = np.stack([np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1)
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
+    @property
+    def samples(self) -> dict[str, int]:
+        """How much the fit stands on: `samples` values compared, `parameters` searched, what is left of freedom."""
+        compared = self.likelihood.samples
+        return {"samples": compared, "parameters": len(self.names), "freedom": compared - len(self.unit)}
+
     def fields(self) -> dict[str, Any]:
         """What `result.json` gains; numbers that do not exist are None."""
         number = lambda x: float(x) if np.isfinite(x) else None  # noqa: E731
@@ -130,7 +136,9 @@ class Uncertainty:
             "verdicts": {name: str(verdict) for name, verdict in self.verdicts.items()},
             "uncertainty": {
                 "level": LEVEL,
+                "names": list(self.names),
                 "correlation": self.information.correlation.tolist(),
+                **self.samples,
                 "profiled": list(self.profiled),
                 "noise": self.noise,
                 "tests": self.tests,

@@ -1,7 +1,7 @@
 """What an interval means, in words: identified, weakly identified and why, not identifiable and what is instead."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "not identifiable from this record",
     "at its bound",
 )
+PROFILED = "by its profile"  # of an interval in words
 WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
@@ -27,9 +28,11 @@ class ParameterVerdict:
 
     word: str
     detail: str
+    interval: str = ""  # by how much the parameter is known; a profile's where there is one
 
     def __str__(self) -> str:
-        return f"{self.word} ({self.detail})" if self.word in (IDENTIFIED, BOUND) else f"{self.word}: {self.detail}"
+        said = "; ".join(filter(None, (self.interval, self.detail)))
+        return f"{self.word} ({said})" if self.word in (IDENTIFIED, BOUND) else f"{self.word}: {said}"
 
 
 def size(value: float, low: float, high: float) -> float:
@@ -59,25 +62,27 @@ def judge(
             verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
+            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join(_trade(information, j, factors[j])), span)
         elif half[j] > WITHIN * size(value, lower[j], upper[j]):
             why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
-            verdicts[name] = ParameterVerdict(WEAK, "; ".join([shown(value, half[j], lower[j], upper[j]), *why, *edge]))
+            span = shown(value, half[j], lower[j], upper[j])
+            verdicts[name] = ParameterVerdict(WEAK, "; ".join([*why, *edge]), span)
         elif at:
             verdicts[name] = ParameterVerdict(
                 BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
             )
         else:
-            tight = "" if lower[j] <= low and high <= upper[j] else "; the interval reaches past its bounds"
-            verdicts[name] = ParameterVerdict(IDENTIFIED, shown(value, half[j], lower[j], upper[j]) + tight)
+            tight = "" if lower[j] <= low and high <= upper[j] else "the interval reaches past its bounds"
+            verdicts[name] = ParameterVerdict(IDENTIFIED, tight, shown(value, half[j], lower[j], upper[j]))
     return verdicts
 
 
 def elsewhere(verdict: ParameterVerdict, value: float) -> ParameterVerdict:
     """A verdict where the records fit as well in another valley, in which the parameter has this value."""
     word = WEAK if verdict.word == IDENTIFIED else verdict.word
-    return ParameterVerdict(word, f"{verdict.detail}; another valley, at {value:.4g}, fits as well")
+    also = f"another valley, at {value:.4g}, fits as well"
+    return replace(verdict, word=word, detail="; ".join(filter(None, (verdict.detail, also))))
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:

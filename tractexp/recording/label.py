@@ -150,7 +150,9 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
             used |= set(have)
             pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
             result.append(
-                Group(tuple(have), pairs, _shared([channels[n] for n in have]), worth[label] >= SURE, BY_NAME, missing)
+                Group(
+                    tuple(have), pairs, shared_name([channels[n] for n in have]), worth[label] >= SURE, BY_NAME, missing
+                )
             )
     return result
 
@@ -212,12 +214,12 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
             have = tuple(n for n in numbers if n is not None)
             if len(have) == size:
                 missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
-                shared = _shared([channels[n] for n in have])
+                shared = shared_name([channels[n] for n in have])
                 result.append(Group(have, pairs, shared, False, "the file's phases say so", missing))
     return result
 
 
-def _shared(channels: list[Channel]) -> str:
+def shared_name(channels: list[Channel]) -> str:
     """What the group is called: its circuit where the names say no more, else what the names share."""
     names = [c.name.strip() for c in channels]
     start = 0

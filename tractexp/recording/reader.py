@@ -17,7 +17,7 @@ from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, propose, unrecognised
-from tractexp.recording.label import order
+from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
@@ -206,9 +206,11 @@ class WaveformReader(Reader):
 
 def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
     """Which load it is, as far as the file says."""
-    fields = {"station": recording.station, "device": recording.device, "load": feeder.name}
+    load = feeder.name or shared_name([recording.channels[i] for i in feeder.currents])
+    fields = {"station": recording.station, "device": recording.device, "load": load}
     for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
         fields[key] = ", ".join(recording.channels[i].name.strip() for i in numbers)
+    fields["time"] = recording.start.isoformat() if recording.start else ""
     return {key: text for key, text in fields.items() if text}
 
 

@@ -14,6 +14,7 @@ from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.identification.model_error import in_percent
+from tractexp.record.identity import Identity, distinct, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places
 from tractexp.report.extended import equations, interval, laws, parameters, value
@@ -77,13 +78,12 @@ def gap(content: Mapping[str, Any]) -> Table:
     return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
 
 
-def report(findings: Findings, content: Mapping[str, Any], title: str) -> Report:
+def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[Identity]) -> Report:
     """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
     events = len(findings.context.events)
-    lead = (
-        f"{findings.context.model.title}, {events} event{'s' * (events > 1)} fitted, {len(findings.withheld)} held out"
-    )
-    page = Report(f"Missing effect: {title}", lead)
+    fitted = f"{events} event{'s' * (events > 1)} fitted, {len(findings.withheld)} held out"
+    lead = "; ".join([*map(str, distinct(identities)), f"{findings.context.model.title}, {fitted}"])
+    page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
     spoken = [joined([findings.catalogue.spoken(name) for name in names]) for names in findings.verdict.sets]
     head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []

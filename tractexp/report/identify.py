@@ -15,10 +15,10 @@ from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelati
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.identification.verdict import IDENTIFIED, PROFILED, TRADES
 from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
-from tractexp.provenance import in_words as identity_in_words
+from tractexp.record.identity import Identity, distinct, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
@@ -43,6 +43,7 @@ MODEL_ERROR = (
     "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
     " apparent power S. epsilon: Eq. (20)."
 )
+FIXED = "fixed"
 SMALLEST = 0.01  # of the deviance: starts closer than this ended in the same place
 
 
@@ -60,7 +61,8 @@ def summary(fit: "Identification") -> Report:
     report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
     report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
     return report.text(
-        *yardstick(fit), *start, result.acceptance, *[headline(result)] * bool(verdicts),
+        *yardstick(fit), *samples(fit), *correlations(fit), *start, result.acceptance,
+        *[headline(result)] * bool(verdicts),
         *(f"  {sentence}" for sentence in poor), *notes, *filter(None, [fit.end_of_search]),
         *(f"next: {sentence}" for sentence in fit.advice),
     )  # fmt: skip
@@ -104,8 +106,9 @@ def report(fit: "Identification") -> Report:
     """The page: what the summary says, and what one sees of it."""
     result, details = fit.result, fit.details
     uncertainty, together = details.uncertainty, details.agreement
-    names = ", ".join(e["name"] for e in result.events if e["role"] == "train")
-    page = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
+    names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
+    lead = "; ".join([*map(str, distinct(of)), f"{result.optimizer}, seed {result.seed}."])
+    page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
         as_sentence(fit.headline),
         *yardstick(fit),
@@ -117,11 +120,11 @@ def report(fit: "Identification") -> Report:
     _curves(page, details.fits, uncertainty)
     page.heading("Parameters").add(parameters(fit)).text(*map(as_sentence, machine(fit)))
     _parameters(page, fit, uncertainty)
-    page.heading("How well it fits").add(errors(fit))
+    page.heading("How well it fits").add(errors(fit)).text(*map(as_sentence, samples(fit)))
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
-    page.heading("The search and the estimate").text(as_sentence(fit.end_of_search))
+    page.heading("The search and the estimate").add(ended(fit)).text(as_sentence(fit.end_of_search))
     page.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
     _starts(page, details.estimation, uncertainty)
     page.heading("What the fit leaves")
@@ -195,6 +198,19 @@ def parameters(fit: "Identification") -> Table:
     )
 
 
+def ended(fit: "Identification") -> Table:
+    """Where the search ended beside the estimate, and a word where they differ."""
+    search, result, away = fit.result.search, fit.result, fit.astray
+    keys = [("objective", "pu²"), ("epsilon_p", "1"), ("epsilon_q", "1")] if search else []
+    rows = [[key, search[key], getattr(result, key), unit, ""] for key, unit in keys]
+    rows += [
+        [e.name, e.search, e.value, e.unit, "outside the 95 % interval" if e.name in away else ""]
+        for e in fit.parameters.values()
+        if e.verdict != FIXED
+    ]
+    return Table(["", "search ended at", "estimate", "unit", "they differ"], rows, words=(3, 4))
+
+
 def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
     """The base of the values, a picture against the bounds, and what rivals make of the parameters."""
     result = fit.result
@@ -226,9 +242,28 @@ def errors(fit: "Identification") -> Table:
     return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
 
 
+def samples(fit: "Identification") -> list[str]:
+    """How many samples were fitted, in a sentence; [] of an early result."""
+    known = fit.result.uncertainty
+    if "samples" not in known:
+        return []
+    said = f"{known['samples']} samples compared, {known['parameters']} parameters searched"
+    return [f"fitted: {said}, {known['freedom']} degrees of freedom"]
+
+
+def correlations(fit: "Identification") -> list[str]:
+    """The correlations that a terminal has room for, the strongest first; [] where none is strong."""
+    known = fit.result.uncertainty
+    names, matrix = known.get("names", []), known.get("correlation", [])
+    pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
+    strong = [f"{a} and {b} {r:+.3f}" for r, a, b in sorted(pairs, key=lambda p: -abs(p[0])) if abs(r) >= TRADES]
+    return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
+
+
 def brief(verdict: str) -> str:
-    """A verdict without what stands behind it."""
+    """A verdict without what stands behind it; a profile's interval stands in a column of its own."""
     first = verdict.partition(":")[0].partition(";")[0]
+    first = first.partition(" (")[0] if PROFILED in first else first
     return first + ")" * (first.count("(") - first.count(")"))
 
 
@@ -345,15 +380,18 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
         f"These trade against each other, so that the record knows a combination of them: {', '.join(strong)}."
         if strong else "No two parameters trade against each other."
     )  # fmt: skip
-    with page.folded("all correlations"):
-        page.table(["", *names], [[n, *(f"{r:+.2f}" for r in row)] for n, row in zip(names, matrix, strict=True)])
+    page.table(
+        ["correlation", *names],
+        [[n, *(f"{r:+.3f}" for r in row[:k]), *[""] * (len(names) - k)]
+         for k, (n, row) in enumerate(zip(names, matrix, strict=True), start=1)],
+    )  # fmt: skip
 
 
 def _origin(result: Any, command: str) -> list[list[str]]:
     rows = [["command", command]] if command else []
     rows.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
     rows += [
-        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [identity_in_words(r), f"SHA-256 {r['sha256']}"]))]
+        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [str(Identity.of(r)), f"SHA-256 {r['sha256']}"]))]
         for r in result.records
     ]
     return rows

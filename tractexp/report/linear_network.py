@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from tractexp.blocks import Report, Table
 from tractexp.identification.model_error import in_percent
 from tractexp.provenance import command
+from tractexp.record.identity import title_of
 from tractexp.report.identify import MODEL_ERROR, ROLES, SHOWN, event_curves
 from tractexp.wording import as_sentence, epsilon
 
@@ -55,8 +56,10 @@ def summary(fit: "NetworkFit") -> Report:
 
 def report(fit: "NetworkFit") -> Report:
     """The page: what the summary says, and the curves."""
-    names = ", ".join(event.record.name for event in fit.train)
-    page = Report(f"Linear network of {names}", "A model without physics: the yardstick of every other.")
+    page = Report(
+        f"Linear network of {title_of(event.record for event in fit.train)}",
+        "A model without physics: the yardstick of every other.",
+    )
     page.verdict(as_sentence(fit.headline))
     page.heading("Measured and calculated")
     for k, one in enumerate(fit.fits):

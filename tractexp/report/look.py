@@ -6,6 +6,7 @@ from typing import Any
 
 from tractexp.blocks import Report, Table
 from tractexp.recording.overview import Sight, View
+from tractexp.report import unfitted
 from tractexp.report.look_charts import charts, unassigned
 from tractexp.wording import as_sentence, change, counted, degrees, figure, share
 
@@ -74,6 +75,7 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
         page.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
+        page.items([as_sentence(said) for said in unfitted.sentences([entry])])
     else:
         page.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
         for name, command in commands:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.blocks import Report, Table
+from tractexp.report import unfitted
 from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size
 from tractexp.wording import counted, figure, joined
 
@@ -18,7 +19,7 @@ Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 def summary(content: Entry) -> Report:
     """One screen: which load and which dip to fit by which command, then a line for each file, bus and load."""
-    page = Report().text(_answer(content["files"]))
+    page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         held = [counted(len(entry["channels"]), "channel")] * bool(entry["channels"])
         page.text("; ".join([_about(entry), *held]), *(f"  note: {note}" for note in entry["notes"][:NOTES]))
@@ -37,7 +38,7 @@ def summary(content: Entry) -> Report:
 
 def everything(content: Entry) -> Report:
     """What files hold: notes, channels, loads and why they are such, all events, all commands."""
-    page = Report().text(_answer(content["files"]))
+    page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
         page.add(*[channels(entry)] * bool(entry["channels"]))

@@ -7,6 +7,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.posterior import ENOUGH, PosteriorSample
 from tractexp.identification.uncertainty import Uncertainty
+from tractexp.record.identity import title_of
 from tractexp.report.profile import ALIKE, SCATTER, axis, declared, span
 from tractexp.wording import as_sentence
 
@@ -20,7 +21,7 @@ CAPTION = (
 
 def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") -> Report:
     """The page. `grade` as on the page of the profiles."""
-    names = ", ".join(e.record.name for e in uncertainty.likelihood.problem.events)
+    names = title_of(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Posterior: {names}",
         f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",

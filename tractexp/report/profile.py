@@ -11,6 +11,7 @@ from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, shown
+from tractexp.record.identity import title_of
 from tractexp.wording import as_sentence
 
 ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
@@ -36,7 +37,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
     `grade` is the sentence that grades the identification.
     """
     uncertainty, verdicts = scan.uncertainty, scan.verdicts
-    names = ", ".join(e.record.name for e in uncertainty.likelihood.problem.events)
+    names = title_of(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Profile likelihood: {names}",
         "One parameter is held at value after value, all others are fitted again each time.",

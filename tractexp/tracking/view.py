@@ -17,6 +17,7 @@ KEY = "tractexp"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
+LOAD = "load"  # a tag of runs on the records of a station: these are compared load by load, not by optimizer
 GROUPS = ("variant", "optimizer")  # tags to group by: early runs have only the second
 STATE = {
     "searchFilter": RUNS,
@@ -46,6 +47,8 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
 
     What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals: the rest is points.
     """
+    if any(LOAD in tags for tags in runs):
+        return STATE | _of_loads()
     keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
     groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
     curves = [
@@ -58,7 +61,10 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     ]
     bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
     section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
-    columns = ("objective", "epsilon_p", "epsilon_q", "search_objective", "search_simulations")
+    columns = (
+        "model_error", "model_error_held_out", "objective", "epsilon_p", "epsilon_q", "search_objective",
+        "search_simulations",
+    )  # fmt: skip
     return STATE | {
         "groupBy": {
             "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": key} for key in keys],
@@ -67,6 +73,17 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
         "groupsExpanded": {f"tag.{group}": False for group in groups},
         "compareRunCharts": [*curves, *points, *bars],
         "compareRunSections": [section | {"isReordered": False}],
+    }  # fmt: skip
+
+
+def _of_loads() -> dict[str, Any]:
+    """The table of a station's runs, the best model of each load first to be found: columns that sort."""
+    metrics = ("model_error", "model_error_held_out", "epsilon_p", "epsilon_q", "epsilon_i", "objective")
+    tags = (LOAD, "model", "optimizer", "seed")
+    return {
+        "groupBy": None, "useGroupedValuesInCharts": False, "compareRunsMode": "TABLE",
+        "orderByKey": "metrics.`model_error`", "orderByAsc": True,
+        "selectedColumns": [*(f"metrics.`{name}`" for name in metrics), *(f"tags.`{name}`" for name in tags)],
     }  # fmt: skip
 
 
@@ -86,4 +103,5 @@ def comparison_view(uri: str) -> str:
     state = _state([run.data.tags for run in runs])
     packed = base64.b64encode(zlib.compress(json.dumps(state).encode())).decode()
     tag_experiment(names[experiment_id], {TAG: f"deflate;{packed}"}, uri)
-    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode=CHART"
+    mode = state["compareRunsMode"]
+    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode={mode}"

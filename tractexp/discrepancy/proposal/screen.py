@@ -123,7 +123,8 @@ def _scores(
 ) -> Iterator[tuple[Scored, np.ndarray]]:
     """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
     ground.noise.prepare(ground.context.drive, ground.context.valid)
-    return itertools.chain(*each_apart(lambda batch: _batch(ground, batch, noise), _batches(wanted)))
+    scored = lambda batch: _batch(ground, batch, noise)  # noqa: E731
+    return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort.parts))
 
 
 def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:

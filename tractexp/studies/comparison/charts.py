@@ -161,8 +161,15 @@ def mean_ranks(ranks: Ranks, label: str = "mean rank over the seeds (1 is best)"
     return chart.limits(None, min(1, spans.min()) - 0.1, max(len(names), spans.max()) + 0.1)
 
 
+def _about(values: Sequence[float]) -> tuple[float, float]:
+    """What an axis shows of these values: all of them, and of equal ones a neighbourhood."""
+    low, high = min(values), max(values)
+    edge = 0.08 * (high - low) or 1e-3 * max(abs(high), 1e-9)
+    return low - edge, high + edge
+
+
 def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
-    """The parameters at which every run ended, a panel for each over its bounds, and where the floor's lie."""
+    """The parameters at which every run ended, a panel for each, and where the floor's lie."""
     variants = [variant for variant in variants if any(run in polished.reached for run in variant.finished)]
     names = list(polished.parameters)
     labels = [f"{name} [{polished.units[name]}]" if polished.units[name] != "1" else name for name in names]
@@ -176,8 +183,9 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
             labels = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
             values = [run.parameters[name] for run, _ in some]
             chart.points(label, [x for _, x in some], values, color, panel, size=5, hover=labels)
-        low, high = polished.bounds[name]
-        edge = 0.03 * (high - low)
-        chart.level(polished.parameters[name], panel=panel, color=INSIDE).limits(panel, low - edge, high + edge)
+        floor = polished.parameters[name]
+        chart.level(floor, panel=panel, color=INSIDE).limits(
+            panel, *_about([floor, *(run.parameters[name] for run, _ in dots)])
+        )
     chart.ticks(None, range(len(variants)), [v.name for v in variants], turned)
     return chart.limits(None, -0.6, len(variants) - 0.4)

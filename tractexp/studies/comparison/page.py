@@ -84,7 +84,7 @@ def _parameters(page: Report, comparison: Comparison) -> None:
     inside = sum(polished.in_valley(run) is True for run in polished.reached)
     page.chart(
         drawn,
-        f"Parameters {AT_END}, over the bounds of each; dashed: those of the lowest objective, "
+        f"Parameters {AT_END}, each axis as wide as the runs scatter; dashed: those of the lowest objective, "
         f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of "
         f"{len(polished.reached)} runs there, and the others to higher valleys.",
     )

@@ -1,32 +1,44 @@
-"""Play a dip through a load in ANDES: run by a Python that has it (see andes_check.py); `andes_loads` alone imports it.
+"""Play a dip through a load in ANDES: run by a Python that has it, in a process of its own (ANDES is GPL-3).
 
-    python andes_run.py load.json dip.json response.npz
+    python _andes_run.py load.json dip.json response.npz
 
-`load.json` holds the load's tables on bus 1, as `task=export task.format=andes` writes them; `dip.json` the source's
-voltage at each step. Written: t, and at the load's bus U, angle, P and Q of each device, 100 MVA base; and the seconds
-that the time domain simulation took.
+`load.json` holds the load's tables on one bus, as `task=export task.format=andes` writes them; `dip.json` the source's
+voltage at each step. Written: t, and at the load's bus U, angle, P and Q of each device, 100 MVA base; the seconds
+that the time domain simulation took, and the version of ANDES. The line is as long for each load, in per unit of it.
 """
 
+import importlib
 import json
 import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
-import andes
 import numpy as np
 
+andes: Any = importlib.import_module("andes")  # of which no type checker need know
+
+SYSTEM = 100.0  # MVA
+SOURCE_BUS = -1  # a number that no load's bus has
 SOURCE = {
-    "Bus": [{"idx": 99, "name": "source", "Vn": 110.0}],
-    "Line": [{"idx": "line", "bus1": 99, "bus2": 1, "Vn1": 110.0, "Vn2": 110.0, "r": 0.002, "x": 0.02}],
-    "Slack": [{"idx": "G", "bus": 99, "Sn": 100.0, "Vn": 110.0, "p0": 1.0, "q0": 0.5}],
-    "GENCLS": [{"idx": "M", "bus": 99, "gen": "G", "Sn": 100.0, "Vn": 110.0, "M": 1e6, "D": 0.0, "xd1": 0.01}],
+    "Bus": [{"idx": SOURCE_BUS, "name": "source", "Vn": 110.0}],
+    "Line": [{"idx": "line", "bus1": SOURCE_BUS, "bus2": 1, "Vn1": 110.0, "Vn2": 110.0, "r": 0.002, "x": 0.02}],
+    "Slack": [{"idx": "G", "bus": SOURCE_BUS, "Sn": 100.0, "Vn": 110.0, "p0": 1.0, "q0": 0.5}],
+    "GENCLS": [{"idx": "M", "bus": SOURCE_BUS, "gen": "G", "Sn": 100.0, "Vn": 110.0, "M": 1e6, "D": 0.0, "xd1": 0.01}],
 }
 
 
 def load_case(tables, frequency):
-    """The load behind a short line from an infinite source."""
+    """The load behind a short line from an infinite source, on the load's own voltage and power."""
     case = {name: [dict(row) for row in rows] for name, rows in SOURCE.items()}
+    (bus,), (line,) = tables["Bus"], case["Line"]
+    ratings = [row["Sn"] for name in ("Motor3", "Motor5") for row in tables.get(name, ())]
+    ratings += [abs(complex(row["p0"], row["q0"])) * SYSTEM for row in tables.get("PQ", ())]
+    line["bus2"], line["Vn1"], line["Vn2"] = bus["idx"], bus["Vn"], bus["Vn"]
+    line |= {key: line[key] * min(1.0, SYSTEM / max(ratings)) for key in ("r", "x")}
+    for name in ("Bus", "Slack", "GENCLS"):
+        case[name][0]["Vn"] = bus["Vn"]
     for name, rows in tables.items():
         case.setdefault(name, []).extend(rows)
     case["Line"][0]["fn"] = case["GENCLS"][0]["fn"] = frequency
@@ -40,7 +52,9 @@ def load_case(tables, frequency):
 def start_running(system, motor):
     """Make the power flow start at a running motor: from standstill, ANDES's own guess, a loaded one diverges."""
     initialize = system.PFlow.init
-    guesses = {"slip": 0.02, "e1d": 0.2, "e1q": 0.85, "e2d": 0.2, "e2q": 0.85, "Id": 0.5, "Iq": -0.3}
+    guesses = {"slip": 0.02, "e1d": 0.2, "e1q": 0.85, "e2d": 0.2, "e2q": 0.85}
+    size = motor.Sn.v / system.config.mva  # currents are per unit of the system
+    guesses |= {"Id": 0.5 * size, "Iq": -0.3 * size}
 
     def running():
         initialize()
@@ -78,12 +92,12 @@ def play(tables, dip):
     started = time.perf_counter()
     if not system.TDS.run():
         raise SystemExit("the time domain simulation of ANDES did not converge")
-    return {"seconds": time.perf_counter() - started} | response(system, motor)
+    return {"seconds": time.perf_counter() - started} | response(system, motor, tables["Bus"][0]["idx"])
 
 
-def response(system, motor):
+def response(system, motor, bus):
     """What the load drew: the motor's own variables, and the static load by its law."""
-    series, k = system.dae.ts, list(system.Bus.idx.v).index(1)
+    series, k = system.dae.ts, list(system.Bus.idx.v).index(bus)
     U, angle = series.y[:, system.Bus.v.a[k]], series.y[:, system.Bus.a.a[k]]
     P, Q = np.zeros_like(U), np.zeros_like(U)
     if motor is not None:
@@ -96,10 +110,12 @@ def response(system, motor):
         law = system.ZIP
         P += law.pp0.v[0] + law.pi0.v[0] * U + law.pz0.v[0] * U**2
         Q += law.qp0.v[0] + law.qi0.v[0] * U + law.qz0.v[0] * U**2
-    return {"t": np.array(series.t), "U": U, "angle": angle, "P": P, "Q": Q}
+    return {"version": andes.__version__, "t": np.array(series.t), "U": U, "angle": angle, "P": P, "Q": Q}
 
 
 if __name__ == "__main__":
     andes.config_logger(40)
     tables, dip, target = sys.argv[1:]
-    np.savez(target, **play(json.loads(Path(tables).read_text()), json.loads(Path(dip).read_text())))
+    np.savez(
+        target, allow_pickle=False, **play(json.loads(Path(tables).read_text()), json.loads(Path(dip).read_text()))
+    )

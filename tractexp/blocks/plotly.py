@@ -1,0 +1,63 @@
+"""Plotly.js with what our charts draw and nothing else: a quarter of it.
+
+The library is one file of modules that esbuild has wrapped, each a top-level variable holding a function that makes the
+module at its first call; the last one registers the kinds of traces. Where that registers those of our charts alone,
+what nothing calls any more is left out. A file that is made otherwise is taken whole.
+"""
+
+import functools
+import hashlib
+import importlib.util
+import re
+from pathlib import Path
+
+from tractexp.errors import UserError
+from tractexp.store import TEXTS, key
+
+TRACE = 'moduleType:"trace",name:"bar"'  # the kind that charts need beside lines, which are part of the core
+COMMON = re.compile(r"[ ,]([\w$]+)=\([\w$]+,[\w$]+\)=>\(\)=>\{try\{return [\w$]+\|\|[\w$]+\(\([\w$]+=\{exports:")
+LAZY = re.compile(r"[ ,]([\w$]+)=\([\w$]+,[\w$]+,[\w$]+\)=>\(\)=>\{if\([\w$]+\)throw")
+REGISTERED = re.compile(r"\.register\(\[((?:[\w$]+\(\),?)+)\]\)")
+CALLED = re.compile(r"([\w$]+)\(\)")
+
+
+def library() -> Path:
+    """Plotly.js, where the package plotly is installed. Raises `UserError` where it is not."""
+    spec = importlib.util.find_spec("plotly")
+    for folder in (spec and spec.submodule_search_locations) or ():
+        if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
+            return path
+    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
+
+
+@functools.cache
+def code() -> str:
+    """The library as pages carry it."""
+    whole = library().read_bytes()
+    made = key("plotly", *(hashlib.sha256(content).hexdigest() for content in (whole, Path(__file__).read_bytes())))
+    return TEXTS.get(made, lambda: needed(whole.decode()).encode()).decode()
+
+
+def needed(whole: str) -> str:
+    """What our charts need of the library; all of it where it is made otherwise than known."""
+    common, lazy = COMMON.search(whole), LAZY.search(whole)
+    if not (common and lazy):
+        return whole
+    wraps = f"{re.escape(common[1])}|{re.escape(lazy[1])}"
+    begins = [m.start() for m in re.finditer(rf"(?<=[;\n])var [\w$]+={re.escape(common[1])}\(\(", whole)]
+    parts = [whole[a:b] for a, b in zip(begins, [*begins[1:], len(whole)], strict=True)]
+    where = {name: k for k, part in enumerate(parts) for name in re.findall(rf"([\w$]+)=(?:{wraps})\(", part)}
+    registered = REGISTERED.search(parts[-1]) if parts else None
+    calls = {k: {where[name] for name in CALLED.findall(part) if name in where} for k, part in enumerate(parts)}
+    kinds = registered[1].rstrip(",").split(",") if registered else []
+    bars = [kind for kind in kinds if any(TRACE in parts[k] for k in calls[where.get(kind[:-2], -1)])]
+    if registered is None or len(bars) != 1:
+        return whole
+    parts[-1] = parts[-1].replace(registered[0], f".register([{bars[0]}])")
+    calls[len(parts) - 1] = {where[name] for name in CALLED.findall(parts[-1]) if name in where}
+    head = whole[: begins[0]]
+    kept, todo = set[int](), {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)}
+    while todo:
+        kept.add(k := todo.pop())
+        todo |= calls[k] - kept
+    return head + "".join(parts[k] for k in sorted(kept))

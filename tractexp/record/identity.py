@@ -1,0 +1,118 @@
+"""Which load a record is of: where it was read, which channels, when, and what one per unit stands for.
+
+One object for everyone who says it: console, pages, `result.json`, MLflow, exports.
+"""
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tractexp.provenance import digest
+from tractexp.record.record import Base, Record
+
+UNKNOWN = "kV and MVA of one per unit unknown"
+DIP = re.compile(r" dip \d+$")  # behind the path of a file that holds several
+
+
+@dataclass(frozen=True)
+class Identity:
+    """`source` are texts by their keys, as far as the file says: file, station, device, load, voltages, currents, time.
+
+    `base` says what one per unit is, `given_base` what it is in the file, None where that is the same: voltage_kV,
+    power_MVA, frequency_Hz and origin each, None where nobody said it. `sha256` is of the channels as they were read.
+    """
+
+    source: Mapping[str, str]
+    base: Mapping[str, Any]
+    given_base: Mapping[str, Any] | None = None
+    sha256: str = field(default="", compare=False)
+
+    @classmethod
+    def at(cls, record: Record) -> "Identity":
+        """That of a record."""
+        in_mva = record.file_base.in_mva
+        given = None if record.original_base is None else _sizes(record.original_base, in_mva)
+        source = {"file": record.source, **record.identity}
+        return cls(source, _sizes(record.base, in_mva), given, digest(record))
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> "Identity":
+        """That of an entry of `records` in `result.json`; of an early one, without what it lacks."""
+        source, base = content.get("source", {}), content.get("base", {})
+        return cls(source, base, content.get("given_base"), content.get("sha256", ""))
+
+    def to_dict(self) -> dict[str, Any]:
+        """As `result.json` has it."""
+        content = {"sha256": self.sha256, "source": dict(self.source), "base": dict(self.base)}
+        return content | ({} if self.given_base is None else {"given_base": dict(self.given_base)})
+
+    @property
+    def station(self) -> str:
+        return self.source.get("station", "")
+
+    @property
+    def label(self) -> str:
+        """Station and load, short; "" where the file names neither."""
+        return ", ".join(filter(None, (self.station, self.source.get("load", ""))))
+
+    @property
+    def dip(self) -> str:
+        """Which dip of its file; "" where the file holds one."""
+        found = DIP.search(self.source.get("file", ""))
+        return found[0].strip() if found else ""
+
+    @property
+    def voltage(self) -> float | None:
+        """kV, line to line, that one per unit is."""
+        return self.base.get("voltage_kV")
+
+    @property
+    def power(self) -> float | None:
+        """MVA that one per unit is."""
+        return self.base.get("power_MVA")
+
+    @property
+    def recording(self) -> "Identity":
+        """The same for all dips of one recording."""
+        return Identity(dict(self.source) | {"file": DIP.sub("", self.source.get("file", ""))}, self.base)
+
+    def __str__(self) -> str:
+        said = [f"{key} {text}" * (key != "file") or text for key, text in self.source.items() if text]
+        for base, name in ((self.base, "per unit of"), (self.given_base or {}, "in the file of")):
+            sizes = [
+                f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)
+            ]
+            said += [f"{name} {' and '.join(sizes)}"] * bool(sizes)
+        return "; ".join(said if self.voltage or self.power or not said else [*said, UNKNOWN])
+
+
+def distinct(identities: Iterable[Identity]) -> list[Identity]:
+    """The recordings that records are from, each once, in their order."""
+    recordings: list[Identity] = []
+    for one in identities:
+        if one.recording not in recordings:
+            recordings.append(one.recording)
+    return recordings
+
+
+def label(identities: Iterable[Identity]) -> str:
+    """Stations and loads, each once; "" where no file names any."""
+    return " and ".join(dict.fromkeys(filter(None, (one.label for one in identities))))
+
+
+def title(identities: Iterable[Identity], names: Iterable[str]) -> str:
+    """What a page is about: station and load, where these are known, and the records' own names."""
+    return ": ".join(filter(None, (label(identities), ", ".join(names))))
+
+
+def title_of(records: Iterable[Record]) -> str:
+    """The same of records at hand."""
+    records = list(records)
+    return title(map(Identity.at, records), (record.name for record in records))
+
+
+def _sizes(base: Base, in_mva: bool) -> dict[str, Any]:
+    voltage = None if base.voltage == 1.0 else base.voltage
+    power = base.power if in_mva else None
+    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
