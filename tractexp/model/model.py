@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.errors import UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel, width
-from tractexp.kernel.layout import EVENT, INPUTS
+from tractexp.kernel.layout import EVENT, INPUTS, LANES
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
@@ -21,6 +21,7 @@ from tractexp.texts import at_hand, text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
+LONGEST = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
 CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
 
 
@@ -325,6 +326,15 @@ class Model:
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
+        lanes = LANES * max(1, int(LONGEST / (LANES * max(np.diff(drive.first) @ steps, 1))))
+        if n > lanes:
+            for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
+                some = np.ascontiguousarray(candidates[..., part])
+                written = np.empty((len(outputs), some.shape[2], drive.samples)) if outputs.size else NOTHING
+                sums[..., part], miss[..., part] = self._run(drive, some, steps, written)
+                if outputs.size:
+                    outputs[:, part] = written
+            return sums, miss
         self.kernel.run(
             candidates,
             drive.event,
