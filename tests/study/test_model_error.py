@@ -1,5 +1,6 @@
 """The size of a model's error: known answers, noise and drift told from it, the headline, `result.json` and MLflow."""
 
+import functools
 import json
 from dataclasses import replace
 
@@ -12,10 +13,16 @@ from tractexp.identification.model_error import ModelError, in_percent, model_er
 from tractexp.identification.result import Fit
 
 
+@functools.cache
+def shaped(depth):
+    """t, U and the power (2, N) of the printed equations in a dip."""
+    t, U = study.Shape(depth).voltage()
+    return t, U, study.printed(study.TYPICAL, t, U, 0.35)
+
+
 def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="dip"):
     """An event of the printed equations, and a model that is off by a share of the response in P and in Q."""
-    t, U = study.Shape(depth).voltage()
-    clean = study.printed(study.TYPICAL, t, U, 0.35)
+    t, U, clean = shaped(depth)
     rng = np.random.default_rng(seed)
     power = clean + noise * rng.standard_normal(clean.shape) + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
     event = study.event(t, U, power, name)
