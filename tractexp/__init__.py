@@ -19,6 +19,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.api.export import export as export
     from tractexp.api.generalise import generalise as generalise
     from tractexp.api.identify import identify as identify
+    from tractexp.api.linear_network import linear_network as linear_network
     from tractexp.api.load import load as load
     from tractexp.api.look import look as look
     from tractexp.api.plan import plan as plan
@@ -49,6 +50,7 @@ PUBLIC = {
     "generalise": "tractexp.api.generalise",
     "identify": "tractexp.api.identify",
     "investigate": "tractexp.api.discrepancy",
+    "linear_network": "tractexp.api.linear_network",
     "load": "tractexp.api.load",
     "look": "tractexp.api.look",
     "paper": "tractexp.studies.api.paper",

@@ -55,6 +55,12 @@ def defaults() -> dict[str, str]:
     return {group: name for item in content["defaults"] if isinstance(item, dict) for group, name in item.items()}
 
 
+def elsewhere(group: str, name: str) -> str:
+    """The end of a sentence on a name that is another group's: ", but there is task=plan"; "" where it is none's."""
+    holders = [g for g, names in choices().items() if name in names and g != group and (g in defaults() or "/" in g)]
+    return f", but there is {' and '.join(f'{g}={name}' for g in sorted(holders))}" if holders else ""
+
+
 @functools.cache
 def replaced(group: str, name: str) -> dict[str, str]:
     """{group: choice} that the configuration `group=name` puts in the place of the usual ones."""

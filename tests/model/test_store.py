@@ -14,9 +14,6 @@ import pytest
 from tractexp import store, texts
 from tractexp.errors import UserError
 from tractexp.kernel import objects, target
-from tractexp.model import compiling
-from tractexp.model.model import compose
-from tractexp.plugin import get
 
 ONES = store.Store("ones")
 WITHOUT_OWNERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owner in this system")
@@ -165,7 +162,7 @@ def test_planted_code_is_not_run_and_the_file_heals(folder):
     sound = path.read_bytes()
     for planted in (theirs.read_bytes(), other, sound[: store.SUM] + other, sound[:-9], b""):
         path.write_bytes(planted)
-        assert not objects.available(stored(42.0))
+        assert store.CODE.read(path.stem) is None
         assert called(42.0) == 42.0
         assert path.read_bytes() == sound
     assert store.CODE.read(path.stem) == answer
@@ -220,31 +217,6 @@ def test_nothing_is_stored_of_a_part_known_by_its_address(folder, parts):
         texts.text_of(parts, lambda: made.append(1) or "text", "text")
     assert len(made) == 2
     assert not list(folder.glob("texts/*"))
-
-
-def test_a_kernel_whose_file_is_damaged_is_compiled_with_the_others(folder, monkeypatch):
-    monkeypatch.setattr(compiling, "PATIENCE", 60.0)
-    motor, static = get("model/motor", "none")(), get("model/static", "zip")()
-    models = [compose(motor, static), compose(get("model/motor", "voltage")(), static)]
-    said = []
-    compiling.compile_missing(models, lambda: said.append(1))
-    assert [model.bare().has_kernel for model in models] == [True, True]
-    code_path(models[1].source).write_bytes(b"code")
-    assert [model.bare().has_kernel for model in models] == [True, False]
-    compiling.compile_missing(models, lambda: said.append(1))
-    assert all(model.bare().has_kernel for model in models)
-    assert not said  # of what takes less than its patience nothing is said
-
-
-def test_many_kernels_are_compiled_side_by_side_and_it_is_said_once(folder, monkeypatch):
-    monkeypatch.setattr(compiling, "FEW", 1)
-    monkeypatch.setattr(compiling, "PATIENCE", 0.0)
-    static = get("model/static", "zip")()
-    models = [compose(get("model/motor", name)(), static) for name in ("none", "voltage", "mechanical")]
-    said = []
-    compiling.compile_missing(models, lambda: said.append(1))
-    assert all(model.bare().has_kernel for model in models)
-    assert said == [1]
 
 
 # where it is kept

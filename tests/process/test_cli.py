@@ -262,8 +262,8 @@ def test_the_help_is_short_narrow_and_tells_what_each_task_does(tmp_path):
     assert len(lines) < 60
     assert max(map(len, lines)) <= 100
     for part in (
-        "  compare      Settle which optimizer is better", "identify by default", "issa and 12 variants", "ssa and 15",
-        "pso,", "pso_limited,", "covariant_sparrow",
+        "  compare         Settle which optimizer is better", "identify by default", "issa and 12 variants",
+        "ssa and 15", "pso,", "pso_limited,", "covariant_sparrow",
         "third_order_exponential, ", " others", "tractexp list GROUP", "tractexp ui", "-m optimizer=issa,ssa,pso",
     ):  # fmt: skip
         assert part in done.stdout, part

@@ -340,7 +340,7 @@ def test_every_call_has_the_door_and_every_result_a_picture():
             UserError, match=rf"^{name}\(\) has no argument 'nonsense'|is no setting|nothing to|missing a required"
         ):
             getattr(tractexp, name)(nonsense=1)
-    assert len(known_kinds()) == 14
+    assert len(known_kinds()) == 15
     for cls in known_kinds().values():
         assert issubclass(cls, Outcome)
         assert cls._repr_html_

@@ -227,6 +227,11 @@ class Identification(Written):
         return ModelError.of(content)
 
     @property
+    def yardstick(self) -> str:
+        """How many times what the best linear network leaves this model does, in a sentence; "" where not judged."""
+        return self.result.linear_network.get("sentence", "")
+
+    @property
     def advice(self) -> list[str]:
         """What to do next, the most pressing first; none where it was not judged."""
         return self.result.advice
@@ -385,6 +390,7 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     from tractexp.identification.profile import checked
     from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_nothing_found
     from tractexp.identification.rivals import with_rivals
+    from tractexp.identification.yardstick import yardstick
 
     problem = setup.problem
     refuse_nothing_found(problem, found)
@@ -404,15 +410,17 @@ def _concluded(setup: FitSpec, found: "SearchResult") -> tuple[Result, FitDetail
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
     advice = advise(uncertainty, adequacy, together.odd if together else (), data=data)
+    beside = yardstick(fits, result.model_error)
     result = replace(
-        result, **fields, adequacy=adequacy.to_dict(), starts=starts, rival_structures=structures, advice=advice
-    )
+        result, **fields, adequacy=adequacy.to_dict(), linear_network=beside, starts=starts,
+        rival_structures=structures, advice=advice,
+    )  # fmt: skip
     return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
 
 
 @plugin
 class Identify(Task, call=identify):
-    """Fit free parameters to the training events, judge on all, show and log the outcome."""
+    """Fit free parameters to the training events, judge on all, show and log that."""
 
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps

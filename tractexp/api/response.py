@@ -95,7 +95,11 @@ def respond_to(model: "Model", values: np.ndarray, event: Event, own: OwnBase | 
     """
     from tractexp.identification.result import respond
 
-    fit = respond(model, values, event if own is None else own.put(event), "validate")
+    return response_of(respond(model, values, event if own is None else own.put(event), "validate"), event, own)
+
+
+def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Response:
+    """What was calculated of an event on the base `own`, on that of its file."""
     record = fit.event.record  # of waveforms, as the estimator sees recorded and calculated currents
     ratio = OwnBase.at(record).ratio if own is not None else 1.0
     P, Q, *measured = (ratio * power for power in (fit.P, fit.Q, record.P, record.Q))

@@ -19,7 +19,7 @@ from tractexp.progress import console, say
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
 # The equations of a model, without what is known of its parameters
-LOAD = ("model.motor", "model.static", "model.effects", "model.integration")
+LOAD = ("model.motor", "model.static", "model.effects", "model.integration", "model.domain")
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain")  # arguments that the model's configuration holds
 ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway

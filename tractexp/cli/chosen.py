@@ -8,7 +8,7 @@ from typing import Any
 from tractexp.api.task import ALWAYS
 from tractexp.errors import UserError
 
-OF = {"domain": "model"}  # groups that choose for another
+OF = {"domain": "model.domain"}  # groups that choose for another, and what
 
 
 def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
@@ -31,8 +31,8 @@ def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str
 
 
 def _overlap(a: str, b: str) -> bool:
-    """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too."""
-    return f"{a}.".startswith(f"{b}.") or f"{b}.".startswith(f"{a}.")
+    """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too, but no domain."""
+    return a == b or f"{a}.".startswith(f"{b}.") or (f"{b}.".startswith(f"{a}.") and b not in OF.values())
 
 
 @functools.cache

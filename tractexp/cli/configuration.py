@@ -12,7 +12,10 @@ from typing import Any
 from tractexp import files
 
 FOLDER, NEXT = ".hydra", ".hydra.next"
-KINDS = ("discrepancy", "generalise", "posterior", "plan", "profile", "survey", "benchmark", "comparison", "paper")
+KINDS = (
+    "discrepancy", "generalise", "linear_network", "posterior", "plan", "profile", "survey", "benchmark", "comparison",
+    "paper",
+)  # fmt: skip
 RESULTS = (
     "result.json", "history.csv", "interrupted.json", "report.html", "posterior.npz", "unexplained.csv", "survey.csv",
     "survey.parquet", "paper.md", "mlflow.json",

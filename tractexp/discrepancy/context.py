@@ -12,7 +12,7 @@ from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.cores import in_same_parts, side_by_side
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.kernels import Family, Kernels
+from tractexp.discrepancy.kernels import Family, Kernels, Key
 from tractexp.discrepancy.records import Records
 from tractexp.domain import Domain, domain_of
 from tractexp.identification.descent import SeparableColumns
@@ -117,25 +117,25 @@ class Context:
         """The samples in which little happens."""
         return quiet_stretches(self.events, self.drive)
 
-    def residuals(self, unit: np.ndarray, names: Sequence[str] | None = None, pushed: bool = False) -> np.ndarray:
+    def residuals(self, unit: np.ndarray, names: Sequence[str], tested: bool = False) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
 
-        By default any effect and any push may be there, at the price of the largest kernel.
+        Where it is `tested` what they leave, any effect and any push may be there, by the largest kernel.
         """
         self.effort.spend(len(unit))
-        key = None if names is None else self.kernels.family.key(names, pushed)
+        key = self.kernels.family.key(names, tested)
         return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
 
     def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
-        """As `residuals`, with a set of names for each of the coordinates, and whether a push is in it."""
-        keys = [self.kernels.family.key(names, pushed) for names, pushed in sets]
-        if len(set(keys)) == 1:
+        """As `residuals`, with a set of names for each of the coordinates, and whether it is tested."""
+        lanes: dict[Key, list[int]] = {}
+        for lane, (names, tested) in enumerate(sets):
+            lanes.setdefault(self.kernels.family.key(names, tested), []).append(lane)
+        if len(lanes) == 1:
             return self.residuals(unit, *sets[0])
         residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
-        for key in dict.fromkeys(keys):
-            mine = np.array([k == key for k in keys])
-            first = sets[keys.index(key)]
-            residuals[mine] = self.residuals(unit[mine], *first)
+        for mine in lanes.values():
+            residuals[mine] = self.residuals(unit[mine], *sets[mine[0]])
         return residuals
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from scipy.special import chdtrc
 
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.fitting import (
     NEAR_BEST,
@@ -29,6 +29,7 @@ from tractexp.discrepancy.fitting import (
 )  # fmt: skip
 from tractexp.discrepancy.linearization import CandidateColumn
 from tractexp.discrepancy.score_test import Score
+from tractexp.discrepancy.window_search import behind_window
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
 
@@ -75,14 +76,19 @@ class Explanations:
         return not self.chosen.names and not self.faults
 
 
-def explanations(base: BaseFit, first: Disagreement, seed: int) -> Explanations:
-    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size."""
+def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: bool = False) -> Explanations:
+    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size.
+
+    Begun anew behind the recorder's window, where one takes the place of faults of the measurement.
+    """
     steps, ground = [first], first
     refits: dict[Names, Refit] = {(): first.fit}
     while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
         fits = searched([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= {f.names: f for f in fits}
+        if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
+            return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
         for further in (searched_widely, from_other_valleys) if size == 1 else ():
             ground, better = further(base, ground, refits, tests)

@@ -41,7 +41,6 @@ def against_members(
     for k, fit in enumerate(fits[:EXAMINED]):
         if not worth(fit, tests.fit, context.criteria.family_p):
             continue
-        context.kernels.family.compile_members(fit.names, context.effort.say, whole=True)
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit)]
@@ -51,14 +50,13 @@ def against_members(
 def member_fits(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], families: Container[str]
 ) -> list[Refit]:  # fmt: skip
-    """Members of some families that join the whole model, the nearest of them searched to the end; the best first."""
-    kernels = context.kernels.family
-    members = [m for m in context.catalogue.members if m.effect.family in families and kernels.joins(m.name)]
+    """Members of some families, the nearest of them searched to the end; the best first."""
+    members = [m for m in context.catalogue.members if m.effect.family in families]
     if not members or not context.domain.calibrated:
         return []
     context.effort.say(f"trying {len(members)} other places and laws")
-    kernels.compile_members([m.name for m in members], context.effort.say)
-    return wide_refits(context, noise, [starts(context, member, refits) for member in members], NEAREST)
+    wanted = [starts(context, member, refits) for member in members]
+    return wide_refits(context, noise, wanted, NEAREST, refits.values())
 
 
 def worth(member: Refit, textbook: Refit, p: float) -> bool:

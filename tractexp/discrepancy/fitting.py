@@ -74,7 +74,7 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
     """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
     begun = _descended(context, noise, wanted, None, (FIRST_ITERATIONS, ROUGH_DESCENT[1]))
     best = best_of(begun)
-    far = max(FAR_BEHIND, FAR_SHARE * (best[-1].cost - best[0].cost))
+    far = _far([r.cost for r in best])
     promising = [r.names for r in best if r.cost <= best[0].cost + far]
     again = []
     for names in promising:
@@ -83,6 +83,11 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
     return best_of(
         [*best, *_descended(context, noise, again, None, (ROUGH_DESCENT[0] - FIRST_ITERATIONS, ROUGH_DESCENT[1]))]
     )
+
+
+def _far(costs: Sequence[float]) -> float:
+    """How far behind the best of these a rough fit is given up."""
+    return max(FAR_BEHIND, FAR_SHARE * (max(costs) - min(costs)))
 
 
 def wide_refit(
@@ -135,11 +140,18 @@ def scattered(context: Context, fit: Refit) -> list[Start]:
 
 
 def wide_refits(
-    context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, faults: Sequence[str] | None = None
+    context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, others: Iterable[Refit] = (),
+    faults: Sequence[str] | None = None,
 ) -> list[Refit]:  # fmt: skip
-    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations."""
+    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations.
+
+    What is far behind the best of `others` then is given up.
+    """
     begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted))
-    begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
+    begun.sort(key=lambda fits: fits[0].cost)
+    if costs := [fit.cost for fit in others]:
+        begun = [fits for fits in begun if fits[0].cost <= min(costs) + _far(costs)]
+    begun = begun[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
     return best_of(itertools.chain(*each_apart(lambda starts: wide_refit(context, noise, starts, faults), again)))
 

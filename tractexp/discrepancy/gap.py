@@ -75,8 +75,8 @@ class GapTest:
         return self.gain > 0 or not self.telling
 
 
-def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] | None = None) -> Curves:
-    """What a fit with the named effects (by default any) leaves; beyond all measure where it has no steady state."""
+def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] = ()) -> Curves:
+    """What a fit with the named effects leaves; beyond all measure where it has no steady state."""
     residual = context.residuals(unit[None], names)
     white = context.whiten(noise, residual)[0]
     measured = context.drive.measured

@@ -85,11 +85,11 @@ class HeldOut:
         if self.leaves_more:
             return self.survivors.retained
         assessments, adequate = self.assessments, self.survivors.adequate
-        helping = [s for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps]
+        helping = {s.fit.names for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps}
         if helping:
-            helping += [s for s in adequate if s not in helping and assessments[s.fit.names].tolerable]
+            helping |= {names for names, one in assessments.items() if one.tolerable}
         of_family: dict[Names, Rival] = {}
-        for rival in helping:  # the best first: places and laws of one family are told by one name
+        for rival in (s for s in adequate if s.fit.names in helping):  # places and laws of a family: by the best's name
             of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
         return tuple(of_family.values())
 

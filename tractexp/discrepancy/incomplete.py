@@ -1,6 +1,6 @@
 """Explanations that leave more than noise, where none leaves less: named by what they predict of held-out events."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -86,7 +86,6 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
     if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
         return None
-    _compiled(weighed, [f.names for f in chosen])
 
     def rival(fit: Refit) -> Rival:
         tests = examined(explained.base.quiet, fit, noise, seed, plain=True)
@@ -108,7 +107,6 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     best, size = explaining[0], len(explaining[0].names)
     others = [p for p in predicted.ranked(size) if len(p.names) == size and p not in explaining]
     bare = predicted.bare.fit
-    _compiled(weighed, [p.names for p in explaining])
 
     def rival(one: PredictionError, rejected: bool) -> Rival:
         fit = one.fit
@@ -132,13 +130,6 @@ def _named(
         weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted,
         **own,
     )  # fmt: skip
-
-
-def _compiled(weighed: HeldOut, sets: Iterable[Names]) -> None:
-    """Compile what the tests of members of families need."""
-    context = weighed.survivors.explanations.base.context
-    members = [name for names in sets for name in names if name not in context.catalogue.of_load]
-    context.kernels.family.compile_members(members, context.effort.say, whole=True)
 
 
 def _assessed(predicted: ErrorPredictions, one: PredictionError) -> Assessment:

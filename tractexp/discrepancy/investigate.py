@@ -15,7 +15,6 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
 from tractexp.discrepancy.incomplete import incomplete
-from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
@@ -25,7 +24,7 @@ from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict, word_of
-from tractexp.discrepancy.window_search import behind_recorder, beside_explanation
+from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -195,12 +194,11 @@ def investigate(
         )
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
-        Family(model, missing).compile(effort.say)
 
         records = Records.of(train)
         base = base_fit(Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
         base, first = behind_recorder(base, disagreement(base, seed), seed)
-        explained = beside_explanation(explanations(base, first, seed), seed)
+        explained = explanations(base, first, seed)
         base, first = explained.base, explained.steps[0]
         standing_out = places(first)
         surviving = survivors(explained, seed)

@@ -1,13 +1,12 @@
-"""Which kernel simulates which set of effects: few kernels, so that they are soon compiled, and each no larger than
-its set needs.
+"""Which kernel simulates which set of effects.
 
-Two effects share a kernel nearly as fast as the base model's, for sets of one of them or of both. Larger sets share
-one that holds every effect whose equations are short, and the pushes of the adequacy test; a set with a long one takes
-the kernel of everything. All give the same response up to rounding.
+A set is fitted by a kernel of its own, no larger than it needs. What it leaves is tested by one that has every other
+effect and the pushes beside it, for all sets of textbook effects the same. All give the same response up to rounding.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import threading
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,16 +17,13 @@ from tractexp.discrepancy.injection import Injection
 from tractexp.domain import domain_of
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
-from tractexp.model.compiling import compile_missing
+from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
+from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.texts import ADDRESS
 
-LONG = 2.0  # times the source of the base model
-SHARED = 2  # effects of one kernel: one each would take longer to compile, more would be slower
-_lengths: dict[str, int] = {}  # of kernels' texts, by their parts: families of one model ask for the same
-Key = tuple[frozenset[str], bool] | None  # load effects and whether pushes are in; None: everything is
+Key = tuple[frozenset[str], bool]  # load effects, and whether the other effects and the pushes are beside them
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,68 +43,29 @@ class Family:
 
     @functools.cached_property
     def whole(self) -> Model:
-        """The model with everything."""
+        """The model with every textbook effect and the pushes."""
         return self.with_effects(self.catalogue.of_load, True)
 
-    @functools.cached_property
-    def short(self) -> frozenset[str]:
-        """The load effects whose kernels are not much longer than the base model's."""
-        most = LONG * self._length(())
-        return frozenset(n for n in self.catalogue.of_load if self._length((n,)) <= most)
-
-    @functools.cached_property
-    def groups(self) -> tuple[frozenset[str], ...]:
-        """Load effects that share a kernel: short ones of nearly the same length, long ones by themselves."""
-        ranked = sorted(self.short, key=lambda n: (self._length((n,)), n))
-        together = [frozenset(ranked[k : k + SHARED]) for k in range(0, len(ranked), SHARED)]
-        return *together, *(frozenset((n,)) for n in self.catalogue.of_load if n not in self.short)
-
-    def _length(self, names: Iterable[str]) -> int:
-        model = self.with_effects(names)
-        key = repr((model.motor, model.static, model.effects, model.domain))
-        if key not in _lengths or ADDRESS.search(key):
-            _lengths[key] = len(model.source)
-        return _lengths[key]
-
-    def key(self, names: Iterable[str], pushed: bool = False) -> Key:
-        """The kernel that serves a set of names, with pushes or without.
-
-        A member of a family has one by itself, and one with everything.
-        """
+    def key(self, names: Iterable[str], tested: bool = False) -> Key:
+        """The kernel that fits a set of names, or by which what it leaves is tested."""
         load = frozenset(names) - set(self.catalogue.of_measurement)
-        if members := load - set(self.catalogue.of_load):
-            return (load, False) if load == members and not pushed else (members.union(self.catalogue.of_load), True)
-        if not pushed:
-            for group in (frozenset(), *self.groups):
-                if load <= group:
-                    return group, False
-        return (self.short, True) if load <= self.short else None
+        return (load.difference(self.catalogue.of_load) if tested else load), tested
 
-    def compile(self, say: Callable[[str], None]) -> None:
-        """Compile what is not in the cache yet, side by side; say what comes after it where it was long."""
-        if compile_missing(
-            self._models(), lambda: say("compiling kernels, once for this base model and these channels")
-        ):
-            say("fitting the base model")
-
-    def joins(self, name: str) -> bool:
-        """Whether a member of a family goes with the model of everything, by which what it leaves is tested."""
-        return self.whole.acceptance(self.catalogue[name].effect).refusal is None
-
-    def compile_members(self, names: Iterable[str], say: Callable[[str], None], *, whole: bool = False) -> None:
-        """Compile what members of families need, side by side: a kernel each, or with everything where `whole`."""
-        load = self.catalogue.of_load
-        models = (self.with_effects((n, *load), True) if whole else self.with_effects((n,)) for n in names)
-        compile_missing(models, lambda: say("compiling kernels of families, once for this model"))
-
-    def _models(self) -> Iterator[Model]:
-        """The largest first."""
-        yield self.whole
-        yield self.with_effects(self.short, True)
-        yield self.model
-        yield self.with_effects(())
-        for group in self.groups:
-            yield self.with_effects(group)
+    def of(self, key: Key) -> Model:
+        """The model of a kernel. An effect that a member of a family does not take beside it is not tested there."""
+        names, tested = key
+        if not tested:
+            return self.with_effects(names)
+        model = self.with_effects({*names, *self.catalogue.of_load}, True)
+        try:
+            model.compile()
+        except Refused:
+            beside = set(names)
+            for name in self.catalogue.of_load:
+                if self.with_effects(beside, True).acceptance(self.catalogue[name].effect).refusal is None:
+                    beside.add(name)
+            return self.with_effects(beside, True)
+        return model
 
 
 class Kernels:
@@ -136,7 +93,8 @@ class Kernels:
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
-        self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {None: self._simulator(self.whole)}
+        self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {}
+        self._one_at_a_time = threading.Lock()
 
     def _fewest(self) -> int:
         """Steps that the model of everything needs where every effect is at its null: some are stiff."""
@@ -166,14 +124,17 @@ class Kernels:
 
     def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
         """The likelihood by one kernel, and where its coordinates stand among all."""
-        if key not in self._likelihoods:
-            assert key is not None
-            model = self.family.with_effects(*key)
-            bounds = {n: v for n, v in self.bounds.items() if n in model.names}
-            fixed = {n: v for n, v in self.fixed.items() if n in model.names}
-            self._likelihoods[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
-        return self._likelihoods[key]
+        with self._one_at_a_time:
+            if key not in self._likelihoods:
+                model = self.family.of(key)
+                bounds = {n: v for n, v in self.bounds.items() if n in model.names}
+                fixed = {n: v for n, v in self.fixed.items() if n in model.names}
+                self._likelihoods[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
+            return self._likelihoods[key]
 
     def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
         before = len(self._column) + np.arange(2 * len(self.events))
-        return Likelihood.of(problem), np.r_[[self._column[n] for n in problem.space.names], before].astype(int)
+        unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
+        return Likelihood.of(problem, unweighted), np.r_[[self._column[n] for n in problem.space.names], before].astype(
+            int
+        )

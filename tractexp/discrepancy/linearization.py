@@ -76,8 +76,7 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     injected, groups = perturbations(context, fit.unit)
     k, m = len(nuisances), len(points)
     sets = [(fit.names, False)] * (1 + 2 * k)
-    sets += [((*fit.names, c.name), False) for c, _, first, last in labels for _ in range(first, last)]
-    sets += [(fit.names, True)] * len(injected)
+    sets += [(fit.names, True)] * (m + len(injected))
     raw = context.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
     base = raw[0]
     up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]

@@ -18,6 +18,8 @@ from tractexp.noise import Noise
 from tractexp.noise.random_walk import walk_of_load
 from tractexp.record import Event
 
+TOGETHER = 64  # sets of voltages in one call
+
 
 @dataclass(frozen=True, eq=False)
 class QuietNoise:
@@ -37,12 +39,13 @@ class QuietNoise:
         most = context.records.voltage_errors
         if not most:
             return cls(context, None)
-        calm = _at_voltage(context, context.events, unit)
-        off = [_at_voltage(context, context.records.off_by(k), unit) - calm for k in range(most)]
-        return cls(context, np.nan_to_num(np.array(off)))
+        calm = _at_voltages(context, [context.events], unit)
+        parts = [range(k, min(k + TOGETHER, most)) for k in range(0, most, TOGETHER)]
+        off = [_at_voltages(context, [context.records.off_by(k) for k in part], unit) - calm for part in parts]
+        return cls(context, np.nan_to_num(np.concatenate(off)))
 
-    def of_fit(self, unit: np.ndarray, names: Sequence[str] | None = None) -> Noise:
-        """The noise of the quiet residuals at coordinates (D,), of a fit with these effects, by default of any."""
+    def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
+        """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
         return self.of(unit, self.context.residuals(unit[None], names)[0])
 
     def of(
@@ -80,8 +83,11 @@ def _values(context: Context, unit: np.ndarray) -> np.ndarray:
     return space.from_unit(unit[: space.dimension])
 
 
-def _at_voltage(context: Context, events: tuple[Event, ...] | list[Event], unit: np.ndarray) -> np.ndarray:
-    """Residuals (C, N) of the base model at coordinates (D,), driven by the voltages of other events."""
+def _at_voltages(context: Context, sets: Sequence[Sequence[Event]], unit: np.ndarray) -> np.ndarray:
+    """Residuals (n, C, N) of the base model at coordinates (D,), driven by the voltages of each set of the events."""
     kernels, at = context.kernels, context.coordinates
-    problem = Problem(context.model, events, kernels.bounds, kernels.fixed, kernels.substeps)
-    return Likelihood.of(problem).residuals(np.r_[unit[at.base], unit[at.before]][None])[0]
+    everyone = [event for events in sets for event in events]
+    problem = Problem(context.model, everyone, kernels.bounds, kernels.fixed, kernels.substeps)
+    lane = np.r_[unit[at.base], np.tile(unit[at.before], len(sets))]
+    residuals = Likelihood.of(problem, white(context)).residuals(lane[None])[0]
+    return residuals.reshape(len(residuals), len(sets), -1).swapaxes(0, 1)

@@ -53,11 +53,8 @@ class Survivors:
 
 def survivors(explained: Explanations, seed: int) -> Survivors:
     """Test every refitted set of the chosen size against the chosen one."""
-    everyone, last, context = rivals(explained), explained.last, explained.base.context
+    everyone, last = rivals(explained), explained.last
     left = [r for r in everyone if not r.rejected][:MOST]
-    members = [n for r in left[1:] for n in r.fit.names if n not in context.catalogue.of_load]
-    if members:
-        context.kernels.family.compile_members(members, context.effort.say, whole=True)
 
     def tested(k: int) -> Rival:
         fit = left[k].fit

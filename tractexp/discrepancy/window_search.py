@@ -14,11 +14,11 @@ from dataclasses import dataclass
 from tractexp.discrepancy.base_fit import BaseFit, fitted_from
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
-from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.fitting import Refit, refit, rough_refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.recorder_window import windows_of
 from tractexp.discrepancy.records import Records
+from tractexp.noise import Noise
 
 FAR = 2.0  # times the deviance that a window explains: no effect that only imitates a window explains as much
 
@@ -73,24 +73,24 @@ def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | No
     return best if most < FAR * best.gained and best.gained > criteria.least_window(most) else None
 
 
-def beside_explanation(explained: Explanations, seed: int) -> Explanations:
-    """The explanations behind the recorder's window, where one does away with the faults of the measurement that the
-    chosen set has beside it; else those given. Windows are tried as long as they leave less than a shorter one."""
-    base, last, context = explained.base, explained.last, explained.base.context
-    if not last.faults or not context.domain.windowed or context.drive.windows:
-        return explained
-    least = last.p_left
-    for window in windows_of(context.events):
+def behind_window(base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int) -> BaseFit | None:
+    """The base model's fit behind the recorder's window that does away with the faults of the measurement which the
+    best explanation has beside it; None where there is none. Windows are tried as long as they leave less than a
+    shorter one. `bare` is the base model's fit without a window."""
+    context = base.context
+    if not context.domain.windowed or context.drive.windows:
+        return None
+    tests = examined(base.quiet, best, noise, seed, plain=True)
+    for window in windows_of(context.events) if tests.faults else ():
         behind = context.on(Records.of(context.records.recorded, window))
-        fit = refit(behind, last.noise, [(last.fit.names, last.fit.unit)])[0]
-        if not fit.deviance < explained.steps[0].fit.deviance:
+        fit = refit(behind, tests.noise, [(best.names, best.unit)])[0]
+        if not fit.deviance < bare.deviance:
             break  # it costs more than the explanation gains
-        tests = examined(QuietNoise.at(behind, fit.unit), fit, last.noise, seed, plain=True)
-        if tests.adequate and not tests.faults:
+        there = examined(QuietNoise.at(behind, fit.unit), fit, tests.noise, seed, plain=True)
+        if there.adequate and not there.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")
-            base = fitted_from(behind, [explained.steps[0].fit.unit], base.local_minima)
-            return explanations(base, disagreement(base, seed), seed)
-        if tests.p_left < least:
+            return fitted_from(behind, [bare.unit], base.local_minima)
+        if there.p_left < tests.p_left:
             break
-        least = tests.p_left
-    return explained
+        tests = there
+    return None

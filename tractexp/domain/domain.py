@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from tractexp.domain.playback import Playback
+from tractexp.domain.port import Complex, Port
 from tractexp.errors import UserError
 from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model
@@ -117,6 +118,14 @@ class Domain(ABC):
     @abstractmethod
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
         """What is calculated (C, N) of an event of this domain beside what was recorded."""
+
+    @abstractmethod
+    def ports(self, event: Event) -> tuple[Port, ...]:
+        """Voltage and current of an event of this domain, as a linear network sees them."""
+
+    @abstractmethod
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+        """What is compared (C, N), where deviations of the ports' currents are `responses`, (N,) complex each [pu]."""
 
     @abstractmethod
     def better(self, event: Event) -> str:

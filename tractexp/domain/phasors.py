@@ -8,6 +8,7 @@ import numpy as np
 from tractexp.domain import excitation
 from tractexp.domain.domain import DipGrid, Domain, simulated
 from tractexp.domain.playback import Playback
+from tractexp.domain.port import Complex, Port, power_port
 from tractexp.model.drive import PHASORS, Drive, Excitation
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -70,6 +71,13 @@ class PhasorDomain(Domain):
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
         return Playback.of_power(event, outputs[0], outputs[1])
+
+    def ports(self, event: Event) -> tuple[Port, ...]:
+        return (power_port(event),)
+
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+        (i,) = responses
+        return np.stack([event.P0 + i.real, event.Q0 - i.imag])
 
     def better(self, event: Event) -> str:
         """Of records that hold no samples, or too few in a cycle, nothing is said."""

@@ -11,6 +11,7 @@ import numpy as np
 from tractexp.domain import excitation, wave_errors
 from tractexp.domain.domain import DipGrid, Domain, simulated
 from tractexp.domain.playback import Playback
+from tractexp.domain.port import Complex, Port, current_ports, periodic_course
 from tractexp.model.drive import WAVES, Drive, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -77,6 +78,16 @@ class WaveDomain(Domain):
 
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
         return Playback.of_currents(cast(WaveEvent, event), outputs)
+
+    def ports(self, event: Event) -> tuple[Port, ...]:
+        return current_ports(cast(WaveEvent, event))
+
+    def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
+        event, (vector, *zero) = cast(WaveEvent, event), responses
+        i = vector * event.turn
+        return periodic_course(event, event.currents) + np.stack(
+            [i.real, i.imag, zero[0].real if zero else np.zeros(len(i))]
+        )
 
     def better(self, event: Event) -> str:
         return ""

@@ -105,6 +105,7 @@ class Result:
     adequacy: dict[str, Any] = field(default_factory=dict)  # grade, sentence, p; empty where it was not judged
     # value, interval, of_S of the fitted events; held_out the same of those; events: name, role, value, interval, of_S
     model_error: dict[str, Any] = field(default_factory=dict)
+    linear_network: dict[str, Any] = field(default_factory=dict)  # the best one beside it: `yardstick`
     rival_structures: list[dict[str, Any]] = field(default_factory=list)  # name, model_error, parameters
     advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
     notes: list[str] = field(default_factory=list)
@@ -271,7 +272,7 @@ def conclude(
         status=end.status,
         seed=seed,
         events=[f.to_dict() for f in fits],
-        model_error=_model_error(fits),
+        model_error=model_errors(fits),
         at_bound=at_bound(problem, free),
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
@@ -289,7 +290,7 @@ def conclude(
     return result, fits
 
 
-def _model_error(fits: Sequence[Fit]) -> dict[str, Any]:
+def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
     """The model's error on the fitted events together, on those held out, and on each."""
     held_out = [f for f in fits if f.role != TRAIN]
     each = [{"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits]

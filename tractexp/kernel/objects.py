@@ -24,7 +24,7 @@ class MachineCode:
         self.address: int = library[name]
 
 
-@functools.lru_cache(maxsize=512)
+@functools.cache  # for good: to free one while another thread links the next is not safe
 def load(text: str) -> MachineCode:
     """The function that this IR defines, compiled where the store does not hold it."""
     name = next(name for name in FUNCTIONS if f"define void @{name}(" in text)
@@ -34,11 +34,6 @@ def load(text: str) -> MachineCode:
     with _one_at_a_time:
         library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
         return MachineCode(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
-
-
-def available(text: str) -> bool:
-    """Whether the store holds sound object code of this IR for this machine."""
-    return CODE.read(_key(text)) is not None
 
 
 def object_code(text: str) -> bytes:

@@ -17,7 +17,7 @@ from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 from tractexp.record.window import averaged_power
-from tractexp.texts import at_hand, text_of
+from tractexp.texts import text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
@@ -169,19 +169,9 @@ class Model:
         """The kernel, compiled where the cache does not hold it."""
         return Kernel(self.source)
 
-    @property
-    def has_kernel(self) -> bool:
-        """Whether the cache holds the kernel."""
-        text = at_hand((self.motor, self.static, *self.effects), self._text_in_cache)
-        return text is not None and objects.available(text)
-
     def compile(self) -> None:
         """Have the kernel in the cache."""
         objects.object_code(self.source)
-
-    def bare(self) -> "Model":
-        """The same model before anything was derived from it: little to hand to another process."""
-        return Model(self.motor, self.static, self.effects, self.integration, self.domain)
 
     def listing(self) -> str:
         """The kernel for people to read: the equations as they were lowered, and the IR."""

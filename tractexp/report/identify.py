@@ -16,6 +16,7 @@ from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES
+from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
 from tractexp.provenance import in_words as identity_in_words
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
@@ -59,14 +60,22 @@ def summary(fit: "Identification") -> Report:
     report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
     report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
     return report.text(
-        *start, result.acceptance, *[headline(result)] * bool(verdicts), *(f"  {sentence}" for sentence in poor),
-        *notes, *filter(None, [fit.end_of_search]), *(f"next: {sentence}" for sentence in fit.advice),
+        *yardstick(fit), *start, result.acceptance, *[headline(result)] * bool(verdicts),
+        *(f"  {sentence}" for sentence in poor), *notes, *filter(None, [fit.end_of_search]),
+        *(f"next: {sentence}" for sentence in fit.advice),
     )  # fmt: skip
 
 
 def machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
     return [str(fit.operating_point)] * (fit.operating_point is not None)
+
+
+def yardstick(fit: "Identification") -> list[str]:
+    """The best linear network beside it, in a sentence, with its poles where there are some; [] where not judged."""
+    poles = fit.result.linear_network.get("poles")
+    beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
+    return [as_sentence(fit.yardstick) + beside] * bool(fit.yardstick)
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:
@@ -85,6 +94,7 @@ def report(fit: "Identification") -> Report:
     page = Report(f"Identification of {names}", f"{result.optimizer}, seed {result.seed}.")
     page.verdict(
         as_sentence(fit.headline),
+        *yardstick(fit),
         f"{as_sentence(result.acceptance)}{_of_currents(result)}",
         headline(result),
         kind=KIND[fit.grade],
@@ -135,12 +145,12 @@ def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None
     for k, fit in enumerate(fits):
         noise = deviation[:, parts[k]] if fit.role == "train" else None
         with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
-            _event(page, fit, noise)
+            event_curves(page, fit, noise)
     if waves:
         page.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
 
 
-def _event(page: Report, fit: Any, noise: np.ndarray | None) -> None:
+def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
     """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
     about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]

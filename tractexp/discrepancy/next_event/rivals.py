@@ -10,7 +10,6 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.fitting import Start, refit
-from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.domain import domain_of
@@ -46,7 +45,6 @@ def event_for(
     )  # fmt: skip
     _check(missing, named)
     with Effort(tell).audible() as effort:
-        Family(model, missing).compile(effort.say)
         context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")

@@ -3,7 +3,7 @@
 A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +14,6 @@ from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, shape_of
-from tractexp.model.compiling import compile_missing
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
@@ -29,12 +28,11 @@ class Terms(Family):
     def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
         return super().with_effects({kind_of(n) for n in names}, pushed)
 
-    def key(self, names: Iterable[str], pushed: bool = False) -> Key:
-        return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), pushed
+    def key(self, names: Iterable[str], tested: bool = False) -> Key:
+        return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), tested
 
-    def compile_kinds(self, say: Callable[[], None]) -> None:
-        """Compile both kernels, side by side, where the cache lacks them."""
-        compile_missing((self.with_effects((kind,)) for kind in KINDS), say)
+    def of(self, key: Key) -> Model:
+        return self.with_effects(*key)
 
 
 def kind_of(name: str) -> str:
@@ -66,15 +64,11 @@ def context_of_terms(original: Context) -> Context:
     faults = tuple(c for c in original.catalogue.candidates if c.measurement)
     whole = tuple(Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS))
     kernels = original.kernels
-    context = Context.of(
+    return Context.of(
         original.load, Catalogue((*faults, *whole), {}), original.records, kernels.bounds, kernels.fixed,
         original.criteria,
         original.effort, kernels.substeps, Terms,
     )  # fmt: skip
-    terms = context.kernels.family
-    assert isinstance(terms, Terms)
-    terms.compile_kinds(lambda: original.effort.say("compiling the library of terms, once for this model"))
-    return context
 
 
 def with_terms(context: Context, chosen: Sequence[Term]) -> Context:

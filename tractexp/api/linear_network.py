@@ -1,0 +1,210 @@
+"""The black box: the best linear network from the recorded voltage to the recorded current, without any physics."""
+
+import functools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Self
+
+from tractexp import files, provenance
+from tractexp.api.arguments import public
+from tractexp.api.compose import DOMAIN
+from tractexp.api.read import Dips, again, dips_of, dips_together, kept
+from tractexp.api.response import Response, response_of
+from tractexp.api.setup import recorded
+from tractexp.api.task import Job, Task
+from tractexp.blocks import Report, Table
+from tractexp.choices import choices, defaults
+from tractexp.errors import UserError, check_choice, check_range
+from tractexp.outcome import Written
+from tractexp.plugin import plugin
+from tractexp.progress import tell
+from tractexp.record import Event, OwnBase
+
+if TYPE_CHECKING:
+    from tractexp.identification.linear_network import BlackBox
+    from tractexp.identification.result import Fit
+
+MOST = 12  # poles that may be asked for
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NetworkFit(Written):
+    """The best linear network of few poles for some events, and how well it does on them and on others.
+
+    `content` is that of `linear_network.json`: `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`,
+    `model_error` as in `result.json`, `events` and `records`, and `by_poles`, what each number of poles leaves.
+    """
+
+    kind = "linear network"
+    page = "linear_network.html"
+
+    train: Dips
+    validate: Dips
+    domain: str
+    order: int | None  # poles, where they are given
+    content: Mapping[str, Any]
+
+    @functools.cached_property
+    def box(self) -> "BlackBox":
+        """The network; of a loaded result it is fitted again."""
+        return _fitted(self)[0]
+
+    @functools.cached_property
+    def fits(self) -> "list[Fit]":
+        """What it calculates of each event beside what was recorded."""
+        return _played(self.box, self)
+
+    @property
+    def poles(self) -> list[dict[str, float]]:
+        return self.content["poles"]
+
+    @property
+    def headline(self) -> str:
+        """How much of the response it leaves, in one sentence."""
+        return self.content["sentence"]
+
+    def predict(self, event: Any) -> Response:
+        """P and Q [pu] (N,) that it draws in an event, on the base of its file.
+
+        `event` is one that `tractexp.read` gave, or what it reads, holding one dip: its voltage and the power before
+        it. Raises `UserError` where the event lacks the samples of its domain.
+        """
+        (one,) = dips_of("event", event, least=1)[:1]
+        own = OwnBase.at(self.train[0].record)
+        return response_of(_play(self.box, own.put(one), "validate"), one, own)
+
+    def table(self) -> Table:
+        from tractexp.report.linear_network import poles
+
+        return poles(self)
+
+    def summary(self) -> Report:
+        from tractexp.report import linear_network
+
+        return linear_network.summary(self)
+
+    def report(self) -> Report:
+        from tractexp.report import linear_network
+
+        return linear_network.report(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        events = {"train": list(map(kept, self.train)), "validate": list(map(kept, self.validate))}
+        return events | {"domain": self.domain, "order": self.order, "content": dict(self.content)}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        train, validate = (Dips(map(again, content[key])) for key in ("train", "validate"))
+        return cls(train, validate, content["domain"], content["order"], content["content"])
+
+    def write_results(self, folder: Path) -> list[Path]:
+        return [files.write_json(folder / "linear_network.json", self.content)]
+
+
+@public
+def linear_network(
+    records: Any,
+    *,
+    validate: Any = (),
+    domain: str | None = None,
+    poles: int | None = None,  # null: as many as predict best the dips that are held out
+    progress: Any = None,
+) -> NetworkFit:
+    """Fit the best linear network of few poles from the voltage to the current of recorded dips: how good can it get?
+
+    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
+    judged, and tell the number of `poles`, up to four, where that is not given; without them an information criterion
+    does. With `domain="waves"` space vectors of sampled currents follow those of the voltages, and the zero sequence
+    has a path of its own; else P and Q follow U. `progress`: a callable is told what is read, a sentence at a time.
+
+    Raises `UserError` for wrong values, and for records of too few samples or whose voltage does not move.
+    """
+    domain = domain or defaults()[DOMAIN]
+    check_choice("domain", domain, sorted(choices()[DOMAIN]))
+    if poles is not None:
+        check_range("task.poles", poles, 0, MOST)
+    train, held_out = dips_together(records, validate)
+    request = NetworkFit(train, held_out, domain, poles, {})
+    tell(progress, recorded(train, held_out))
+    box, boxes = _fitted(request)
+    return NetworkFit(train, held_out, domain, poles, files.plain(_content(request, box, boxes)))
+
+
+def _fitted(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
+    """The network for the events of a call, and those of fewer and of more poles."""
+    from tractexp.domain import DOMAINS
+    from tractexp.identification.linear_network import MOST, black_boxes, selection
+
+    domain = DOMAINS[of.domain]
+    train, held_out = domain.events(of.train), domain.events(of.validate)
+    boxes = black_boxes(domain, train, MOST if of.order is None else of.order)
+    if of.order is None:
+        return selection(boxes, train, held_out), boxes
+    if len(boxes) <= of.order:
+        raise UserError(
+            f"task.poles={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer poles,"
+            " or take a record that goes on longer"
+        )
+    return boxes[-1], boxes
+
+
+def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
+    from tractexp.identification.result import Fit
+
+    return Fit(role=role, **vars(box.play(box.domain.event(event))))
+
+
+def _played(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
+    from tractexp.identification.result import TRAIN, VALIDATE
+
+    return [_play(box, e, role) for role, events in ((TRAIN, of.train), (VALIDATE, of.validate)) for e in events]
+
+
+def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
+    from tractexp.identification.model_error import ModelError
+    from tractexp.identification.result import model_errors
+    from tractexp.identification.yardstick import network_in_words
+
+    fits = _played(box, of)
+    error, by_poles = model_errors(fits), []
+    for one in boxes:
+        own = model_errors(_played(one, of))
+        held = own["held_out"] and own["held_out"]["value"]
+        by_poles.append({"poles": len(one.poles), "model_error": own["value"], "held_out": held})
+    sentence = f"{network_in_words(len(box.poles))} leaves {ModelError.of(error)}"
+    if error["held_out"]:
+        sentence += f", and of the held-out dips {ModelError.of(error['held_out'])}"
+    return {
+        "sentence": sentence, "poles": box.poles, "chosen_by": box.chosen_by or f"task.poles={of.order}",
+        "model_error": error,
+        "events": [fit.to_dict() for fit in fits], "by_poles": by_poles,
+        "records": [{"role": f.role, "name": f.event.record.name} | provenance.identity(f.event.record) for f in fits],
+        "tractexp_version": provenance.version(), "commit": provenance.commit(),
+    }  # fmt: skip
+
+
+@plugin
+class LinearNetwork(Task, call=linear_network):
+    """Fit the best linear network of few poles, a model without physics: linear_network.html and .json.
+
+    What it leaves is what a model can hardly go below by linear equations; each identification says how much more it
+    leaves itself.
+    """
+
+    reads = ("data", "model.domain")
+    instead = {"model": "a network has no equations: leave it out"}
+
+    def perform(self, job: Job, **instead: Any) -> NetworkFit:
+        return super().perform(job, domain=job.config["model"]["domain"], **instead)
+
+    def logged(self, job: Job, result: NetworkFit) -> dict[str, Any]:
+        error = result.content["model_error"]
+        metrics = {"model_error": error["value"], "poles": len(result.poles)}
+        if error["held_out"]:
+            metrics["model_error_held_out"] = error["held_out"]["value"]
+        names = " and ".join(event.record.name for event in result.train)
+        return {
+            "name": f"linear network, {names}", "metrics": metrics, "description": result.headline,
+            "records": result.content["records"],
+        }  # fmt: skip

@@ -1,0 +1,143 @@
+r"""The best linear network of a few poles from the recorded voltage to the recorded current: a model without physics.
+
+    i = G u + C du/dt + sum_k g_k s / (s - p_k) u
+
+u and i deviate from their course before the dip, complex (`tractexp.domain.port`); G is how the current follows a
+voltage that stays, C a capacitance, g_k what pole k adds at first and what dies out with it. The zero sequence has the
+path of a resistance and an inductance, g / (s - p) u. Between samples u is a straight line: so responses are exact. The
+poles are found by variable projection (`tractexp.identification.projection`), their number by events held out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.domain import Domain, Playback
+from tractexp.domain.port import Complex, Port
+from tractexp.errors import UserError
+from tractexp.identification.projection import Projection, basis
+from tractexp.record import Event
+
+MOST = 4  # poles of the vectors
+OF_ZERO = 1  # of the zero sequence
+SAMPLES = 5  # for each unknown
+STILL = 1e-6  # pu: a voltage that moves by less tells nothing
+HELD_OUT, CRITERION = "the held-out dips", "the Bayesian information criterion"
+
+
+@dataclass(frozen=True, eq=False)
+class LinearNetwork:
+    """Poles (n,) [rad/s] in the port's frame, and the linear part (k,): g_k, C, and G where the port leaves it open."""
+
+    poles: Complex
+    coefficients: Complex
+
+    def response(self, port: Port) -> Complex:
+        """The current's deviation (N,) [pu]."""
+        return port.steady_response + basis(port, self.poles) @ self.coefficients
+
+    def squares(self, ports: Sequence[Port]) -> float:
+        """The sum of squares that it leaves from the dips on [pu²]."""
+        return sum(float(np.nansum(np.abs(rest) ** 2)) for rest in map(self.residual, ports))
+
+    def residual(self, port: Port) -> Complex:
+        """What it leaves from the dip on (n,) [pu]; nan where the current is not compared."""
+        return (port.i - self.response(port))[port.start :]
+
+
+@dataclass(frozen=True, eq=False)
+class BlackBox:
+    """A linear network for each port of a domain, and by what the number of its poles was chosen."""
+
+    domain: Domain
+    networks: tuple[LinearNetwork, ...]
+    turns: float  # Hz, of the frame
+    chosen_by: str = ""
+
+    @property
+    def poles(self) -> list[dict[str, float]]:
+        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the vectors, the slowest first.
+
+        In waveforms the frequency is that in the phases, negative where the vector turns backwards; in phasors P and Q
+        oscillate with it. The admittance is what the pole adds at first and what dies out.
+        """
+        poles, shares = self.networks[0].poles, np.abs(self.networks[0].coefficients)
+        turning = poles.imag / (2 * np.pi) + self.turns if self.turns else np.abs(poles.imag) / (2 * np.pi)
+        rows = zip((-poles.real).tolist(), turning.tolist(), shares.tolist(), strict=False)
+        return [dict(zip(("decay", "frequency", "admittance"), row, strict=True)) for row in sorted(rows)]
+
+    def play(self, event: Event) -> Playback:
+        """What it calculates of an event of its domain."""
+        responses = [n.response(port) for n, port in zip(self.networks, self.domain.ports(event), strict=False)]
+        return self.domain.comparison(event, self.domain.outputs(event, responses))
+
+
+def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST) -> list[BlackBox]:
+    """The best ones for events of a domain together, of no pole, one, and so on.
+
+    Raises `UserError` where the voltage does not move, or the samples are too few for a network without poles.
+    """
+    vectors, *zeros = zip(*map(domain.ports, train), strict=False)
+    _refuse(vectors, ", ".join(e.record.name for e in train))
+    zero = [networks(ports, OF_ZERO)[-1] for ports in zeros]
+    return [BlackBox(domain, (one, *zero), vectors[0].turns) for one in networks(vectors, most)]
+
+
+def best(domain: Domain, train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
+    """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes` does."""
+    return selection(black_boxes(domain, train), train, held_out)
+
+
+def selection(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
+    """The one that leaves least of events that it has not seen; without such, of the least information criterion."""
+    vectors = [box.networks[0] for box in boxes]
+    ports = [boxes[0].domain.ports(event)[0] for event in held_out or train]
+    by = [one.squares(ports) for one in vectors] if held_out else information(vectors, ports)
+    return replace(boxes[int(np.argmin(by))], chosen_by=HELD_OUT if held_out else CRITERION)
+
+
+def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
+    """The best network of no pole, one, and so on, up to `most` or to what the samples allow."""
+    fit = Projection.of(ports)
+    found = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
+    while len(found) <= most and _samples(ports) >= SAMPLES * unknowns(len(found), ports[0]):
+        poles = fit.optimum(np.append(found[-1].poles, fit.start(found[-1].poles)))
+        found.append(LinearNetwork(poles, fit.linear_part(poles).coefficients))
+    return found
+
+
+def information(found: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
+    """The Bayesian information criterion of each (b,); samples count as what the last one leaves is correlated in time.
+
+    Source: Schwarz 1978; Bayley and Hammersley 1946 (the effective number of samples).
+    """
+    left = np.array([one.squares(ports) for one in found])
+    rests = [found[-1].residual(port) for port in ports]
+    in_turn = abs(sum(complex(np.nansum(rest[1:] * rest[:-1].conj())) for rest in rests))
+    correlation = in_turn / max(float(left[-1]), 1e-300)
+    worth = _samples(ports) * (1 - correlation) / (1 + correlation)
+    size = np.array([unknowns(len(one.poles), ports[0]) for one in found])
+    return worth * np.log(np.maximum(left, 1e-300)) + size * np.log(max(worth, 1.0))
+
+
+def unknowns(poles: int, port: Port) -> int:
+    """Real unknowns of a network."""
+    linear = poles if port.series else poles + 1 + (port.steady is None)
+    return 2 * (poles + linear)
+
+
+def _samples(ports: Sequence[Port]) -> int:
+    """Real values from the dips on."""
+    return 2 * sum(int(np.count_nonzero(np.isfinite(port.i[port.start :]))) for port in ports)
+
+
+def _refuse(ports: Sequence[Port], names: str) -> None:
+    samples, needed = _samples(ports), SAMPLES * unknowns(0, ports[0])
+    if samples < needed:
+        raise UserError(
+            f"{names}: {samples // 2} samples from the dip on are too few for a linear network, which needs"
+            f" {-(-needed // 2)}; take a record that goes on longer, or of more samples in a second"
+        )
+    if max(float(np.abs(port.u[port.start :]).max()) for port in ports) < STILL:
+        raise UserError(f"the voltage of {names} does not change, and a network is known by what a change does")

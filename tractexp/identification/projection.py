@@ -1,0 +1,141 @@
+"""Variable projection: the poles of a network by nonlinear least squares, everything that is linear projected out.
+
+A pole more starts where one of a grid takes most of what the others leave. Bounds keep each where it dies out, within
+the time that is recorded, and is no faster than the samples show.
+Source: Golub and Pereyra 2003; Kaufman 1975 (the Jacobian).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from tractexp.domain.port import Complex, Port
+
+DECAYS = 6  # of a pole that is tried, from the slowest to the fastest
+FREQUENCIES = (0.0, 2.0, 5.0, 12.0, 25.0, 50.0, 100.0)  # Hz against the frame, of a pole that is tried
+FASTEST, HIGHEST = 0.5, 0.25  # of the sampling rate: a decay [1/s], a frequency [Hz]
+STEPS = 40  # of the nonlinear least squares
+PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is theirs
+
+
+class LinearPart(NamedTuple):
+    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), the residual (R,)."""
+
+    coefficients: Complex
+    base: Complex
+    residual: Complex
+
+
+@dataclass(frozen=True, eq=False)
+class Projection:
+    """Ports fitted together, at the R samples of all of them that are compared."""
+
+    ports: Sequence[Port]
+    current: Complex  # (R,) of all ports, without what is known of it
+    slowest: float  # 1/s
+    rate: float  # samples per second
+
+    @classmethod
+    def of(cls, ports: Sequence[Port]) -> "Projection":
+        seconds = max((len(port.u) - port.start) * port.step for port in ports)
+        current = _rows(ports, lambda port: port.i - port.steady_response)
+        return cls(ports, current, 1 / seconds, 1 / max(port.step for port in ports))
+
+    def linear_part(self, poles: Complex) -> LinearPart:
+        """The best linear part beside poles (n,)."""
+        base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
+        inside = base.conj().T @ self.current
+        return LinearPart(np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside)
+
+    @property
+    def grid(self) -> list[complex]:
+        """Poles that are tried."""
+        decays = np.geomspace(self.slowest, FASTEST * self.rate, DECAYS + 2)[1:-1].tolist()
+        turns = [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]
+        return [complex(-a, 2 * np.pi * f) for a in decays for f in sorted({*turns, *(-f for f in turns)})]
+
+    def start(self, poles: Complex) -> complex:
+        """The pole of the grid that takes most of what these leave, beside them."""
+        _, base, residual = self.linear_part(poles)
+
+        def taken(pole: complex) -> float:
+            response = _rows(self.ports, lambda port: of_pole(port, pole))
+            apart = response - base @ (base.conj().T @ response)
+            least = PARALLEL * np.linalg.norm(response) + np.finfo(float).tiny
+            return float(abs(np.vdot(residual, apart)) / max(np.linalg.norm(apart), least))
+
+        return max(self.grid, key=taken)
+
+    def optimum(self, poles: Complex) -> Complex:
+        """The poles that leave least, near these."""
+        from scipy.optimize import least_squares
+
+        n, apart = len(poles), 2 * np.pi * HIGHEST * self.rate
+        lower, upper = np.log(self.slowest), np.log(FASTEST * self.rate)
+        bounds = np.array([[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)).T
+        first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
+        found = least_squares(
+            lambda x: _parts(self.linear_part(_poles(x, n)).residual), np.clip(first, *bounds),
+            lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
+            bounds=bounds, x_scale="jac", method="dogbox", max_nfev=STEPS,
+        )  # fmt: skip
+        return _poles(found.x, n)
+
+    def jacobian(self, poles: Complex) -> np.ndarray:
+        """How what is left (2 R,) moves with the logarithms of the decays and with the frequencies."""
+        coefficients, base, _ = self.linear_part(poles)
+        moved = _rows(self.ports, lambda port: np.stack([with_pole(port, p) for p in poles], axis=1))
+        moved = moved * coefficients[: len(poles)]
+        moved = base @ (base.conj().T @ moved) - moved
+        return _parts(np.concatenate([moved * poles.real] + [1j * moved] * (not self.ports[0].series), axis=1))
+
+
+def basis(port: Port, poles: Complex) -> Complex:
+    """Responses to u (N, k): of each pole, of the derivative and, where that is open, of a constant.
+
+    Of a path in series those of its poles alone.
+    """
+    columns = [of_pole(port, pole) for pole in poles]
+    if not port.series:
+        columns += [np.gradient(port.u, port.step), *[port.u] * (port.steady is None)]
+    return np.array(columns, dtype=complex).reshape(len(columns), len(port.u)).T
+
+
+def of_pole(port: Port, pole: complex) -> Complex:
+    """The response (N,) of s / (s - p); of a path in series that of 1 / (s - p)."""
+    x = decaying(port.u, pole, port.step)
+    return x if port.series else port.u + pole * x
+
+
+def with_pole(port: Port, pole: complex) -> Complex:
+    """How that moves (N,) with the pole."""
+    x = decaying(port.u, pole, port.step)
+    moved = decaying(x, pole, port.step)
+    return moved if port.series else x + pole * moved
+
+
+def decaying(u: Complex, pole: complex, step: float) -> Complex:
+    """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line between samples."""
+    from scipy.signal import lfilter
+
+    z = pole * step
+    grown = np.expm1(z)
+    last = (grown - z) / (pole * z)
+    return np.asarray(lfilter([last, grown / pole - last], [1.0, -np.exp(z)], u))
+
+
+def _rows(ports: Sequence[Port], of: Callable[[Port], Complex]) -> Complex:
+    """What `of` gives of each port, (N, ...), at the samples that are compared, one port after the other."""
+    return np.concatenate([of(port)[np.isfinite(port.i)] for port in ports])
+
+
+def _poles(x: np.ndarray, n: int) -> Complex:
+    """Poles (n,) of the logarithms of their decays and, where they may oscillate, their frequencies [rad/s]."""
+    return -np.exp(x[:n]) + 1j * (x[n:] if len(x) > n else np.zeros(n))
+
+
+def _parts(z: Complex) -> np.ndarray:
+    """Real parts above imaginary ones."""
+    return np.concatenate([z.real, z.imag])

@@ -1,0 +1,69 @@
+"""The page of a linear network: how good a model without physics is, and the poles of the load."""
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING
+
+from tractexp.blocks import Report, Table
+from tractexp.identification.model_error import in_percent
+from tractexp.provenance import command
+from tractexp.report.identify import MODEL_ERROR, ROLES, SHOWN, event_curves
+from tractexp.wording import as_sentence, epsilon
+
+if TYPE_CHECKING:
+    from tractexp.api.linear_network import NetworkFit
+
+WAVES = "frequency: in the phases, negative where the vector turns backwards"
+PHASORS = "frequency: of P and Q"
+POLES = "admittance: what the pole adds at first and what dies out, per unit of the record's base. {}."
+
+
+def poles(fit: "NetworkFit") -> Table:
+    """Each pole, the slowest first."""
+    rows = [
+        [k, f"{p['decay']:.4g}", f"{1000 / p['decay']:.4g}", f"{p['frequency']:.4g}", f"{p['admittance']:.4g}"]
+        for k, p in enumerate(fit.poles, start=1)
+    ]
+    columns = ["pole", "decay [1/s]", "forgotten in [ms]", "frequency [Hz]", "admittance [pu]"]
+    return Table(columns, rows, "linear network", POLES.format(WAVES if fit.domain == "waves" else PHASORS))
+
+
+def numbers(fit: "NetworkFit") -> Table:
+    """What networks of fewer and of more poles leave."""
+    keys = ["model_error", *["held_out"] * bool(fit.validate)]
+    rows = [[row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]]
+    chosen = f"The number of poles is chosen by {fit.content['chosen_by']}."
+    return Table(["poles", "model error, fitted", "held out"][: 1 + len(keys)], rows, "", chosen)
+
+
+def errors(fit: "NetworkFit") -> Table:
+    """The model's error on each event, and the errors of Eq. (20)."""
+    keys = [key for key in fit.content["events"][0] if key.startswith("epsilon_")]
+    pairs = zip(fit.content["events"], fit.content["model_error"]["events"], strict=True)
+    rows = [
+        [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
+         in_percent(m["of_S"]), *(epsilon(e[key]) for key in keys)]
+        for e, m in pairs
+    ]  # fmt: skip
+    columns = ["event", "role", "model error", "95 % interval", "of S", *keys]
+    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
+
+
+def summary(fit: "NetworkFit") -> Report:
+    """How much it leaves, its poles, and what other numbers of poles leave."""
+    return Report().text(as_sentence(fit.headline)).add(poles(fit)).add(errors(fit)).add(numbers(fit))
+
+
+def report(fit: "NetworkFit") -> Report:
+    """The page: what the summary says, and the curves."""
+    names = ", ".join(event.record.name for event in fit.train)
+    page = Report(f"Linear network of {names}", "A model without physics: the yardstick of every other.")
+    page.verdict(as_sentence(fit.headline))
+    page.heading("Measured and calculated")
+    for k, one in enumerate(fit.fits):
+        with page.folded(f"{one.event.record.name}, {ROLES[one.role]}") if k >= SHOWN else nullcontext():
+            event_curves(page, one, None)
+    page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
+    page.heading("Poles").add(poles(fit))
+    page.heading("How this page was made")
+    made = [["tractexp", fit.content["tractexp_version"]], *[["command", command()]] * bool(command())]
+    return page.table(["", ""], made, words=(1,))
