@@ -360,8 +360,8 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
     for share in (0.0, 0.3, 0.9):
         folder, _ = with_store(f"cut{share}", sound[: int(share * len(sound))])
         yield observed(f"store cut short to {share:.0%}", folder, runs=1)
-    folder, _ = with_store("junk", bytes(chance.randrange(256) for _ in range(5000)))
-    yield observed("store overwritten with noise", folder, runs=1)
+    folder, database = with_store("junk", bytes(chance.randrange(256) for _ in range(5000)))
+    yield observed("store overwritten with noise, which nobody knows for ours, moved away", folder, database.unlink, 1)
     folder, database = with_store("torn", torn(sound, chance))
     yield observed("a page of the store overwritten", folder, runs=1)
     folder, database = with_store("locked", sound)
@@ -521,7 +521,7 @@ def disks(work: Path, found: dict) -> Iterator[Fault]:
                 "" if again == 0 else log.read_text()[-300:],
             )  # fmt: skip
         finally:
-            subprocess.run(["umount", str(folder)], check=False)
+            subprocess.run(["umount", "-l", str(folder)], check=False)  # what logs may be in it still
 
 
 def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
@@ -647,7 +647,7 @@ def unwritable(folder: Path) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        folder.chmod(0o755) if not as_mount else subprocess.run(["umount", str(folder)], check=True)
+        folder.chmod(0o755) if not as_mount else subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
 def readable(folder: Path) -> str:
