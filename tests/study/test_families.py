@@ -43,7 +43,7 @@ def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
     assert made.names == ("undervoltage_trip",)
     (form,) = forms(made)
     assert form.law == "catalogue"
-    assert {("static_trip",), ("motor_trip",)} & set(made.explanations.refits)
+    assert ("two_stage_trip",) in made.explanations.refits  # the others are far behind after a few iterations
 
 
 def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
@@ -280,7 +280,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
 
 
 def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_dips():
-    """How much the second opens is what the fitted dips show of it, hardly anything."""
+    """The fitted dips show hardly anything of how much the second opens; a fit to all events tells."""
     made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
     assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
@@ -288,7 +288,7 @@ def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_d
     assert told.names == ("two_stage_trip",)
     at = told.context.coordinates
     assert at.value("stage_1_tripped", told.extended.unit) == pytest.approx(0.075, rel=0.05)
-    assert 0 < at.value("stage_2_tripped", told.extended.unit) < 0.075
+    assert at.value("stage_2_tripped", told.extended.unit) == pytest.approx(0.075, rel=0.05)
 
 
 def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events():

@@ -150,9 +150,9 @@ def weighed(
 
     A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
     other must leave nothing in a fit to all events and not be far behind the best one there. That fit may also bear
-    out what does not help as it was fitted, since the fitted events may leave a part of it open; it is returned as
-    fitted to all. Where the base model is `doubted` all events need only bear with it: the held-out ones may not show
-    it at all.
+    out what does not help as it was fitted, or leaves more than chance does, since the fitted events may leave a part
+    of it open; it is returned as fitted to all. Where the base model is `doubted` all events need only bear with it:
+    the held-out ones may not show it at all.
     """
     context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
     assessments = judged_on(context, both.events, both.bare, fits)
@@ -161,12 +161,13 @@ def weighed(
     joint = {t.fit.names: t for t in both.compared(fits, seed)}
     best, plain = min(t.fit.cost for t in joint.values()), both.plain.cost
     helping = {names for names, one in assessments.items() if one.gap.helps}
+    sufficing = {names for names in helping if assessments[names].gap.left <= criteria.shown}
     for names, fitted in joint.items():
         behind = bool(criteria.rejects(fitted.fit.cost - best, 0.0, 0, plain - best))
         assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
     again = [
         fitted.fit for names, fitted in joint.items()
-        if names not in helping and not assessments[names].behind and fitted.confirmed(criteria, doubted)
+        if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria, doubted)
         and (not helping or fitted.p_left >= criteria.stands)
     ]  # fmt: skip
     return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
