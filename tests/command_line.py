@@ -6,6 +6,7 @@ import io
 import logging
 import os
 import signal
+import socket
 import subprocess
 import sys
 import warnings
@@ -33,6 +34,13 @@ def run_command(*arguments, cwd, **environment) -> subprocess.CompletedProcess:
         except SystemExit as end:
             code = end.code
     return subprocess.CompletedProcess(["tractexp", *arguments], code, out.getvalue(), err.getvalue())
+
+
+def free_port() -> int:
+    """A port that nobody listens to, asked of the system."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 @contextlib.contextmanager

@@ -64,6 +64,17 @@ def resistive_dips(tmp_path_factory) -> list[Path]:
     return paths
 
 
+@pytest.fixture(scope="session")
+def planted():
+    """An investigation that names the stator resistance in two of three generated events: of a few effects."""
+    from test_discrepancy import FEW, base, events
+
+    from tractexp.discrepancy.investigate import investigate
+
+    dips = events("stator_resistance", size=2.0, count=3)
+    return investigate(base(), dips[:2], dips[2:], {}, {}, only=FEW)
+
+
 collect_ignore = ["process/acme"]  # a package of its own, whose tests run where it is installed
 
 

@@ -2,6 +2,7 @@
 
 import base64
 import html.parser
+import json
 import re
 
 import numpy as np
@@ -55,6 +56,11 @@ def read(path) -> Reader:
     assert not re.search(r"https?://|//[a-z]|@import", text)
     assert not {"script", "link", "iframe", "img", "object", "embed", "metadata"} & set(reader.tags)
     return reader
+
+
+def charts(text):
+    """What the charts of a page's text draw, from the top."""
+    return [json.loads(data) for data in re.findall(r'<script type="application/json">([^<]*)</script>', text)]
 
 
 def unpacked(packed):

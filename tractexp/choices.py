@@ -157,7 +157,7 @@ def _class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | No
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
         if isinstance(node, ast.ImportFrom):
-            package = module.split(".")[: -node.level + _is_package(module) or None] if node.level else []
+            package = module.split(".")[: -node.level + bool(_folders(module)) or None] if node.level else []
             there = ".".join([*package, *([node.module] if node.module else [])])
             for alias in node.names:
                 if (alias.asname or alias.name) == name and there not in visited:
@@ -186,10 +186,6 @@ def _source(module: str) -> Path | None:
     package, _, name = module.rpartition(".")
     own = [folder / "__init__.py" for folder in _folders(module)]
     return next((f for f in (*own, *(folder / f"{name}.py" for folder in _folders(package))) if f.is_file()), None)
-
-
-def _is_package(module: str) -> int:
-    return int(bool(_folders(module)))
 
 
 @functools.cache

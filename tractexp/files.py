@@ -38,6 +38,11 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
+def packaged(name: str) -> str:
+    """The text of a file that the package brings along, such as `blocks/chart.js`."""
+    return (Path(__file__).parent / name).read_text(encoding="utf-8")
+
+
 def there(path: Path | str) -> bool:
     """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for no name of a file.
 
@@ -58,6 +63,12 @@ def there(path: Path | str) -> bool:
     if kind in ODD:
         raise UserError(f"{name} is {ODD[kind]}, no ordinary file; write what it holds to a file, and give that")
     return kind == stat.S_IFREG
+
+
+def check_there(path: Path) -> None:
+    """Raise `UserError` where there is no ordinary file."""
+    if not there(path):
+        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
 
 
 def read(path: Path | str, limit: int | None = None) -> bytes:

@@ -92,6 +92,7 @@ class Written(Outcome):
     """Base of the results that are written into a folder: files for machines first, then pages and figures."""
 
     page: ClassVar[str] = ""  # file of the page; "" for none
+    content: Mapping[str, Any]  # for machines
 
     def report(self) -> Report:
         """The page as a list of blocks: a notebook shows it, `save(path)` writes it.
@@ -108,8 +109,11 @@ class Written(Outcome):
         return report
 
     def write_results(self, folder: Path) -> list[Path]:
-        """Write what cannot be had again without the computation; the paths. Raises `UserError` where it cannot."""
-        raise NotImplementedError
+        """Write what cannot be had again without the computation; the paths. Raises `UserError` where it cannot.
+
+        By default the result's `content`, beside its page.
+        """
+        return [files.write_json((folder / self.page).with_suffix(".json"), self.content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
         """What is made from the results, {name of the file: what makes it}."""

@@ -78,19 +78,19 @@ def plugin(cls: Class) -> Class:
         raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
     if cls.sourced and "Source:" not in (cls.__doc__ or ""):
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
-    known = _registry.setdefault(group, {})
-    if name in known and known[name].__module__ != cls.__module__:
+    others = _registry.setdefault(group, {})
+    if name in others and others[name].__module__ != cls.__module__:
         raise UserError(
-            f"{where}: the name '{name}' in group '{group}' is taken by {known[name].__module__}; rename the file"
+            f"{where}: the name '{name}' in group '{group}' is taken by {others[name].__module__}; rename the file"
         )
     if missing := sorted(n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)):
         raise UserError(f"{where} lacks what every plugin of group '{group}' must do: define {' and '.join(missing)}")
-    made = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
-    made.name = name
-    made.parameters = _parameters(made, where)
-    made.check_class(where)
-    known[name] = made
-    return made
+    plugin_class = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
+    plugin_class.name = name
+    plugin_class.parameters = _parameters(plugin_class, where)
+    plugin_class.check_class(where)
+    others[name] = plugin_class
+    return plugin_class
 
 
 def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
@@ -98,7 +98,7 @@ def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
 
     Raises `UserError` for one that is declared wrongly.
     """
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for base in reversed(cls.__mro__):
         for name, parameter in vars(base).items():
             if isinstance(parameter, Parameter):
@@ -108,8 +108,8 @@ def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
                         " write it out a second time"
                     )
                 parameter.check(f"{where}: {name}")
-                found[name] = parameter
-    return tuple(found.values())
+                parameters[name] = parameter
+    return tuple(parameters.values())
 
 
 def schema(cls: type[Plugin]) -> type:
@@ -148,20 +148,20 @@ def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
     return _registry
 
 
-def import_all(found: Iterable[ModuleType]) -> None:
+def import_all(packages: Iterable[ModuleType]) -> None:
     """Import every module of some packages that does not start with an underscore.
 
     Raises `UserError` with file and line for a module that cannot be imported, and for a class in it that is not
     decorated with `@plugin`.
     """
-    made = [_module(name) for package in found for name in modules(package.__name__, package.__path__)]
-    for module in made:
+    imported = [_module(name) for package in packages for name in modules(package.__name__, package.__path__)]
+    for module in imported:
         _check_decorated(module)
 
 
 def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
     """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
-    refused, made = {}, []
+    refused, imported = {}, []
     for point in entry_points():
         try:
             package = _package(point)
@@ -170,10 +170,10 @@ def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, st
             continue
         for name in modules(package.__name__, package.__path__):
             try:
-                made.append(_module(name))
+                imported.append(_module(name))
             except UserError as error:
                 refused[name] = str(error)
-    for module in made:
+    for module in imported:
         try:
             _check_decorated(module)
         except UserError as error:
@@ -183,23 +183,23 @@ def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, st
 
 def _package(point: "EntryPoint") -> ModuleType:
     what = f"the plugin package '{point.value}' (entry point '{point.name}')"
-    with _told(what):
-        found = point.load()
-    if not hasattr(found, "__path__"):
+    with _import_error(what):
+        package = point.load()
+    if not hasattr(package, "__path__"):
         raise UserError(f"{what} is a single file; make it a folder with an __init__.py and a file for each plugin")
-    return found
+    return package
 
 
 def _module(name: str) -> ModuleType:
-    with _told(f"the plugin module '{name}'"):
+    with _import_error(f"the plugin module '{name}'"):
         return importlib.import_module(name)
 
 
 def _check_decorated(module: ModuleType) -> None:
     """Raise `UserError` for a class of a module that would be a plugin if it were decorated."""
-    known = tuple(cls for classes in _registry.values() for cls in classes.values())
+    classes = tuple(cls for classes in _registry.values() for cls in classes.values())
     for cls in vars(module).values():
-        if _forgotten(cls, module.__name__, known):
+        if _forgotten(cls, module.__name__, classes):
             base = next(b for b in cls.__mro__ if "group" in vars(b))
             raise UserError(
                 f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
@@ -208,15 +208,15 @@ def _check_decorated(module: ModuleType) -> None:
             )
 
 
-def _forgotten(cls: Any, module: str, known: tuple[type, ...]) -> bool:
+def _forgotten(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
     """Whether a class of a module is neither a plugin, nor what plugins are made from."""
     if not (isinstance(cls, type) and issubclass(cls, Plugin) and cls.__module__ == module and hasattr(cls, "group")):
         return False
-    return not (cls.__name__.startswith("_") or "name" in vars(cls) or any(issubclass(k, cls) for k in known))
+    return not (cls.__name__.startswith("_") or "name" in vars(cls) or any(issubclass(k, cls) for k in classes))
 
 
 @contextmanager
-def _told(what: str) -> Iterator[None]:
+def _import_error(what: str) -> Iterator[None]:
     """Tell in a sentence, with file and line, why an import failed."""
     try:
         yield
@@ -241,10 +241,10 @@ def _place(error: Exception) -> str:
 
 def get(group: str, name: str) -> type[Any]:
     """The plugin class registered as `name` in `group`; raises `UserError` with the nearest name."""
-    known = discover().get(group, {})
-    if name not in known:
-        raise UserError(f"there is no {group} '{name}'{among(name, known)}")
-    return known[name]
+    classes = discover().get(group, {})
+    if name not in classes:
+        raise UserError(f"there is no {group} '{name}'{among(name, classes)}")
+    return classes[name]
 
 
 def build(group: str, settings: Mapping[str, Any]) -> Any:
@@ -258,9 +258,9 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     for key in chosen:
         if key not in allowed:
             raise UserError(f"{group} '{cls.name}' has no setting '{key}'{among(key, allowed, 'Settings')}")
-    made = cls(**chosen)
-    made.check()
-    return made
+    instance = cls(**chosen)
+    instance.check()
+    return instance
 
 
 def of_several(group: str, given: Sequence[Any]) -> dict[str, Any]:

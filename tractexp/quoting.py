@@ -59,15 +59,15 @@ def hydra(text: str, *, literal: bool = True) -> str:
     return "'" + re.sub(r"\\*('|$)", _doubled, omegaconf(text) if literal else text) + "'"
 
 
-def _doubled(found: re.Match[str]) -> str:
+def _doubled(match: re.Match[str]) -> str:
     """Backslashes before a quote, or at the end: only there are they read as an escape."""
-    mark, slashes = found[1], found[0].removesuffix(found[1])
+    mark, slashes = match[1], match[0].removesuffix(match[1])
     return 2 * slashes + ("\\'" if mark else "")
 
 
 def omegaconf(text: str) -> str:
     """A text of a configuration, within which an interpolation is text."""
-    return INTERPOLATION.sub(lambda found: 2 * found[1] + "\\${", text)
+    return INTERPOLATION.sub(lambda match: 2 * match[1] + "\\${", text)
 
 
 def yaml(content: Mapping[str, Any]) -> str:

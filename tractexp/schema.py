@@ -53,13 +53,13 @@ def check(config: Mapping[str, Any]) -> None:
     sections = {"model.": ModelConfig, "tracking.": TrackingConfig}
     for where, kind in {"": Config, **sections}.items():
         part = config.get(where[:-1]) if where else config
-        known = [item.name for item in dataclasses.fields(kind)]
+        keys = [item.name for item in dataclasses.fields(kind)]
         if not isinstance(part, Mapping):
             raise UserError(f"{where.rstrip('.')} holds no settings; leave it as it is")
         for key in part:
-            if key not in known:
-                raise UserError(f"{where}{key}: there is no such key{among(key, known, 'Keys')}")
-        for key in known:
+            if key not in keys:
+                raise UserError(f"{where}{key}: there is no such key{among(key, keys, 'Keys')}")
+        for key in keys:
             if key not in part:
                 raise UserError(f"{where}{key} is taken out, and every run needs it; leave it as it is")
     for key, least in {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}.items():

@@ -35,8 +35,8 @@ class _Arms(Connection):
 
     @property
     def notes(self) -> tuple[str, ...]:
-        known = f"arm {self.arm} of an ideal {self.name} transformer, told from its three-phase side"
-        return (f"{known}, ratio {self.ratio:g}: the transformer's own impedance counts to the load", SINGLE)
+        origin = f"arm {self.arm} of an ideal {self.name} transformer, told from its three-phase side"
+        return (f"{origin}, ratio {self.ratio:g}: the transformer's own impedance counts to the load", SINGLE)
 
     def voltage(self) -> np.ndarray:
         return self.rows()[[ARMS.index(self.arm)]] / self.ratio

@@ -12,9 +12,9 @@ PAIRS = ("ab", "bc", "ca", "ba", "cb", "ac")
 
 def line(pair: str) -> np.ndarray:
     """Row (3,) that makes the line voltage of a pair from three phase voltages: ab is V_a - V_b."""
-    made = np.zeros(3)
-    made[PHASES.index(pair[0])], made[PHASES.index(pair[1])] = 1.0, -1.0
-    return made
+    row = np.zeros(3)
+    row[PHASES.index(pair[0])], row[PHASES.index(pair[1])] = 1.0, -1.0
+    return row
 
 
 def check_pairs(where: str, pairs: Sequence[str]) -> None:
@@ -27,16 +27,16 @@ def check_pairs(where: str, pairs: Sequence[str]) -> None:
 
 def from_lines(pairs: Sequence[str]) -> np.ndarray:
     """(3, pairs): the phase voltages of no zero sequence that these line voltages are differences of."""
-    made = np.linalg.pinv(np.array([line(pair) for pair in pairs]))
-    return np.where(np.abs(made) < 1e-12, 0.0, made)
+    inverse = np.linalg.pinv(np.array([line(pair) for pair in pairs]))
+    return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)
 
 
 def from_two(phases: str) -> np.ndarray:
     """(3, 2): three currents of no zero sequence from those of two phases."""
-    made = np.zeros((3, 2))
+    matrix = np.zeros((3, 2))
     for k, phase in enumerate(PHASES):
-        made[k] = [float(phase == p) for p in phases] if phase in phases else -1.0
-    return made
+        matrix[k] = [float(phase == p) for p in phases] if phase in phases else -1.0
+    return matrix
 
 
 def check_two(where: str, phases: str) -> None:

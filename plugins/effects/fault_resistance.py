@@ -32,7 +32,7 @@ class FaultResistance(Effect):
         import sympy
 
         on = eq.memory("fault_on", "f")
-        kept = sympy.Max(0, on - eq.step / HOLD)
-        eq.renews(on, sympy.Max(kept, left(eq, LEVEL)), 0)
+        active = sympy.Max(0, on - eq.step / HOLD)
+        eq.renews(on, sympy.Max(active, left(eq, LEVEL)), 0)
         drawn = fault_conductance * sympy.Min(1, on * HOLD / eq.step)
         eq.draw(drawn * eq.v, drawn * eq.v_zero)

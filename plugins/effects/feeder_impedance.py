@@ -116,17 +116,17 @@ def _linear(eq, drop_0):
     from sympy import I
 
     x, y = sympy.symbols("bus_x bus_y", real=True)
-    known, inside = {eq.v: x + I * y}, None
+    values, inside = {eq.v: x + I * y}, None
     if sites.bus_voltage_rate in eq:
         inside, rate = eq.lag_vector("feeder_drop", "w"), eq[sites.bus_voltage_rate]
-        drop = eq.recorded_voltage - known[eq.v]
-        known[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
-    reads = set(known)  # and what is written in it
+        drop = eq.recorded_voltage - values[eq.v]
+        values[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
+    reads = set(values)  # and what is written in it
     while more := {s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads}:
         reads |= more
-    whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in known)
+    whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in values)
     eq.define("feeder_drawn", eq.expression(sites.current), "i")
-    parts = eq.parts(whole.xreplace(known))
+    parts = eq.parts(whole.xreplace(values))
     J = [[sympy.diff(part, axis) for axis in (x, y)] for part in parts]
     if any(row.has(x, y) for rows in J for row in rows):
         raise Unfit("its current is not linear in the voltage at an instant")

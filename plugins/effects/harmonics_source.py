@@ -38,12 +38,12 @@ class HarmonicsSource(Measurement):
             first = int(np.argmax(recorded))
             last = first + int(np.searchsorted(angle[first:] - angle[first], 2 * np.pi * CYCLES))
             basis = self._basis(angle)
-            found = np.linalg.pinv(basis[first:last])  # (2 H + 1, W)
+            inverse = np.linalg.pinv(basis[first:last])  # (2 H + 1, W)
             basis[:last] = 0.0
             compared = drive.weights[:, part].any(axis=1)
             left = drive.measured[compared, None, part.start + first : part.start + last]
             left = left - power[compared, :, part.start + first : part.start + last]
-            out[compared, :, part] += values["harmonics"][e][:, None] * (left @ found.T @ basis.T)
+            out[compared, :, part] += values["harmonics"][e][:, None] * (left @ inverse.T @ basis.T)
         return out
 
     @staticmethod

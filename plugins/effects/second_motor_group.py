@@ -53,9 +53,9 @@ def _drawn(eq):
 
 def _moving(eq):
     """The states the motor's power depends on, and those that these depend on in turn."""
-    found, read = set(), {eq[site] for site in _drawn(eq)}
+    states, read = set(), {eq[site] for site in _drawn(eq)}
     while read:
-        new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - found
-        found |= new
+        new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - states
+        states |= new
         read = {eq.states[s].derivative for s in new}
-    return [s for s in eq.states if s in found]
+    return [s for s in eq.states if s in states]

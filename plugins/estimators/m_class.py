@@ -30,9 +30,9 @@ class MClass(Estimator):
     reporting: int | None = None  # phasors a second of the unit; null: the nominal frequency
 
     def check(self) -> None:
-        known = sorted({rate for table in FILTERS.values() for rate in table})
-        if self.reporting is not None and self.reporting not in known:
-            rates = ", ".join(map(str, known))
+        supported = sorted({rate for table in FILTERS.values() for rate in table})
+        if self.reporting is not None and self.reporting not in supported:
+            rates = ", ".join(map(str, supported))
             raise UserError(f"data.estimator.reporting={self.reporting} is none of the standard's rates: {rates}")
 
     def filter(self, nominal: float) -> tuple[float, float]:

@@ -23,7 +23,7 @@ class Modelica(Format):
     suffix = ".mo"
 
     def text(self, load):
-        eq, known = load.model.equations, load.before
+        eq, before = load.model.equations, load.before
         if eq.memories or load.model.measurements:
             which = next(m.name for m in (*eq.memories, *load.model.measurements))
             raise UserError(
@@ -38,7 +38,7 @@ class Modelica(Format):
             lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {quoting.modelica(about)};")
         for name, about in BEFORE.items():
             if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
-                lines.append(f"  parameter Real {name} = {known[name]!r} {quoting.modelica(about)};")
+                lines.append(f"  parameter Real {name} = {before[name]!r} {quoting.modelica(about)};")
         lines += [f"  input Real U(start = U0) {quoting.modelica('voltage [pu]')};"]
         lines += [
             f"  input Real omega_s(start = omega_s0) {quoting.modelica('synchronous speed less nominal [rad/s]')};"
@@ -47,7 +47,7 @@ class Modelica(Format):
             lines.append(f"  input Real U2 {quoting.modelica('negative-sequence voltage [pu]')};")
         lines += [f"  output Real {power} {quoting.modelica('consumed [pu]')};" for power in "PQ"]
         for symbol, start in _starts(eq):
-            lines.append(f"  Real {symbol}(start = {known[start]!r}, fixed = true);")
+            lines.append(f"  Real {symbol}(start = {before[start]!r}, fixed = true);")
         lines += [f"  Real {symbol};" for symbol in eq.steps]
         lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
         return "\n".join(lines) + "\n"
@@ -71,10 +71,10 @@ def _equations(eq):
     """(left, right) of each equation, as Modelica text; what the static load draws before the event is one name."""
     from tractexp.extend.symbols import Symbol
 
-    kept = {eq.P_s0: Symbol("P_left", real=True), eq.Q_s0: Symbol("Q_left", real=True)}
-    named = {symbol: Symbol(name, real=True) for symbol, name in zip(kept.values(), ("P_s0", "Q_s0"), strict=True)}
+    static = {eq.P_s0: Symbol("P_left", real=True), eq.Q_s0: Symbol("Q_left", real=True)}
+    named = {symbol: Symbol(name, real=True) for symbol, name in zip(static.values(), ("P_s0", "Q_s0"), strict=True)}
     at = {eq.U_rate: Symbol("der(U)", real=True), eq.t: Symbol("time", real=True)}
-    show = lambda e: _modelica(eq.real(eq.expand(e, lambda s: s not in kept).xreplace(kept)).xreplace(named | at))  # noqa: E731
+    show = lambda e: _modelica(eq.real(eq.expand(e, lambda s: s not in static).xreplace(static)).xreplace(named | at))  # noqa: E731
     rows = [(f"der({symbol})", _modelica(d.xreplace(at))) for symbol, d, _ in eq.real_states()]
     rows += [(symbol.name, show(e)) for symbol, e in eq.steps.items()]
     return [*rows, ("P", show(eq.P)), ("Q", show(eq.Q))]

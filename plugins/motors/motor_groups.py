@@ -39,7 +39,7 @@ class MotorGroups(Motor):
         members: tuple[Motor, ...] = tuple(
             build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of
         )
-        told = {
+        fields = {
             "members": members,
             "parameters": tuple(p for k, one in enumerate(members, 1) for p in _own(one, k, len(members))),
             "reads": tuple(dict.fromkeys(channel for one in members for channel in one.reads)),
@@ -47,7 +47,7 @@ class MotorGroups(Motor):
             "phasors_only": next((one.phasors_only for one in members if one.phasors_only), ""),
             "waves_only": next((one.waves_only for one in members if one.waves_only), ""),
         }
-        for key, value in told.items():  # of these groups; the class knows of none
+        for key, value in fields.items():  # of these groups; the class knows of none
             object.__setattr__(self, key, value)
 
     @property

@@ -37,5 +37,5 @@ class Archive(Reader):
             )
         check_distinct("data.train and data.validate", [*self.train, *self.validate])
         folder = Path(self.path)
-        made = records(folder, [*self.train, *self.validate], "data.train and data.validate")
-        return Events(made[: len(self.train)], made[len(self.train) :])
+        dips = records(folder, [*self.train, *self.validate], "data.train and data.validate")
+        return Events(dips[: len(self.train)], dips[len(self.train) :])

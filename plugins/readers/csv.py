@@ -130,19 +130,22 @@ class CSV(Tabular, Reader):
 
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""
-        told = beside(path)
-        table, found = self.table_of(path, told)
-        given = self.base_voltage or (told.base and told.base.voltage)
-        declared = told.base.frequency if told.base else self.frequency
-        made = powers(table, found, declared, self.reverse_current, kilovolts=given is not None)
-        window = told.window or (self.estimator and estimator_of(self.estimator).window(made.frequency))
-        arrays: Any = {**made.columns, "more": table.numbers(told.more), "window": window or None}
-        raw = Record(name=self._name(path, told), source=path, notes=(*told.notes, *made.notes), **arrays)
-        even = raw if told.uniform else raw.uniform(table.place)
-        base, note = self._base(even, made, told, base)
+        sidecar = beside(path)
+        table, mapping = self.table_of(path, sidecar)
+        given = self.base_voltage or (sidecar.base and sidecar.base.voltage)
+        declared = sidecar.base.frequency if sidecar.base else self.frequency
+        quantities = powers(table, mapping, declared, self.reverse_current, kilovolts=given is not None)
+        window = sidecar.window or (self.estimator and estimator_of(self.estimator).window(quantities.frequency))
+        arrays: Any = {**quantities.columns, "more": table.numbers(sidecar.more), "window": window or None}
+        raw = Record(name=self._name(path, sidecar), source=path, notes=(*sidecar.notes, *quantities.notes), **arrays)
+        even = raw if sidecar.uniform else raw.uniform(table.place)
+        base, note = self._base(even, quantities, sidecar, base)
         voltage, power = (
-            size if made.absolute[key] or (made.absolute[key] is None and size_given) else 1.0
-            for key, size, size_given in (("U", base.voltage, given), ("P", base.power, self.base_power or told.base))
+            size if quantities.absolute[key] or (quantities.absolute[key] is None and size_given) else 1.0
+            for key, size, size_given in (
+                ("U", base.voltage, given),
+                ("P", base.power, self.base_power or sidecar.base),
+            )
         )
         by = Base(voltage, power)
         arrays = by.per_unit(even.channels)
@@ -150,37 +153,37 @@ class CSV(Tabular, Reader):
         record.check(table.place if record.samples == raw.samples else None)
         return replace(record, notes=(*record.notes, *signs(record)))
 
-    def _name(self, path: str, told: Sidecar) -> str:
+    def _name(self, path: str, sidecar: Sidecar) -> str:
         stem = Path(path.removeprefix(PACKAGE)).stem
         stems = [Path(str(p).removeprefix(PACKAGE)).stem for p in (*self.train, *(self.validate or []))]
-        return told.name or stem if self.path or stems.count(stem) == 1 else path
+        return sidecar.name or stem if self.path or stems.count(stem) == 1 else path
 
-    def _base(self, record: Record, made: Powers, told: Sidecar, same: Base | None) -> tuple[Base, list[str]]:
+    def _base(self, record: Record, quantities: Powers, sidecar: Sidecar, same: Base | None) -> tuple[Base, list[str]]:
         """What one per unit is: given, that of the record before, or the steady state of values in kV and MW."""
-        voltage = self.base_voltage or (told.base and told.base.voltage) or (same and same.voltage)
-        power = self.base_power or (told.base and told.base.power) or (same and same.power)
-        if voltage is None and power is None and made.absolute["U"] and made.absolute["P"] is None:
+        voltage = self.base_voltage or (sidecar.base and sidecar.base.voltage) or (same and same.voltage)
+        power = self.base_power or (sidecar.base and sidecar.base.power) or (same and same.power)
+        if voltage is None and power is None and quantities.absolute["U"] and quantities.absolute["P"] is None:
             raise UserError(
                 f"{record.where}: U is in kV, and the unit of P and Q is not told; say data.units={{P: MW, Q: Mvar}} "
                 "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
             )
-        chosen_by = None if self.base_power else told.base or same
+        chosen_by = None if self.base_power else sidecar.base or same
         origin = chosen_by.origin if chosen_by else DECLARATION
-        told_by = []
-        if (voltage is None and made.absolute["U"]) or (power is None and made.absolute["P"]):
+        sources = []
+        if (voltage is None and quantities.absolute["U"]) or (power is None and quantities.absolute["P"]):
             U, S = level(record)
             if S < 1e-9:
                 raise UserError(
                     f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
                     "data.base_power (MVA)"
                 )
-            if made.absolute["U"]:
-                check_load(record.where, U, S if made.absolute["P"] else 0.0)
-            if voltage is None and made.absolute["U"]:
+            if quantities.absolute["U"]:
+                check_load(record.where, U, S if quantities.absolute["P"] else 0.0)
+            if voltage is None and quantities.absolute["U"]:
                 voltage = U
-                told_by.append(f"{U:.4g} kV line to line")
-            if power is None and made.absolute["P"]:
+                sources.append(f"{U:.4g} kV line to line")
+            if power is None and quantities.absolute["P"]:
                 power, origin = S, LOAD
-                told_by.append(f"{S:.4g} MVA")
-        note = [f"base: {' and '.join(told_by)}, the steady state before the first dip"] if told_by else []
-        return Base(voltage or 1.0, power or 1.0, made.frequency, origin), note
+                sources.append(f"{S:.4g} MVA")
+        note = [f"base: {' and '.join(sources)}, the steady state before the first dip"] if sources else []
+        return Base(voltage or 1.0, power or 1.0, quantities.frequency, origin), note

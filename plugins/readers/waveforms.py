@@ -32,7 +32,7 @@ class Waveforms(Tabular, WaveformReader):
         self.check_table()
 
     def recording(self) -> Recording:
-        told = beside(self.path)
-        if told.recording is not None:
-            return restored(self.path, told.recording)
-        return recording(*self.table_of(self.path, told), self.frequency)
+        sidecar = beside(self.path)
+        if sidecar.recording is not None:
+            return restored(self.path, sidecar.recording)
+        return recording(*self.table_of(self.path, sidecar), self.frequency)

@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -16,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_command
+from command_line import free_port, run_command
 from test_compare import samples, write_sweep
 
 from tractexp import tracking
@@ -267,9 +266,7 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
     if browser is None:
         pytest.skip("no Chromium on this machine")
     folder, _, _, _ = filled
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = probe.getsockname()[1]
+    port = free_port()
     with (tmp_path / "log").open("w") as output:
         command = [sys.executable, "-m", "tractexp", "ui", "--port", str(port)]
         server = subprocess.Popen(command, cwd=folder, stdout=output, stderr=output)

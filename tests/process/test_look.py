@@ -11,6 +11,7 @@ import pytest
 from browser import BROWSER, Worked, drawn
 from command_line import run_command
 from made_recordings import BASE, RATE, constant, recording, waves
+from pages import charts
 
 import tractexp
 import tractexp.progress
@@ -21,7 +22,7 @@ from tractexp.overrides import assigned, override
 from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.report.look import envelope
+from tractexp.report.look_charts import envelope
 from tractexp.report.look_console import summary
 
 
@@ -250,8 +251,7 @@ def test_a_saved_look_shows_the_same_and_gives_its_arrays_again(looked, tmp_path
 
 def test_the_page_holds_every_sample_and_marks_the_events(looked, tmp_path):
     page = looked.write(tmp_path)[-1].read_text(encoding="utf-8")
-    charts = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', page)]
-    whole = charts[0]
+    whole = charts(page)[0]
     u = next(trace for trace in whole["data"] if trace.get("samples"))
     held = np.frombuffer(__import__("base64").b64decode(u["samples"]["bdata"]), "<i2")
     values = u["samples"]["offset"] + u["samples"]["scale"] * held
@@ -270,7 +270,7 @@ def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tm
     trip = (np.arange(values.shape[1]) >= 0.55 * RATE).astype(np.uint8)
     status = [StatusChannel("Q1 <trip>", trip), StatusChannel("idle", 0 * trip)]
     page = tractexp.look(saved(tmp_path / "trip.cfg", values, trigger=0.49, status=status)).report().html
-    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    whole = charts(page)[0]
     (mark,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "line"]
     assert mark["x0"] == pytest.approx(0.49, abs=1e-6)
     assert "trigger" in [note["text"] for note in whole["layout"]["annotations"]]
@@ -290,14 +290,14 @@ def test_channels_of_no_load_have_a_chart_of_their_own(tmp_path):
     values = np.concatenate([constant(), 0.01 * constant()[:1], 0.02 * constant()[3:4]])
     names = ("UA", "UB", "UC", "IA", "IB", "IC", "3U0", "3I0")
     page = tractexp.look(saved(tmp_path / "rest.cfg", values, names=names)).report().html
-    charts = [json.loads(text) for text in re.findall(r'<script type="application/json">(.*?)</script>', page)]
+    last = charts(page)[-1]
     assert "The 2 channels of no load" in page
-    assert [(trace["label"], trace["panel"]) for trace in charts[-1]["data"]] == [("3U0", "u [kV]"), ("3I0", "i [kA]")]
+    assert [(trace["label"], trace["panel"]) for trace in last["data"]] == [("3U0", "u [kV]"), ("3I0", "i [kA]")]
 
 
 def test_a_page_without_status_channels_or_trigger_says_nothing_of_them(looked):
     page = looked.report().html
-    whole = json.loads(re.findall(r'<script type="application/json">(.*?)</script>', page)[0])
+    whole = charts(page)[0]
     assert "status" not in {axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")}
     assert "Status channels" not in page
 

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_command
+from command_line import free_port, run_command
 
 from tractexp import tracking
 from tractexp.errors import UserError
@@ -470,12 +470,6 @@ time.sleep(60)"""
 # A server on PostgreSQL
 
 POSTGRES = next(iter(sorted(Path("/usr/lib/postgresql").glob("*/bin"))), None)
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.fixture(scope="module")

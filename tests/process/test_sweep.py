@@ -288,6 +288,7 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
 def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged, tmp_path):
     _, sweep, _ = logged
     threads = ("hydra.launcher.backend=threading", TWO)
+    first = {of: content for of, content in results(sweep).items() if of[1] == 0}
     launchers = [("hydra.launcher.n_jobs=1",), threads, ("hydra/launcher=basic",)]  # two processes ran `logged`
     if importlib.util.find_spec("distributed") is not None:
         launchers.append(("hydra/launcher=dask", TWO))
@@ -299,13 +300,13 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
             *launcher,
             PLAIN,
             "optimizer=ssa,pso",
-            "seed=range(0,2)",
+            "seed=0",
             f"hydra.sweep.dir=sweep{k}",
         )
         run = tractexp if "hydra/launcher=dask" in launcher else run_command
         done = run(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
-        assert results(tmp_path / f"sweep{k}") == results(sweep)
+        assert results(tmp_path / f"sweep{k}") == first
 
 
 @needs_submitit

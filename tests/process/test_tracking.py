@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import run_command
+from command_line import free_port, run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
@@ -398,12 +398,6 @@ def test_the_model_predicts_in_another_process_by_either_address(tmp_path, uri):
     for answer, refused in (told[:2], told[2:]):
         assert json.loads(answer) == [["P", "Q"], [7, 8], [[0.8, 1.0], [0.4, 0.5]], [1.0, 0.98]]
         assert refused == "True"
-
-
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def answers(address: str) -> bool:

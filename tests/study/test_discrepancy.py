@@ -78,12 +78,6 @@ def find(before, step, load, rests=()):
 
 
 @pytest.fixture(scope="module")
-def planted():
-    made = events("stator_resistance", size=2.0, count=3)
-    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
-
-
-@pytest.fixture(scope="module")
 def silent():
     return investigate(base(), events(), (), {}, {}, only=FEW)
 

@@ -2,14 +2,13 @@
 
 import base64
 import html
-import json
 import re
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from pages import read
+from pages import charts, read
 from test_discrepancy import FEW, base, events
 
 from tractexp.discrepancy import verdict
@@ -22,10 +21,9 @@ from tractexp.report.events import WITHIN
 from tractexp.wording import joined
 
 
-@pytest.fixture(scope="module")
-def named():
-    made = events("stator_resistance", size=2.0, count=3)
-    return investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
+@pytest.fixture
+def named(planted):
+    return planted
 
 
 @pytest.fixture(scope="module")
@@ -42,8 +40,7 @@ def unexplained():
 def page(found, folder):
     """The words of the page, and what its charts draw."""
     path = discrepancy.report(found, content(found), "event1, event2").save(folder / "discrepancy.html")
-    drawn = re.findall(r'<script type="application/json">([^<]*)</script>', path.read_text(encoding="utf-8"))
-    return words_of(path), [json.loads(each) for each in drawn]
+    return words_of(path), charts(path.read_text(encoding="utf-8"))
 
 
 def words_of(path):

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import next_event as study
 import numpy as np
 import pytest
+from test_discrepancy import base
 
 import tractexp
 from hidden_effects import Case, Noise
@@ -34,8 +35,6 @@ from tractexp.discrepancy.records import Records
 from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
-from tractexp.model.model import compose
-from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 TIE = ("feeder_impedance", "speed_dependent_torque")
@@ -55,10 +54,6 @@ class LeakageLoss(Effect):
         from sympy import I
 
         eq.edit(sites.stator_impedance, lambda Z: Z - I * loss * Z)
-
-
-def base():
-    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
 
 
 def hidden(*dips, effect="speed_dependent_torque", size=0.8):

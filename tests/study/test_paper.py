@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import run_command, start_command
+from command_line import run_command
 
 from tractexp.blocks import Report
 from tractexp.blocks.markdown import markdown
@@ -30,7 +30,7 @@ EXPERIMENTS = [
 def page(tmp_path_factory):
     """All parts with one seed and few simulations: (folder, what was printed)."""
     folder = tmp_path_factory.mktemp("paper")
-    done = start_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
+    done = run_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -38,7 +38,7 @@ def page(tmp_path_factory):
 @pytest.fixture(scope="module")
 def generalised(tmp_path_factory):
     folder = tmp_path_factory.mktemp("generalise")
-    done = start_command(
+    done = run_command(
         "task=generalise", "task.optimizers=[pso]", "budget=400", "tracking.enabled=false", "hydra.run.dir=run",
         cwd=folder,
     )  # fmt: skip

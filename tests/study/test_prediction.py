@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from command_line import run_command
 
+import tractexp
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.incomplete import PredictedDeviance
@@ -112,12 +112,17 @@ def dips(depths=(0.5, 0.35, 0.6)):
 
 
 @pytest.fixture(scope="module")
-def inexact():
+def investigation():
     """A trip of a quarter of the load, and beside it a swing of 1 % that no effect has, fifty times the noise."""
     only = ("undervoltage_trip", "stator_resistance", "exponential_recovery", "dc_link_lag")
-    model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     events = dips()
-    return investigate(model, events[:2], events[2:], only=only)
+    return tractexp.investigate(events[:2], validate=events[2:], effects=only, progress=False)
+
+
+@pytest.fixture(scope="module")
+def inexact(investigation):
+    """The same as the discrepancy room has it."""
+    return investigation.steps
 
 
 def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(inexact):
@@ -156,22 +161,12 @@ def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
 def test_without_held_out_events_nothing_incomplete_is_named():
     only = ("undervoltage_trip", "stator_resistance")
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    found = investigate(model, dips(), only=only)
+    found = investigate(model, dips((0.5, 0.35)), only=only)
     assert (found.verdict.word, found.verdict.complete) == ("unexplained", False)
 
 
-def test_the_files_say_what_is_left(tmp_path):
-    paths = []
-    for event in dips():
-        record = event.record
-        table = np.stack([record.t, record.U, record.P, record.Q], axis=1)
-        path = tmp_path / f"{record.name}.csv"
-        np.savetxt(path, table, delimiter=",", header="t,U,P,Q", comments="", fmt="%.7g")
-        paths.append(path)
-    data = ["data=csv", f"data.train=[{paths[0]},{paths[1]}]", f"data.validate=[{paths[2]}]", "tracking.enabled=false"]
-    only = "task.effects=[undervoltage_trip,stator_resistance]"
-    done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+def test_the_files_say_what_is_left(investigation, tmp_path):
+    investigation.write(tmp_path / "run")
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert (made["verdict"], made["complete"], made["effects"]) == ("named", False, ["undervoltage_trip"])
     left, gap = made["remainder"], made["gap"]["validate"]
@@ -186,4 +181,4 @@ def test_the_files_say_what_is_left(tmp_path):
     assert (tmp_path / "run" / "unexplained.csv").exists()
     page = (tmp_path / "run" / "discrepancy.html").read_text()
     assert "What is left" in page
-    assert "undervoltage_trip" in done.stdout
+    assert "undervoltage_trip" in str(investigation)

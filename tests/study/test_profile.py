@@ -1,13 +1,12 @@
 """Profiles: a parabola where theory says so, open sides, two minima, better optima, and the posterior beside them."""
 
-import json
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import uncertainty as study
-from pages import read, unpacked
+from pages import charts, read, unpacked
 
 from tractexp.errors import UserError
 from tractexp.identification.posterior import PosteriorSample
@@ -130,16 +129,11 @@ def test_too_few_walkers_are_refused(quiet):
         sample(quiet, walkers=10, steps=100, seed=0)
 
 
-def drawn(path):
-    """The charts of a page, as they are drawn."""
-    told = re.findall(r'<script type="application/json">(.*?)</script>', path.read_text(encoding="utf-8"))
-    return [json.loads(chart) for chart in told]
-
-
 def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(quiet, tmp_path):
     found = profiles(quiet)
-    told, charts = read(report(found).save(tmp_path / "profile.html")), drawn(tmp_path / "profile.html")
-    for chart, profile, value, half in zip(charts, found.profiles, quiet.values, quiet.half, strict=True):
+    path = report(found).save(tmp_path / "profile.html")
+    told, drawn = read(path), charts(path.read_text(encoding="utf-8"))
+    for chart, profile, value, half in zip(drawn, found.profiles, quiet.values, quiet.half, strict=True):
         assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
         curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
         x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
@@ -180,12 +174,12 @@ def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path)
     path = posterior.report(quiet, PosteriorSample(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(
         tmp_path / "posterior.html"
     )
-    told, charts = read(path).words, drawn(path)
+    told, drawn = read(path).words, charts(path.read_text(encoding="utf-8"))
     assert "but those of X_prime: take the posterior's." in told
     assert "The chain lasts 40 autocorrelation times; 50 are asked for: raise steps." in told
     assert "C and q_v depend on each other most" in told
-    assert len(charts) == len(quiet.names) + 1
-    first = charts[0]
+    assert len(drawn) == len(quiet.names) + 1
+    first = drawn[0]
     edges, density = (unpacked(first["data"][-1][axis]).astype(float) for axis in "xy")
     assert np.sum(np.diff(edges) * density[:-1]) == pytest.approx(1, rel=1e-4)
     shaded, estimate = first["layout"]["shapes"]

@@ -169,7 +169,7 @@ def test_a_result_of_waveforms_predicts_from_a_voltage(fit):
 def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase(fit):
     problem, values = fit.spec.problem, fit.details.uncertainty.values
     shape = DipShape.of(problem.events[0])
-    assert shape.waves
+    assert shape.domain is WAVES
     assert shape.jump == pytest.approx(0, abs=1)
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
     shape.check()

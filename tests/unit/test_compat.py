@@ -174,8 +174,8 @@ def test_joblib_never_hears_of_a_dask_worker_that_was_killed_but_through_the_doo
 
 def reached(tree):
     """What a module takes that is not meant for it: (line, what)."""
-    foreign = {}
-    for node in ast.walk(tree):
+    foreign, nodes = {}, [*ast.walk(tree)]
+    for node in nodes:
         if isinstance(node, ast.Import):
             names = [(a.name, a.asname or a.name.partition(".")[0]) for a in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -189,7 +189,7 @@ def reached(tree):
             foreign[name] = path
             if any(p == "externals" or (p.startswith("_") and not p.endswith("__")) for p in parts):
                 yield node.lineno, path
-    for node in ast.walk(tree):
+    for node in nodes:
         if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name) or node.value.id not in foreign:
             continue
         path = f"{foreign[node.value.id]}.{node.attr}"

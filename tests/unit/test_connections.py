@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from tractexp.api.read import again, kept
+from tractexp.api.read import event_from_dict, event_to_dict
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
 from tractexp.record import detect
@@ -231,8 +231,8 @@ def test_one_voltage_and_one_current_make_a_record(monkeypatch):
     assert record.window.name == "p_class"
     assert set(record.more) == {"P_3", "P_H", "THD_u", "THD_i"}
     assert any("p-class phasors every 1 ms" in note for note in record.notes)
-    told = kept(detect(record))
-    back = again(told).record
+    told = event_to_dict(detect(record))
+    back = event_from_dict(told).record
     assert back.window.to_dict() == record.window.to_dict()
     assert back.more["THD_u"].tolist() == record.more["THD_u"].tolist()
 

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 
 from tractexp.errors import UserError
 from tractexp.record import Record, describe, detect, find_dips
-from tractexp.record.event import noise, sample_noise
+from tractexp.record.event import noise
+from tractexp.record.fall import sample_noise
 
 
 def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002, slow=0.0, seed=0):

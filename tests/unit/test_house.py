@@ -1,6 +1,7 @@
 """The floors of the house: imports go down only, as CONTRIBUTING.md says."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
@@ -22,18 +23,27 @@ def floors() -> dict[str, int]:
 FLOORS = floors()
 
 
+@functools.cache
+def modules(path: Path) -> list[tuple[str, bool]]:
+    """The modules that a file imports by their full names, each with whether its annotations alone need it."""
+    found, nodes = [], [(ast.parse(path.read_text(encoding="utf-8")), False)]
+    while nodes:
+        node, typed = nodes.pop()
+        if isinstance(node, ast.Import):
+            found += [(alias.name, typed) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            whole = node.module == "tractexp"
+            found += [(f"tractexp.{alias.name}", typed) for alias in node.names] if whole else [(node.module, typed)]
+        elif isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            nodes += [(child, True) for child in node.body] + [(child, typed) for child in node.orelse]
+        elif not isinstance(node, ast.expr):  # which holds no import
+            nodes += [(child, typed) for child in ast.iter_child_nodes(node)]
+    return found
+
+
 def imported(path: Path) -> set[str]:
     """Rooms of the package that a module imports, within functions too, but not for its annotations only."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    for node in ast.walk(tree):
-        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
-            node.body = []
-    found = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "tractexp":
-            parts = (node.module or "").split(".")
-            found |= {parts[1]} if len(parts) > 1 else {alias.name for alias in node.names}
-    return found
+    return {n.split(".")[1] for n, typed in modules(path) if n.startswith("tractexp.") and not typed}
 
 
 @pytest.mark.parametrize("room", sorted({*FLOORS} - {"__main__"}))
@@ -61,18 +71,10 @@ def test_plugins_of_ours_import_what_a_plugin_of_others_may():
     imports = {
         f"{path.relative_to(ROOT)}: {name}"
         for path in (ROOT / "plugins").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        for name in names(node)
+        for name, _ in modules(path)
         if name.split(".")[0] in ("tractexp", "tractexp_plugins") and name.split(".")[:2] != ["tractexp", "extend"]
     }
     assert imports == set()
-
-
-def names(node: ast.AST) -> list[str]:
-    """The modules that a statement imports by their full names."""
-    if isinstance(node, ast.Import):
-        return [alias.name for alias in node.names]
-    return [node.module] if isinstance(node, ast.ImportFrom) and node.module and not node.level else []
 
 
 def test_one_module_quotes():
@@ -81,8 +83,7 @@ def test_one_module_quotes():
     imports = {
         f"{path.relative_to(ROOT)}: {name}"
         for path in sources
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        for name in names(node)
+        for name, _ in modules(path)
         if name.split(".")[0] in ("html", "shlex") and path != PACKAGE / "quoting.py"
     }
     assert imports == set()

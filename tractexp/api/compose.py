@@ -126,8 +126,8 @@ def compose(
     _ = composed.parameters
     for key in composed.fixed:
         if key not in composed.parameters:
-            known = among(key, composed.parameters, "Parameters")
-            raise UserError(f"fixed.{key}: this model has no parameter '{key}'{known}")
+            allowed = among(key, composed.parameters, "Parameters")
+            raise UserError(f"fixed.{key}: this model has no parameter '{key}'{allowed}")
     return composed
 
 
@@ -145,10 +145,10 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
         given = read_choice(GROUP, str(given or defaults()[GROUP]))
     elif not isinstance(given, Mapping):
         given = _node(given)
-    known = [f.name for f in dataclasses.fields(LoadModel)]
+    keys = [f.name for f in dataclasses.fields(LoadModel)]
     for key in given:
-        if key not in known:
-            raise UserError(f"model.{key}: there is no such key{among(key, known, 'Keys')}")
+        if key not in keys:
+            raise UserError(f"model.{key}: there is no such key{among(key, keys, 'Keys')}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
     composed: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}

@@ -63,8 +63,8 @@ def convert(
 
 def writer_of(to: str | None) -> Writer:
     """The writer of that name, or the usual one."""
-    known = discover()["writer"]
-    return build("writer", {"name": to or next(name for name, cls in known.items() if getattr(cls, "usual", False))})
+    writers = discover()["writer"]
+    return build("writer", {"name": to or next(name for name, cls in writers.items() if getattr(cls, "usual", False))})
 
 
 def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
@@ -107,8 +107,8 @@ def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, An
         kind = type(source).__name__
         raise UserError(f"a value of type {kind} cannot be converted; give a file, or events as tractexp.read gives")
     if settings or what == WHAT[0]:
-        told = ", ".join(settings) or "task.what=recording"
-        raise UserError(f"{told}: events are taken as they are; give the file, whose recording or settings are meant")
+        reason = ", ".join(settings) or "task.what=recording"
+        raise UserError(f"{reason}: events are taken as they are; give the file, whose recording or settings are meant")
     record = source.record if isinstance(source, Event) else source
     return [(record.name, record)]
 

@@ -168,11 +168,11 @@ class Investigation(Written):
         return self._sizes(near["effects"], near["parameters"]) if near else []
 
     @staticmethod
-    def _sizes(effects: Sequence[str], known: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
         from tractexp.plugin import get
 
         own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
-        return [_size(p.name, known[p.name], p.unit) for p in own]
+        return [_size(p.name, parameters[p.name], p.unit) for p in own]
 
     @property
     def sets(self) -> list[Mapping[str, Any]]:
@@ -359,8 +359,8 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     objective = float(problem.objective(values[None])[0])
     history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
-    found = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
-    result, _ = conclude(problem, found, question.validate, question.seed, model.node, "descent")
+    search = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
+    result, _ = conclude(problem, search, question.validate, question.seed, model.node, "descent")
     return replace(result, adequacy=adequacy(steps).to_dict())
 
 

@@ -3,13 +3,12 @@
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files, provenance
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
-from tractexp.api.read import Dips, again, dips_of, dips_together, kept
+from tractexp.api.read import Dips, dips_of, dips_together, event_from_dict, event_to_dict
 from tractexp.api.response import Response, response_of
 from tractexp.api.setup import recorded
 from tractexp.api.task import Job, Task
@@ -90,16 +89,13 @@ class NetworkFit(Written):
         return linear_network.report(self)
 
     def to_dict(self) -> dict[str, Any]:
-        events = {"train": list(map(kept, self.train)), "validate": list(map(kept, self.validate))}
+        events = {"train": list(map(event_to_dict, self.train)), "validate": list(map(event_to_dict, self.validate))}
         return events | {"domain": self.domain, "order": self.order, "content": dict(self.content)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        train, validate = (Dips(map(again, content[key])) for key in ("train", "validate"))
+        train, validate = (Dips(map(event_from_dict, content[key])) for key in ("train", "validate"))
         return cls(train, validate, content["domain"], content["order"], content["content"])
-
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "linear_network.json", self.content)]
 
 
 @public

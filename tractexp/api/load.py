@@ -22,11 +22,11 @@ def load(path: str | Path) -> Outcome:
 
         return Identification(read_result(Path(path)))
     content = saved(path)
-    known = known_kinds()
-    if content["kind"] not in known:
-        why = among(content["kind"], known, "Kinds")
+    kinds = known_kinds()
+    if content["kind"] not in kinds:
+        why = among(content["kind"], kinds, "Kinds")
         raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{why}")
-    return known[content["kind"]].revived(content)
+    return kinds[content["kind"]].revived(content)
 
 
 def _bare(path: str | Path) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tractexp import files, plugin
 from tractexp.api.arguments import public
-from tractexp.api.read import kept_record, node_of, record_again, table
+from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.outcome import Tabulated, Written
@@ -21,6 +21,7 @@ from tractexp.record.wave_event import COARSEST, smeared
 from tractexp.recording.feeder import unrecognised
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
+from tractexp.wording import counted
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -74,8 +75,8 @@ class Look(Written):
     def files(self) -> Listed:
         """One row for each file: station, start, rates, nominal and measured frequency, notes."""
         left_out = ("channels", "feeders", "segments")
-        made = [{k: v for k, v in f.items() if k not in left_out} for f in self.content["files"]]
-        return Listed(made, "files")
+        rows = [{k: v for k, v in f.items() if k not in left_out} for f in self.content["files"]]
+        return Listed(rows, "files")
 
     @property
     def channels(self) -> Listed:
@@ -85,20 +86,20 @@ class Look(Written):
     @property
     def feeders(self) -> Listed:
         """One row for each load: its channels, voltage and power before anything happened, the command that fits."""
-        made = [
+        rows = [
             {"file": f["file"], **{k: v for k, v in feeder.items() if k != "events"}}
             for f in self.content["files"] for feeder in f["feeders"]
         ]  # fmt: skip
-        return Listed(made, "loads")
+        return Listed(rows, "loads")
 
     @property
     def events(self) -> Listed:
         """One row for each event of each load: kind, start, depth, duration, jump, U2, P and Q, worth, why."""
-        made = [
+        rows = [
             {"file": f["file"], "feeder": feeder["name"], **event}
             for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
         ]  # fmt: skip
-        return Listed(made, "events")
+        return Listed(rows, "events")
 
     @property
     def commands(self) -> list[str]:
@@ -140,7 +141,7 @@ class Look(Written):
             [f"{f['file']} {feeder['name']}" if several else feeder["name"], *event_row(event)]
             for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
         ]  # fmt: skip
-        title = f"{len(rows)} event{'s' * (len(rows) != 1)} in {', '.join(f['file'] for f in self.content['files'])}"
+        title = f"{counted(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
@@ -161,16 +162,13 @@ class Look(Written):
         return look.report(self.views, self.content)
 
     def to_dict(self) -> dict[str, Any]:
-        told = [s if isinstance(s, str) else kept_record(s) for s in self.sources]
-        return {"sources": told, "settings": dict(self.settings), "content": dict(self.content)}
+        sources = [s if isinstance(s, str) else record_to_dict(s) for s in self.sources]
+        return {"sources": sources, "settings": dict(self.settings), "content": dict(self.content)}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        sources = [s if isinstance(s, str) else record_again(s) for s in content["sources"]]
+        sources = [s if isinstance(s, str) else record_from_dict(s) for s in content["sources"]]
         return cls(sources, content["settings"], content["content"])
-
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "look.json", self.content)]
 
 
 @public
@@ -187,15 +185,15 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     flat = [one for source in sources for one in (source if isinstance(source, list | tuple) else [source])]
     if not flat:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
-    told = list(dict.fromkeys(map(_source, flat)))
+    distinct = list(dict.fromkeys(map(_source, flat)))
     with staged(progress) as stage:
         views = []
-        for source in told:
+        for source in distinct:
             stage(f"reading {source if isinstance(source, str) else source.name}")
             views.append(_view(source, settings))
         stage("measuring the quality of the channels")
         content = files.plain({"files": [_content(view) for view in views]})
-    return Look(told, settings, content, views)
+    return Look(distinct, settings, content, views)
 
 
 def _source(given: Any) -> str | Record:
@@ -244,60 +242,63 @@ def event_row(seen: LoadEvent) -> dict[str, Any]:
 
 def _content(view: View) -> dict[str, Any]:
     """What `look.json` holds of a file."""
-    made = view.recording
-    known: dict[str, Any] = {"file": view.source, "reader": view.node.get("name", "")}
-    if made is None:
+    recording = view.recording
+    content: dict[str, Any] = {"file": view.source, "reader": view.node.get("name", "")}
+    if recording is None:
         record = view.sights[0].record
         assert record is not None
-        known |= {
+        content |= {
             "station": "", "device": "", "start": None, "frequency": record.base.frequency,
             "rates": [record.rate], "seconds": float(record.t[-1] - record.t[0]),
             "segments": [{"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}],
             "notes": list(record.notes), "channels": [],
         }  # fmt: skip
     else:
-        last = made.segments[-1]
-        known |= {
-            "station": made.station, "device": made.device, "start": made.start and made.start.isoformat(),
-            "frequency": made.frequency, "rates": [s.rate for s in made.segments],
+        last = recording.segments[-1]
+        content |= {
+            "station": recording.station, "device": recording.device,
+            "start": recording.start and recording.start.isoformat(),
+            "frequency": recording.frequency, "rates": [s.rate for s in recording.segments],
             "seconds": last.start + (last.stop - last.first) / last.rate,
-            "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in made.segments],
-            "notes": [*made.notes, *([] if view.sights else [f"no load was recognised: {unrecognised(made)}"])],
-            "channels": [_channel(view, number) for number in range(len(made.channels))],
+            "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in recording.segments],
+            "notes": [
+                *recording.notes, *([] if view.sights else [f"no load was recognised: {unrecognised(recording)}"]),
+            ],
+            "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }  # fmt: skip
-    known["measured_frequency"] = view.frequency
-    return known | {"feeders": [_feeder(view, shown) for shown in view.sights]}
+    content["measured_frequency"] = view.frequency
+    return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
 
 
 def _channel(view: View, number: int) -> dict[str, Any]:
     assert view.recording is not None
-    channel, told = view.recording.channels[number], view.quality[number]
-    share = told.noise / told.level if told.level > 0 else None
+    channel, fitness = view.recording.channels[number], view.quality[number]
+    share = fitness.noise / fitness.level if fitness.level > 0 else None
     return {
         "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
-        "quantity": channel.quantity, "magnitude": told.level,
+        "quantity": channel.quantity, "magnitude": fitness.level,
         "primary_unit": {"voltage": "kV", "current": "kA"}.get(unit_of(channel.unit)[0], channel.unit),
-        "noise_share": share, **asdict(told),
+        "noise_share": share, **asdict(fitness),
     }  # fmt: skip
 
 
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
-    feeder, told = shown.feeder, view.powers(shown)
+    feeder, powers = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
-    made: dict[str, Any] = {"name": shown.name}
+    row: dict[str, Any] = {"name": shown.name}
     if feeder is not None:
-        made |= {
+        row |= {
             "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
             "currents": list(feeder.currents),
             "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
             "reverse_current": feeder.reverse_current, "why": list(feeder.why), "loaded": feeder.loaded,
         }  # fmt: skip
     else:
-        made |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": [],
+        row |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": [],
                  "loaded": True}  # fmt: skip
-    U, P, Q = told or (None, None, None)
+    U, P, Q = powers or (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
-    return made | {
+    return row | {
         "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
         "said": list(shown.said), "command": command(view, shown),
         "events": [event_row(seen) for seen in shown.events],
@@ -315,8 +316,8 @@ def command(view: View, shown: Sight) -> str:
         return ""
     usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
     settings = {**view.node, **choice}
-    told = typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
-    return f"{told} domain=waves" if waves_serve(view, shown) else told
+    text = typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+    return f"{text} domain=waves" if waves_serve(view, shown) else text
 
 
 def waves_serve(view: View, shown: Sight) -> bool:
@@ -337,15 +338,15 @@ def _is_usual(setting: Any, value: Any) -> bool:
 
 def _sums(shown: Sight) -> dict[str, Any]:
     """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's, at the beginning."""
-    made = {}
+    sums = {}
     for key in "VI":
         value = None
         if shown.phasors and len(shown.phasors[0].V) == 3:
             first = getattr(shown.phasors[0], key)[:, :50]
             scale = float(np.abs(first).mean())
             value = float(np.abs(first.sum(axis=0)).mean()) / scale if scale > 0 else None
-        made[f"sum_{key}"] = value
-    return made
+        sums[f"sum_{key}"] = value
+    return sums
 
 
 def _picked(items: Sequence[Any], k: int, what: str) -> Any:

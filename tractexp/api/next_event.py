@@ -67,9 +67,6 @@ class Recommended(Written):
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["rivals"], content["content"])
 
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "plan.json", self.content)]
-
 
 def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""

@@ -19,7 +19,7 @@ from tractexp.errors import UserError, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.record import Event
-from tractexp.report.plan import CURRENT_NOISE, DEPTH, DURATION, JUMP, NOISE, RATE, UNBALANCE
+from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import ChosenEvent, DipShape
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from tractexp.report.plan import Planned
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
-JUMPS = (0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0)  # degrees
-UNBALANCES = (0.0, 0.25, 0.5, 0.75, 1.0)  # negative sequence over the depth
-PER_CYCLE = (16, 32, 64, 128, 200)  # samples of waveforms
-RATES = (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz
+GRIDS = {  # of what only some domains' dips have: degrees, negative sequence over the depth
+    "jump": (JUMP, (0.0, 5.0, 10.0, 20.0, 30.0, 45.0, 60.0)),
+    "unbalance": (UNBALANCE, (0.0, 0.25, 0.5, 0.75, 1.0)),
+}
 NOISES = (0.001, 0.002, 0.005, 0.01, 0.02)  # of P before the event
 FIT, DEFAULT = "fit", "default"
 
@@ -84,9 +84,6 @@ class Forecasts(Written):
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
-
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "plan.json", self.content)]
 
 
 @public
@@ -162,8 +159,8 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
-    for name in ("jump", "unbalance"):
-        if given[name] is not None and not problem.model.waves:
+    for name in GRIDS:
+        if given[name] is not None and name not in problem.domain.shaped_by:
             raise UserError(f"task.{name}={given[name]:g} is of waveforms: add domain=waves, or leave it out")
     deepest = max(problem.events, key=lambda e: e.depth)
     at, origin, noise = _guess(setup, deepest, values)
@@ -186,15 +183,15 @@ def chosen_events(setup: Setup, values: Any, most: int) -> "list[ChosenEvent]":
     if setup.problem_of(setup.train[:1]).per_event:
         raise UserError("events are chosen for shared parameters; leave model.per_event empty")
     at, *_ = _guess(setup, max(setup.train, key=lambda e: e.depth), values)
-    told, refused = {}, ""
+    informations, refused = {}, ""
     for event in setup.train:
         try:
-            told[event.record.name] = alone(setup.problem_of([event]), at)
+            informations[event.record.name] = alone(setup.problem_of([event]), at)
         except UserError as error:
             refused = str(error)
-    if not told:
+    if not informations:
         raise UserError(refused)
-    return best_of([*told.values()], [*told], 0.0, most)
+    return best_of([*informations.values()], [*informations], 0.0, most)
 
 
 def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "DipShape":
@@ -241,21 +238,18 @@ def _scans(problem: Any, values: np.ndarray, shape: "DipShape") -> dict[str, Any
     by_depth = over_depth(problem, values, shape)
     P = abs(shape.P0)
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
-    made = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
-    if shape.waves:
-        made |= {JUMP: over("jump", JUMPS), UNBALANCE: over("unbalance", UNBALANCES)}
-    rates = tuple(n * shape.frequency for n in PER_CYCLE) if shape.waves else RATES
-    made[RATE] = over("rate", rates)
-    return made | {CURRENT_NOISE if shape.waves else NOISE: (NOISES, [forecast(problem, values, s) for s in loud])}
+    scans = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
+    scans |= {GRIDS[name][0]: over(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
+    scans[RATE] = over("rate", shape.domain.rates(shape.frequency))
+    return scans | {shape.domain.planned_noise: (NOISES, [forecast(problem, values, s) for s in loud])}
 
 
 def _described(shape: "DipShape") -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
-    names = ("i_alpha", "i_beta") if shape.waves else ("P", "Q")
+    names = shape.domain.channels
     dip = f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f} Hz"
-    if shape.waves:
-        dip += f", the phase jumping by {shape.jump:.0f} degrees, negative sequence {shape.unbalance:.0%} of the depth"
+    dip += shape.domain.describe_shape(shape)
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 

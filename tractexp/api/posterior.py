@@ -58,12 +58,12 @@ class Sampled(Written):
 
     def summary(self) -> Report:
         c, s = self.content, self.settings
-        made = (
+        effort = (
             f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance {c['acceptance']:.2f},"
             f" autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
-        return self.fit.summary().add(self.table()).text(made, *[short] * (not c["converged"]))
+        return self.fit.summary().add(self.table()).text(effort, *[short] * (not c["converged"]))
 
     def report(self) -> Report:
         from tractexp.report import posterior

@@ -15,6 +15,7 @@ from tractexp.errors import UserError, among
 from tractexp.outcome import Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
 from tractexp.record.dips import around
+from tractexp.wording import counted
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -41,7 +42,7 @@ class Dips(Tabulated, list[Event]):
         ]  # fmt: skip
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
                    "channels"]  # fmt: skip
-        return Table(columns, rows, f"{len(self)} dip{'s' * (len(self) != 1)}", words=(8,))
+        return Table(columns, rows, counted(len(self), "dip"), words=(8,))
 
     def summary(self) -> Report:
         """The table, and what a reader or the detection found odd."""
@@ -91,10 +92,10 @@ def read(
 def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
     """What a call takes as its records: events, or whatever `read` reads, one or a list of them."""
     listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-    made = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
-    if len(made) < least:
+    dips = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
+    if len(dips) < least:
         raise UserError(f"{argument} is empty; give at least one event, as tractexp.read gives them")
-    return made
+    return dips
 
 
 def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
@@ -106,31 +107,31 @@ def dips_together(records: Any, validate: Any) -> tuple[Dips, Dips]:
 
 def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) -> Record:
     """The checked record of columns (N,) each; further columns are left out with a note."""
-    known = {"base_voltage": None, "base_power": None, "frequency": None}
+    bases = {"base_voltage": None, "base_power": None, "frequency": None}
     for key, value in settings.items():
-        if key not in known:
-            raise UserError(f"{key} is no setting of arrays and frames{among(key, known, 'Settings')}")
+        if key not in bases:
+            raise UserError(f"{key} is no setting of arrays and frames{among(key, bases, 'Settings')}")
         check_kind(key, value, float | None)
-        known[key] = value
+        bases[key] = value
     if missing := [key for key in REQUIRED if key not in columns]:
         lack = f"{name}: {', '.join(missing)} missing; {', '.join(REQUIRED)} are needed"
         raise UserError(f"{lack}{among(missing[0], columns, 'Columns')}")
     spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
     values = {key: _array(columns[key], f"{name}: {key}") for key in (*REQUIRED, *OPTIONAL) if key in columns}
-    base = Base(known["base_voltage"] or 1.0, known["base_power"] or 1.0, known["frequency"] or 50.0)
-    made: Any = base.per_unit(values)
-    return Record(name, base=base, notes=notes, **made).uniform().check()
+    base = Base(bases["base_voltage"] or 1.0, bases["base_power"] or 1.0, bases["frequency"] or 50.0)
+    signals: Any = base.per_unit(values)
+    return Record(name, base=base, notes=notes, **signals).uniform().check()
 
 
 def _array(values: Any, where: str) -> np.ndarray:
     try:
-        made = np.array(values, dtype=float)
+        array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
         raise UserError(f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap") from error
-    if made.ndim != 1:
-        raise UserError(f"{where} has shape {made.shape}; one number per sample, (N,), is needed")
-    return made
+    if array.ndim != 1:
+        raise UserError(f"{where} has shape {array.shape}; one number per sample, (N,), is needed")
+    return array
 
 
 def _odd(values: Any) -> str:
@@ -176,12 +177,12 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {"name": cls.name, **cls.of(path), **settings}
 
 
-def kept(event: Event) -> dict[str, Any]:
+def event_to_dict(event: Event) -> dict[str, Any]:
     """The record of an event as plain data, as a saved result holds it."""
-    return kept_record(event.record)
+    return record_to_dict(event.record)
 
 
-def kept_record(record: Record) -> dict[str, Any]:
+def record_to_dict(record: Record) -> dict[str, Any]:
     """A record as plain data."""
     plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
              "waves": record.waves and record.waves.to_dict(), "identity": {**record.identity},
@@ -189,12 +190,12 @@ def kept_record(record: Record) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
-def again(content: Mapping[str, Any]) -> Event:
+def event_from_dict(content: Mapping[str, Any]) -> Event:
     """The event of what `kept` told; its dip is found again."""
-    return detect(record_again(content))
+    return detect(record_from_dict(content))
 
 
-def record_again(content: Mapping[str, Any]) -> Record:
+def record_from_dict(content: Mapping[str, Any]) -> Record:
     """The record of what `kept_record` told."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import Choice
 from tractexp.api.compose import LoadModel, Portable, model_of
-from tractexp.api.read import Dips, again, dips_together, kept
+from tractexp.api.read import Dips, dips_together, event_from_dict, event_to_dict
 from tractexp.errors import check_range
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
 PLAIN: Mapping[Any, Any] = {  # by the type of a field: to plain data, and back
-    Dips: (lambda events: list(map(kept, events)), lambda told: Dips(map(again, told))),
-    LoadModel: (asdict, lambda told: LoadModel(**told)),
-    Choice: (asdict, lambda told: Choice(**told)),
+    Dips: (lambda events: list(map(event_to_dict, events)), lambda content: Dips(map(event_from_dict, content))),
+    LoadModel: (asdict, lambda content: LoadModel(**content)),
+    Choice: (asdict, lambda content: Choice(**content)),
 }
 
 
@@ -35,13 +35,13 @@ class Given(Portable):
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data, the records with it."""
-        told = ((f, getattr(self, f.name)) for f in fields(self))
-        return {f.name: PLAIN[f.type][0](value) if f.type in PLAIN else value for f, value in told}
+        values = ((f, getattr(self, f.name)) for f in fields(self))
+        return {f.name: PLAIN[f.type][0](value) if f.type in PLAIN else value for f, value in values}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         types = {f.name: f.type for f in fields(cls)}
-        return cls(**{k: PLAIN[types[k]][1](told) if types.get(k) in PLAIN else told for k, told in content.items()})
+        return cls(**{k: PLAIN[types[k]][1](value) if types.get(k) in PLAIN else value for k, value in content.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,7 +54,7 @@ class Setup(Given):
     target: float | None = None
 
     @classmethod
-    def of(cls, records: Any, model: Any, validate: Any, objective: Any, known: Mapping[str, Any], **search: Any
+    def of(cls, records: Any, model: Any, validate: Any, objective: Any, settings: Mapping[str, Any], **search: Any
            ) -> Self:  # fmt: skip
         """From the arguments of a call; `known` replaces keys of the model where it is not None."""
         for key, least in LEAST.items():
@@ -64,7 +64,7 @@ class Setup(Given):
         return cls(
             train=train,
             validate=held,
-            model=model_of(model, known.get("domain")).with_(**known),
+            model=model_of(model, settings.get("domain")).with_(**settings),
             objective=Choice.of("objective", objective),
             **search,
         )

@@ -172,14 +172,14 @@ def smooth(x: np.ndarray) -> np.ndarray:
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0.0, 1.0))
 
 
-def chosen(names: Sequence[str], found: Mapping[str, float], given: Mapping[str, float]) -> np.ndarray:
+def chosen(names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str, float]) -> np.ndarray:
     """Values (d,) in the model's order. Raises `UserError` for unknown names and for what is missing."""
     for name in given:
         if name not in names:
             raise UserError(
                 f"task.values.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
             )
-    values = {**found, **given}
+    values = {**fitted, **given}
     if missing := [name for name in names if name not in values]:
         raise UserError(
             f"no value for {', '.join(missing)}: give task.parameters=result.json of an identification,"

@@ -59,8 +59,8 @@ class Surveyed(Written):
     @property
     def unread(self) -> Listed:
         """One row for each file that cannot be read: its name and the reason."""
-        found = [{"file": row["file"], "why": row["why"]} for row in self.content["rows"] if row["kind"] == UNREAD]
-        return Listed(found, f"files of {self.folder} that cannot be read")
+        rows = [{"file": row["file"], "why": row["why"]} for row in self.content["rows"] if row["kind"] == UNREAD]
+        return Listed(rows, f"files of {self.folder} that cannot be read")
 
     @property
     def informative(self) -> list[str]:
@@ -144,8 +144,8 @@ def survey(
     rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
     with counting("files", len(fresh), progress) as count:
-        for name, made in looked(place, fresh, cores or _cores()):
-            rows[name] = files.plain(made)
+        for name, fresh_rows in looked(place, fresh, cores or _cores()):
+            rows[name] = files.plain(fresh_rows)
             store.write(names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode())
             count()
     content = {
@@ -177,7 +177,7 @@ def _cores() -> int:
 
 
 def _best(
-    folder: Path, names: Sequence[str], most: int, model: Any, values: Any, known: Mapping[str, Any]
+    folder: Path, names: Sequence[str], most: int, model: Any, values: Any, settings: Mapping[str, Any]
 ) -> "list[ChosenEvent]":
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
     from tractexp.api.plan import chosen_events
@@ -187,7 +187,7 @@ def _best(
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
     events = [detect(record) for record in archive.records(folder, list(names), "data.train")]
-    return chosen_events(Setup.of(events, model, (), None, known), values, most)
+    return chosen_events(Setup.of(events, model, (), None, settings), values, most)
 
 
 @plugin

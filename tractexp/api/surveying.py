@@ -37,12 +37,12 @@ def rows_of(folder: str, file: str) -> Rows:
     row: dict[str, Any] = dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
     try:
         view = archive.looked(Path(folder, file))
-        made = [
+        rows = [
             row | _event(view, file, number, shown, seen)
             for number, shown in enumerate(view.sights, 1)
             for seen in shown.events
         ]
-        return files.plain(made or [row | _common(view) | {"kind": QUIET, "why": _quiet(view)}])
+        return files.plain(rows or [row | _common(view) | {"kind": QUIET, "why": _quiet(view)}])
     except UserError as error:
         return [row | {"kind": UNREAD, "why": str(error)}]
     except Exception as error:  # a survey of thousands of files does not end with one of them
@@ -65,13 +65,13 @@ def _common(view: View) -> dict[str, Any]:
 
 def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
     """The row of one event."""
-    told = event_row(seen)
+    fields = event_row(seen)
     begun = view.recording.start if view.recording else None
     event = seen.event
     return {
-        **_common(view), **{key: value for key, value in told.items() if key in COLUMNS},
+        **_common(view), **{key: value for key, value in fields.items() if key in COLUMNS},
         "event": archive.event_name(file, number, seen), "load": shown.name, "unit": "pu" if shown.per_unit else "MW",
-        "when": (begun + timedelta(seconds=told["start"])).isoformat() if begun else None,
+        "when": (begun + timedelta(seconds=fields["start"])).isoformat() if begun else None,
         "noise": event and event.noise_share,
         "command": command(view, shown) if seen.worth else "", **_pictures(shown, seen),
     }  # fmt: skip
@@ -91,8 +91,8 @@ def _few(values: np.ndarray) -> list[float | None]:
         parts = np.array_split(values, POINTS // 2)
         ends = [sorted((int(np.argmin(p)), int(np.argmax(p)))) for p in parts]
         values = np.array([p[k] for p, pair in zip(parts, ends, strict=True) for k in pair])
-    known = values[np.isfinite(values)]
-    size = float(np.abs(known).max()) if len(known) else 0.0
+    finite = values[np.isfinite(values)]
+    size = float(np.abs(finite).max()) if len(finite) else 0.0
     return [round(float(v) / size, 3) if size and np.isfinite(v) else None for v in values]
 
 

@@ -11,7 +11,7 @@ import re
 from collections.abc import Sequence
 from typing import Any
 
-from tractexp import quoting
+from tractexp import files, quoting
 from tractexp.blocks.block import (
     Block,
     ChartBlock,
@@ -31,49 +31,6 @@ from tractexp.blocks.block import (
 from tractexp.blocks.chart import script
 
 SHORT = 14  # letters of a word that never needs a second line
-STYLE = """
-:root { --ink: #1d1d1f; --faint: #666; --line: #dcdcdc; --good: #00664a; --bad: #a33b00; }
-* { box-sizing: border-box; }
-body { margin: 2rem auto; max-width: 62rem; padding: 0 1.2rem; color: var(--ink); background: #fff;
-  font: 16px/1.5 system-ui, "Segoe UI", "Liberation Sans", sans-serif; }
-h1 { font-size: 1.7rem; line-height: 1.2; margin: 0 0 .4rem; }
-h2 { font-size: 1.2rem; margin: 2.2rem 0 .5rem; border-bottom: 1px solid var(--line); padding-bottom: .2rem; }
-h3 { font-size: 1rem; margin: 1.4rem 0 .3rem; }
-h1, h2, h3 { break-after: avoid; }
-p { margin: .5rem 0; max-width: 46rem; }
-.lead { color: var(--faint); }
-.verdict { border-left: 4px solid var(--faint); background: #f6f6f6; padding: .6rem 1rem; margin: 1rem 0; }
-.verdict p { margin: .2rem 0; }
-.good { border-color: var(--good); } .bad { border-color: var(--bad); }
-.wide { overflow-x: auto; margin: .8rem 0; }
-table { border-collapse: collapse; font-size: .84rem; font-variant-numeric: tabular-nums; }
-figure.table .wide { margin: 0; } figure.table figcaption { font-size: .84rem; padding-top: .35rem; }
-caption { text-align: left; font-weight: 600; padding: .2rem 0; }
-th, td { padding: .22rem .6rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
-th { vertical-align: bottom; white-space: normal; border-bottom-color: var(--faint); font-weight: 600; }
-th:first-child, td:first-child, .words, .short { text-align: left; }
-td.words { white-space: normal; min-width: 8rem; overflow-wrap: anywhere; } td.words:last-child { min-width: 11rem; }
-figure { margin: 1rem 0; } figure, tr { break-inside: avoid; }
-figure svg { max-width: 100%; height: auto; }
-figcaption { color: var(--faint); font-size: .88rem; max-width: 46rem; }
-.chart { width: 100%; } .charts { display: grid; gap: .4rem 1rem;
-  grid-template-columns: repeat(auto-fit, minmax(min(17rem, 100%), 1fr)); }
-.charts figure { margin: .3rem 0; min-width: 0; }
-.readout { position: sticky; top: 0; z-index: 2; display: flex; gap: 1rem; align-items: center;
-  justify-content: space-between; background: #fff; border-bottom: 1px solid var(--line); }
-.arrows { min-height: 11.5rem; }
-.readout td { padding: .1rem .5rem; font-size: .78rem; text-align: left; white-space: normal; vertical-align: top; }
-.readout td:first-child { white-space: nowrap; color: var(--faint); }
-.readout span { margin-right: .9rem; display: inline-block; }
-.readout i { display: inline-block; width: .6rem; height: .6rem; margin-right: .25rem; } .readout svg { flex: none; }
-.equation { margin: .7rem 0 .7rem 1.5rem; overflow-x: auto; } .equation svg { vertical-align: middle; }
-pre { margin: .5rem 0; padding: .5rem .7rem; background: #f6f6f6; font-size: .84rem; white-space: pre-wrap;
-  overflow-wrap: anywhere; user-select: all; }
-li { margin: .3rem 0; max-width: 46rem; }
-details { margin: .8rem 0; } summary { cursor: pointer; color: #0058a0; }
-@media print { body { margin: 0; max-width: none; font-size: 10.5pt; } .wide { overflow: visible; }
-  .modebar-container { display: none !important; } .charts { grid-template-columns: 1fr 1fr; } }
-"""
 
 
 def page(report: Report) -> str:
@@ -81,11 +38,12 @@ def page(report: Report) -> str:
     figures = itertools.count(1)
     title, lead = quoting.html(report.title), quoting.html(report.lead)
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    style = files.packaged("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
     body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{STYLE}</style></head>\n<body>\n{body}\n</body></html>\n'
+        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{style}</style></head>\n<body>\n{body}\n</body></html>\n'
     )
 
 

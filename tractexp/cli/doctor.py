@@ -32,16 +32,16 @@ def doctor(arguments: list[str]) -> int:
     from tractexp import tracking
 
     uri = tracking.address(chosen.uri)
-    wrong = sum(map(told, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
-    if told(store(uri)):
+    wrong = sum(map(print_findings, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
+    if print_findings(store(uri)):
         return 2
-    wrong += told(runs(uri))
+    wrong += print_findings(runs(uri))
     if chosen.folder.is_dir():
         wrong += brought(chosen.folder, chosen.uri)["not logged"]
     return 2 if wrong else 0
 
 
-def told(findings: Iterable[Finding]) -> int:
+def print_findings(findings: Iterable[Finding]) -> int:
     """Print findings; how many of them are wrong."""
     wrong = 0
     for state, sentence in findings:
@@ -61,8 +61,8 @@ def versions() -> Iterator[Finding]:
         if needed.marker is not None and not needed.marker.evaluate({"extra": ""}):
             continue
         try:
-            if not needed.specifier.contains(found := version(needed.name), prereleases=True):
-                wrong.append(f"{needed.name} {found} is installed, and {needed} is needed")
+            if not needed.specifier.contains(installed := version(needed.name), prereleases=True):
+                wrong.append(f"{needed.name} {installed} is installed, and {needed} is needed")
         except PackageNotFoundError:
             wrong.append(f"{needed.name} is not installed, and {needed} is needed")
     for sentence in wrong:
@@ -169,9 +169,9 @@ def _unsound(database: Path) -> str:
     """What is wrong with an SQLite file, in a few words; "locked" for one that is in use, "" for a sound one."""
     try:
         with closing(sqlite3.connect(database, timeout=BUSY)) as connection:
-            (told,) = connection.execute("PRAGMA quick_check(1)").fetchone()
-            if told != "ok":
-                return str(told).partition("\n")[0]
+            (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
+            if verdict != "ok":
+                return str(verdict).partition("\n")[0]
             connection.execute("SELECT version_num FROM alembic_version")
             if os.access(database, os.W_OK):
                 connection.execute("BEGIN IMMEDIATE")

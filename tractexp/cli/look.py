@@ -31,10 +31,10 @@ def look(arguments: list[str]) -> int:
     from tractexp.api.task import call, listed
     from tractexp.blocks.terminal import show
 
-    made = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
+    view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
     rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
-    show(made.everything() if chosen.all else made.summary().text(rest), console())
-    listed(made.write(chosen.folder or FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
+    show(view.everything() if chosen.all else view.summary().text(rest), console())
+    listed(view.write(chosen.folder or FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
     return 0
 
 

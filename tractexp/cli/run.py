@@ -32,9 +32,9 @@ def run(config: Any) -> None:
         configuration.removed(folder)
         raise
     except KeyboardInterrupt as stop:
-        kept = so_far(stop, folder, begin)
+        saved = so_far(stop, folder, begin)
         configuration.removed(folder)
-        raise Stopped(f"{_how(stop)}; {kept or again(config)}", getattr(stop, "code", 130)) from None
+        raise Stopped(f"{_how(stop)}; {saved or again(config)}", getattr(stop, "code", 130)) from None
 
 
 def _how(stop: KeyboardInterrupt) -> str:
@@ -43,15 +43,15 @@ def _how(stop: KeyboardInterrupt) -> str:
 
 def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | None) -> str:
     """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
-    if begin is None or (found := getattr(stop, "result", None)) is None:
+    if begin is None or (state := getattr(stop, "result", None)) is None:
         return ""
     from tractexp.identification.result import write_history
 
     begin()
-    path = found.result.write(folder / "interrupted.json")
-    write_history(folder / "history.csv", found.ended.history)
+    path = state.result.write(folder / "interrupted.json")
+    write_history(folder / "history.csv", state.ended.history)
     return (
-        f"the best of {found.result.simulations} simulations so far, objective {found.result.objective:.4g} pu², is in"
+        f"the best of {state.result.simulations} simulations so far, objective {state.result.objective:.4g} pu², is in"
         f" {path}; it is neither polished nor judged, and not logged"
     )
 

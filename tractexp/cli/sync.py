@@ -30,6 +30,6 @@ def brought(folder: Path, uri: str | None) -> Counter[str]:
     from tractexp.tracking.sync import sync
 
     counts = sync(folder.absolute(), uri, own=tracking.address(uri), tell=lambda line: say(f"  {line}"))
-    told = ", ".join(f"{count} {what}" for what, count in counts.items()) or "none are kept there"
-    say(f"runs in {folder}: {told}")
+    numbers = ", ".join(f"{count} {what}" for what, count in counts.items()) or "none are kept there"
+    say(f"runs in {folder}: {numbers}")
     return counts

@@ -58,6 +58,7 @@ class Domain(ABC):
     edge: ClassVar[float]  # s, fall and rise of a planned dip
     further: ClassVar[Mapping[str, str]]  # channels that a jump of the phase and an unbalance have to be recorded with
     shaped_by: ClassVar[tuple[str, ...]]  # what a planned dip has beside depth, duration, rate and noise
+    planned_noise: ClassVar[str]  # what the noise of a plan is
     dips: ClassVar[DipGrid]  # that might be recorded next
 
     @property
@@ -136,8 +137,28 @@ class Domain(ABC):
         """The lowest sampling rate [Hz] of a planned dip in a grid of this frequency [Hz]."""
 
     @abstractmethod
+    def rates(self, frequency: float) -> tuple[float, ...]:
+        """Sampling rates [Hz] that a plan tries in a grid of this frequency [Hz]."""
+
+    @abstractmethod
     def shape(self, event: Event) -> dict[str, float]:
         """What `shaped_by` names, of a recorded event."""
+
+    def describe_shape(self, shape: "DipShape") -> str:
+        """The same of a planned dip, as its sentence goes on."""
+        return ""
+
+    @property
+    def edges(self) -> str:
+        """How a planned dip falls and comes back."""
+        return f"straight edges of {1000 * self.edge:g} ms"
+
+    @abstractmethod
+    def about_noise(self, faults: Sequence[str], judged: bool) -> str:
+        """Where noise is estimated, and how faults of the measurement are free in every fit, in sentences.
+
+        `judged` says whether noise would not pass for these faults.
+        """
 
     @abstractmethod
     def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:

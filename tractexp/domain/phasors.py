@@ -36,7 +36,7 @@ class PhasorDomain(Domain):
     nearest_gap = False
     edge = 0.02
     further = {"jump": "the frequency f", "unbalance": "U2"}
-    shaped_by = ()
+    shaped_by, planned_noise = (), "noise, of P before the dip"
     dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)  # the longest is a tap or a bank that is back after 1 s
 
     def event(self, event: Event) -> Event:
@@ -91,8 +91,18 @@ class PhasorDomain(Domain):
     def slowest(self, frequency: float) -> float:
         return 5.0
 
+    def rates(self, frequency: float) -> tuple[float, ...]:
+        return (25.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+
     def shape(self, event: Event) -> dict[str, float]:
         return {}
+
+    def about_noise(self, faults: Sequence[str], judged: bool) -> str:
+        return (
+            "It is estimated where nothing happens, from what the fit leaves there, and so contains what smoothing"
+            " leaves of the voltage's noise. Time skew, measurement window and load drift are free in every fit, each"
+            " held by what is physically likely."
+        )
 
     def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """P and Q hold the steady state, for no forecast looks at them."""

@@ -21,6 +21,7 @@ from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
+from tractexp.wording import joined
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
@@ -40,7 +41,7 @@ class WaveDomain(Domain):
     nearest_gap = True
     edge = 0.001
     further = {}
-    shaped_by = ("jump", "unbalance")
+    shaped_by, planned_noise = ("jump", "unbalance"), "noise of the currents, of P before the dip"
     dips = DipGrid((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)  # as long as recorders of waveforms go on
 
     def event(self, event: Event) -> WaveEvent:
@@ -95,6 +96,9 @@ class WaveDomain(Domain):
     def slowest(self, frequency: float) -> float:
         return COARSEST * frequency
 
+    def rates(self, frequency: float) -> tuple[float, ...]:
+        return tuple(n * frequency for n in (16, 32, 64, 128, 200))
+
     def shape(self, event: Event) -> dict[str, float]:
         """How far the voltage's phase jumps [degrees], and the negative sequence over its depth."""
         event = cast(WaveEvent, event)
@@ -104,6 +108,23 @@ class WaveDomain(Domain):
         v, turn = event.v[around], event.turn[around]
         negative = abs(np.mean(np.conj(v * turn) / turn)) / max(event.U0 * event.depth, 1e-9)
         return {"jump": float(np.degrees(np.angle(v.mean()))), "unbalance": float(min(negative, 1.0))}
+
+    def describe_shape(self, shape: "DipShape") -> str:
+        return f", the phase jumping by {shape.jump:.0f} degrees, negative sequence {shape.unbalance:.0%} of the depth"
+
+    @property
+    def edges(self) -> str:
+        return f"{super().edges}, without zero sequence"
+
+    def about_noise(self, faults: Sequence[str], judged: bool) -> str:
+        origin = (
+            "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics"
+            " that no equation explains count as noise; noise of the voltage is passed on as the model does. Beside it"
+            " each channel may keep a small offset, and how steep the voltage is at the samples of an edge is known no"
+            " better than two curves through them agree."
+        )
+        how = "each held by what is likely" if judged else "and not judged: these offsets and edges would pass for them"
+        return origin + f" Faults of the measurement ({joined(faults)}) are free in every fit, {how}." * bool(faults)
 
     def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""

@@ -4,7 +4,8 @@ from tractexp.files import PACKAGE, located
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers, recording
+from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
+from tractexp.filetypes.tabulated_waves import recording
 from tractexp.filetypes.tidy import restored
 from tractexp.overrides import survey_of
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered, signs

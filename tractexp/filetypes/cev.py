@@ -18,7 +18,7 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
-from tractexp.filetypes.comtrade_header import number, quoted
+from tractexp.filetypes.comtrade_fields import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.remarks import Remarks
@@ -142,8 +142,7 @@ class _Opened:
 
 def _opened(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     if path.stat().st_size > LARGEST:
         raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
     text, encoding = decode(files.read(path), str(path), encoding)

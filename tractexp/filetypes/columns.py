@@ -169,14 +169,10 @@ def _compound(words: Sequence[str]) -> tuple[str, str] | None:
     """Quantity and phase of a word such as ua, vl1, i_b, V1."""
     for word, after in zip(words, [*words[1:], ""], strict=True):
         if match := COMPOUND.fullmatch(word):
-            return _letter(match[1]), PHASES[match[2]]
+            return "U" if match[1] == "v" else match[1].upper(), PHASES[match[2]]
         if (key := WORDS.get(word)) in ("U", "I", "P", "Q") and after in PHASES and (after != "p"):
             return key, PHASES[after]
     return None
-
-
-def _letter(letter: str) -> str:
-    return {"v": "U"}.get(letter, letter.upper())
 
 
 def _worded(words: Sequence[str]) -> tuple[str, str] | None:

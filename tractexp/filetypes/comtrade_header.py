@@ -7,18 +7,18 @@ import re
 from collections import deque
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
-from math import isfinite
 
 from tractexp.errors import UserError
+from tractexp.filetypes.comtrade_fields import date, number, quoted
 from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import unit_of
+from tractexp.wording import counted
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
 MOST_RATES = 10  # sampling rates of one file, where their number stands for the nominal frequency
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
-_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
 _COUNTS = re.compile(r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE)
 
 
@@ -122,20 +122,6 @@ def parse(where: str, lines: list[str], remarks: Remarks, first: int = 1) -> Hea
     return header
 
 
-def number(text: str) -> float | None:
-    """A finite number as files write it, or None."""
-    text = text.strip()
-    if not _NUMBER.fullmatch(text):
-        return None
-    value = float(text.replace("d", "e").replace("D", "e"))
-    return value if isfinite(value) else None
-
-
-def quoted(text: str) -> str:
-    """A value of the file for a message: not longer than a line bears."""
-    return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
-
-
 def _station(rows: _Lines, header: Header) -> None:
     if _COUNTS.fullmatch(rows.peek()):
         rows.remarks.add("the line of station and device is missing", rows.rest[0][0])
@@ -183,8 +169,8 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
     if len(fields) not in (10, 13) and not short:
         raise rows.refuse(
-            line, f"{channel} has {_fields(fields)}, but an analog channel has 13, or 10 by the standard of 1991; "
-            "correct the line, or the numbers of channels in line 2",
+            line, f"{channel} has {counted(len(fields), 'field')}, but an analog channel has 13, or 10 by the standard "
+            "of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
 
     def value(i: int, what: str, default: float | None) -> float:
@@ -216,10 +202,6 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     return _checked_ratio(rows, line, channel, analog)
 
 
-def _fields(fields: list[str]) -> str:
-    return f"{len(fields)} field{'s' * (len(fields) != 1)}"
-
-
 def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Analog:
     """Secondary values need a ratio; a channel that is neither voltage nor current may lack it."""
     if analog.side != "S" or (analog.primary > 0 and analog.secondary > 0):
@@ -247,8 +229,8 @@ def _digital(rows: _Lines, k: int, count: int) -> Digital:
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
         name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
         raise rows.refuse(
-            line, f"status channel {k + 1} of {count} {name} has {_fields(fields)}, but a status channel has 5, or "
-            "3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
+            line, f"status channel {k + 1} of {count} {name} has {counted(len(fields), 'field')}, but a status channel "
+            "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
     if len(fields) == 5:
         name, phase, circuit = fields[1:4]
@@ -353,33 +335,6 @@ def _dates(rows: _Lines, header: Header) -> None:
 
 
 _LIKE_DATE = re.compile(r"^[\s,]*$|\d.*[/:.,\-]|[/:,\-].*\d", re.ASCII)
-_DATE = re.compile(
-    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
-    re.ASCII,
-)
-
-
-def date(text: str, american: bool) -> tuple[datetime | None, str]:
-    """A date in whichever order its numbers allow, and a remark on it; None where they allow none.
-
-    `american`: the month is written first (1991).
-    """
-    match = _DATE.fullmatch(text.strip())
-    if match is None:
-        return None, f"{quoted(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
-    a, b, c, hour, minute, second = map(int, match.groups()[:6])
-    micro = int((match[7] or "0")[:6].ljust(6, "0"))
-    orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
-    if len(match[1]) > 2:
-        orders = [(a, b, c), (a, c, b)]
-    for k, (year, month, day) in enumerate(orders):
-        year += (1900 if year >= 70 else 2000) if year < 100 else 0
-        try:
-            moment = datetime(year, month, day, hour, minute, second, micro)
-        except ValueError:
-            continue
-        return moment, f"date {quoted(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
-    return None, f"{quoted(text)} is not a day of the calendar; not used"
 
 
 def _kind(rows: _Lines, header: Header) -> None:

@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.comtrade_header import VALUE, Header, number, quoted
+from tractexp.filetypes.comtrade_fields import number, quoted
+from tractexp.filetypes.comtrade_header import VALUE, Header
 from tractexp.filetypes.remarks import Remarks
 
 LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note

@@ -9,7 +9,8 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError, check_choice
-from tractexp.filetypes.comtrade_header import EPOCH, VALUE, date
+from tractexp.filetypes.comtrade_fields import date
+from tractexp.filetypes.comtrade_header import EPOCH, VALUE
 from tractexp.filetypes.comtrade_samples import NONE, row
 from tractexp.recording.recording import Channel, Recording, Segment
 

@@ -43,7 +43,6 @@ FUNDAMENTAL = (tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"), tag("672d0310-7810-1
 FEWEST = 4  # samples of a waveform
 CLOSE = 1e-6  # s: times that are the same to the resolution of a moment
 GAP = 1.5  # usual steps: after a longer one a log is another one
-ENDINGS = (".pqd", ".pqdif")
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,24 +69,24 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     Raises `UserError` naming file and record of what is wrong, and for a file without waveforms.
     """
     remarks = Remarks(str(path))
-    found = observed(path, encoding, [WAVEFORM], remarks)
+    content = observed(path, encoding, [WAVEFORM], remarks)
     channels: dict[int, tuple[ChannelDefinition, str]] = {}
-    stretches = _fullest(_waves(found, channels, remarks), remarks)
+    stretches = _fullest(_waves(content, channels, remarks), remarks)
     if not stretches:
         raise UserError(
             f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read as a table: "
             f"data=csv data.path={path}"
         )
     segments, evened = _segments(str(path), stretches)
-    start, begin = found.observations[0].start, stretches[0].t[0]
-    triggers = [seconds(o.triggered, start) - begin for o in found.observations if o.triggered]
+    start, begin = content.observations[0].start, stretches[0].t[0]
+    triggers = [seconds(o.triggered, start) - begin for o in content.observations if o.triggered]
     last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
     return Recording(
         source=str(path),
         channels=[_channel(*channels[k], values) for k, values in evened.items()],
         segments=segments,
-        frequency=found.frequency if 10 <= found.frequency <= 100 else 50.0,
-        station=found.station,
+        frequency=content.frequency if 10 <= content.frequency <= 100 else 50.0,
+        station=content.station,
         start=_moment(start, float(begin), remarks),
         trigger=next((t for t in triggers if 0 < t < last), None),
         notes=remarks.notes(),
@@ -95,11 +94,11 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     )
 
 
-def _waves(found: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks) -> list[Stretch]:
+def _waves(content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks) -> list[Stretch]:
     """The waveforms of each observation by the times of their samples; `channels` learns definition and unit."""
-    made: dict[tuple[float, ...], Stretch] = {}
-    for each in found.observations:
-        begin, own = seconds(each.start, found.observations[0].start), dict[tuple[float, ...], Stretch]()
+    stretches: dict[tuple[float, ...], Stretch] = {}
+    for each in content.observations:
+        begin, own = seconds(each.start, content.observations[0].start), dict[tuple[float, ...], Stretch]()
         for one in each.instances:
             definition, values = next(((d, v) for d, v in one.series if _wave(d)), (None, None))
             if definition is None or values is None or len(one.t) < FEWEST:
@@ -109,8 +108,8 @@ def _waves(found: Observed, channels: dict[int, tuple[ChannelDefinition, str]], 
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
             own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[one.channel.number] = values
         for stretch in _together([*own.values()], remarks):
-            made.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
-    return sorted(made.values(), key=lambda stretch: stretch.t[0])
+            stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
+    return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
 def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
@@ -189,9 +188,9 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     for a file without logs.
     """
     remarks = Remarks(str(path))
-    found = observed(path, encoding, [LOG, PHASOR], remarks)
+    content = observed(path, encoding, [LOG, PHASOR], remarks)
     names: dict[int, tuple[str, str]] = {}
-    stretches = _logs(found, names)
+    stretches = _logs(content, names)
     if not stretches:
         raise UserError(
             f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms are read by "
@@ -206,13 +205,13 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     return Rows(str(path), head, cells.__getitem__, sample, first=1, word="sample", notes=remarks.notes())
 
 
-def _logs(found: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
+def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
     """The logs of each observation by their times; `names` learns what each column is called, and its unit."""
-    made: dict[tuple[float, ...], Stretch] = {}
-    circuits = {i.channel.circuit for o in found.observations for i in o.instances}
+    stretches: dict[tuple[float, ...], Stretch] = {}
+    circuits = {i.channel.circuit for o in content.observations for i in o.instances}
     numbers: dict[tuple[int, int], int] = {}
-    for each in found.observations:
-        begin = seconds(each.start, found.observations[0].start)
+    for each in content.observations:
+        begin = seconds(each.start, content.observations[0].start)
         for one in each.instances:
             values = {d.value for d, _ in one.series}
             for k, (definition, column) in enumerate(one.series):
@@ -222,8 +221,8 @@ def _logs(found: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
                 number = numbers.setdefault((one.channel.number, k), len(numbers))
                 name = f"{one.channel.circuit} {name}" if len(circuits) > 1 and one.channel.circuit else name
                 names[number] = (name, UNITS[definition.unit])
-                made.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[number] = column
-    return sorted(made.values(), key=lambda stretch: stretch.t[0])
+                stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[number] = column
+    return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
 def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:

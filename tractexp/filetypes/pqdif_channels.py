@@ -116,8 +116,7 @@ def observed(
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     reading = _Reading(kinds, remarks)
     for kind, body in records(path, encoding, remarks):
         if kind == SOURCE:
@@ -154,8 +153,8 @@ class _Reading:
             circuit = " ".join(each.texts(GROUP)) or (name if name != self.station else "")
             phase, kind = int(each.number(PHASE)), each.identifier(KIND)
             quantity = QUANTITIES.get(int(each.number(QUANTITY)), "")
-            made = ChannelDefinition(self.count, each.text(NAME), phase, circuit, quantity, kind, tuple(series))
-            self.definitions.append(made)
+            definition = ChannelDefinition(self.count, each.text(NAME), phase, circuit, quantity, kind, tuple(series))
+            self.definitions.append(definition)
             self.count += 1
 
     def settings(self, body: Collection) -> None:
@@ -180,8 +179,8 @@ class _Reading:
             if not 0 <= one.number < len(self.definitions):
                 raise body.body.damaged(f"channel {one.number} is observed, and {len(self.definitions)} are defined")
             channel = self.definitions[one.number]
-            if channel.kind in self.kinds and (made := self._instance(channel, one.owners(every), start, times)):
-                instances.append(made)
+            if channel.kind in self.kinds and (instance := self._instance(channel, one.owners(every), start, times)):
+                instances.append(instance)
         if instances:
             self.observations.append(Observation(start, body.moment(TRIGGERED), tuple(instances)))
 
@@ -300,12 +299,12 @@ class _Stored:
 
     def owners(self, every: Sequence["_Stored"]) -> list[_Series]:
         """Each series with the one whose values it has."""
-        made = []
+        pairs = []
         for own in self.series:
             channel, series = int(own.number(SHARED_CHANNEL, -1)), int(own.number(SHARED_SERIES, -1))
             shared = 0 <= channel < len(every) and 0 <= series < len(every[channel].series)
-            made.append(_Series(own, every[channel].series[series] if shared else own))
-        return made
+            pairs.append(_Series(own, every[channel].series[series] if shared else own))
+        return pairs
 
 
 def _record(body: Collection) -> str:

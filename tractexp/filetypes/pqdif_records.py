@@ -99,8 +99,8 @@ class Collection:
 
     def texts(self, name: bytes) -> list[str]:
         """The texts of one tag, without what follows their end."""
-        made = [v[:LONGEST].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
-        return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in made]
+        texts = [v[:LONGEST].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
+        return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in texts]
 
     def text(self, name: bytes) -> str:
         return next(iter(self.texts(name)), "")
@@ -189,13 +189,13 @@ def _compression(container: Collection, where: str) -> bool:
 def _decompressed(content: bytes, room: int, where: str) -> bytes:
     inflate = zlib.decompressobj()
     try:
-        made = inflate.decompress(content, room + 1)
+        body = inflate.decompress(content, room + 1)
     except zlib.error as error:
         raise UserError(f"{where}: its compressed body is damaged; get the file from the recorder again") from error
-    if len(made) > room:
+    if len(body) > room:
         raise UserError(
             f"{where}: the file's records hold more than {LARGEST / 1e6:.0f} MB decompressed; give a part of it"
         )
     if not inflate.eof:
         raise UserError(f"{where}: its compressed body ends too early; get the file from the recorder again")
-    return made
+    return body

@@ -42,16 +42,16 @@ class Results(TableFile):
         self.notes = (*parts[0].notes, f"channels named by the .inf file, of {len(parts)} .out file(s)")
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
-        made: dict[int, TableColumn] = {}
+        cells: dict[int, TableColumn] = {}
         for part in self.parts:
             own = {k: kind for k, kind in wanted.items() if (k == 0 and part is self.parts[0]) or self._in(part, k)}
             columns = part.read({0: "time", **{self.columns[k - 1][1]: kind for k, kind in own.items() if k}})
-            made |= {k: columns[self.columns[k - 1][1] if k else 0] for k in own}
-        lengths = {len(one.values) for one in made.values()}
+            cells |= {k: columns[self.columns[k - 1][1] if k else 0] for k in own}
+        lengths = {len(one.values) for one in cells.values()}
         if len(lengths) > 1:
             counts = " and ".join(map(str, sorted(lengths)))
             raise UserError(f"{self.source}: its .out files have {counts} rows: they are not of one run")
-        return made
+        return cells
 
     def _in(self, part: TextTable, number: int) -> bool:
         return number > 0 and self.columns[number - 1][0] is part
@@ -62,8 +62,7 @@ class Results(TableFile):
 
 def table(path: Path, form: TableForm) -> Results:
     """The results that a `.out` file is part of; raises `UserError` where no `.inf` file names its channels."""
-    if not files.there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+    files.check_there(path)
     number = _NUMBERED.fullmatch(path.stem)
     case = number[1] if number else path.stem
     beside = sorted(path.parent.iterdir())

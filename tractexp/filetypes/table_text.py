@@ -18,6 +18,7 @@ from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
+from tractexp.wording import counted
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most
@@ -181,7 +182,7 @@ class TextTable(TableFile):
 
     def _ragged(self, line: int, cells: int) -> UserError:
         return UserError(
-            f"{self.source}: line {line} has {cells} cell{'s' * (cells != 1)} where the others have {self.width}; a "
+            f"{self.source}: line {line} has {counted(cells, 'cell')} where the others have {self.width}; a "
             "gap in P or Q is written nan"
         )
 

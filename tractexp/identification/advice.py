@@ -11,8 +11,8 @@ from tractexp.identification.plan import DipShape, Forecast, over_depth
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
-from tractexp.noise.color import runs
 from tractexp.provenance import again
+from tractexp.record.change import runs
 
 
 def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:

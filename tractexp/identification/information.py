@@ -88,11 +88,6 @@ class Information:
         slope = exponents / np.where(self.values == 0, 1.0, self.values)
         return float(np.sqrt(slope @ self.covariance @ slope))
 
-    def logdet(self) -> float:
-        """log of the volume of what is known: the D-criterion, over all parameters (-inf where one is unseen)."""
-        sign, value = np.linalg.slogdet(self.J.T @ self.J)
-        return float(value) if sign > 0 else -np.inf
-
 
 def _echelon(rows: np.ndarray) -> np.ndarray:
     """Reduced row echelon form by full pivoting: the same row space with as many zeros as it allows."""

@@ -14,7 +14,7 @@ SCREENED = 4096  # points of the box that are simulated
 STARTS, APART = 24, 0.5  # the best of them that are so far apart in the unit cube
 FEW, SAME, PROMISING = 8, 0.05, 10  # iterations after which only so many, so far apart, are refined
 MORE, TOLERANCE = 12, 0.1  # iterations of those, and of the deviance
-KEPT, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: several end in the same valley
+MOST, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: several end in the same valley
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
 
 
@@ -45,7 +45,7 @@ def best_fits(likelihood: Likelihood) -> np.ndarray:
 
 def distinct(ends: Descent, free: int) -> np.ndarray:
     """Coordinates (at most 4, D) of the ends of distinct valleys, the best first."""
-    return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, KEPT, norm=2)]
+    return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, MOST, norm=2)]
 
 
 def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:

@@ -56,11 +56,6 @@ class DipShape:
         )  # fmt: skip
 
     @property
-    def waves(self) -> bool:
-        """Whether the currents of waveforms are planned for."""
-        return self.domain is not PHASORS
-
-    @property
     def noise(self) -> Noise:
         """Noise of what is compared at this rate: a first-order autoregression."""
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0

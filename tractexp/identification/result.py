@@ -129,22 +129,22 @@ class Result:
         are missing or no finite numbers.
         """
         stored.check_fields(cls, content, where)
-        made = cls(**stored.without_nulls(cls, content))
+        result = cls(**stored.without_nulls(cls, content))
         for name in ("parameters", "per_event", "before", "bounds"):
-            stored.check_numbers(f"{where}: {name}", getattr(made, name))
+            stored.check_numbers(f"{where}: {name}", getattr(result, name))
         try:
-            motor, static, effects, *_ = parts(made.model)
-            ratio = made.base.ratio
+            motor, static, effects, *_ = parts(result.model)
+            ratio = result.base.ratio
         except (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError) as error:
             raise UserError(f"{where}: its model or own_base is none that an identification writes") from error
-        if missing := [key for key in BEFORE if key not in made.before]:
+        if missing := [key for key in BEFORE if key not in result.before]:
             raise UserError(f"{where}: before lacks {missing[0]}; identify again")
         if not (math.isfinite(ratio) and ratio > 0):
             raise UserError(f"{where}: own_base has powers that are no finite numbers above zero; identify again")
-        stored.check_parameters(where, made.parameters, (motor, static, *effects))
-        for sentence in stored.outside(by_event(made.parameters, made.per_event), made.bounds):
+        stored.check_parameters(where, result.parameters, (motor, static, *effects))
+        for sentence in stored.outside(by_event(result.parameters, result.per_event), result.bounds):
             warnings.warn(f"{where}: {sentence}", UserWarning, stacklevel=2)
-        return made
+        return result
 
     @property
     def base(self) -> OwnBase:
@@ -257,11 +257,11 @@ def conclude(
     free = end.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
     fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
-    first, found_values = problem.events[0], _values(problem, free)
+    first, estimates = problem.events[0], _values(problem, free)
     own = OwnBase.at(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     result = Result(
-        **found_values,
+        **estimates,
         objective=float(problem.objective(free[None])[0]),
         epsilon_p=epsilon_p,
         epsilon_q=epsilon_q,
@@ -283,7 +283,7 @@ def conclude(
         notes=[note for f in fits for note in f.event.record.notes],
         records=[{"name": f.event.record.name, "role": f.role} | provenance.identity(f.event.record) for f in fits],
         own_base=asdict(own),
-        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*found_values.values()), exponents),
+        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*estimates.values()), exponents),
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )

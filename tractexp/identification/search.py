@@ -198,14 +198,14 @@ def search(
     except _Stop as stop:
         status = str(stop)
     except KeyboardInterrupt as stop:
-        ended = _found(counter, rows, f"was stopped after {counter.simulations} simulations")
+        ended = _result(counter, rows, f"was stopped after {counter.simulations} simulations")
         raise Stopped.of(stop, state=ended) from None
     if not rows or rows[-1][0] < counter.simulations:
         note()
-    return _found(counter, rows, status)
+    return _result(counter, rows, status)
 
 
-def _found(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
+def _result(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
     """Where a search is."""
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)

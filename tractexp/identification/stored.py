@@ -9,6 +9,7 @@ import numpy as np
 
 from tractexp.errors import UserError, among
 from tractexp.kinds import check_kind
+from tractexp.wording import counted
 
 
 def check_fields(cls: type[Any], content: Any, where: str) -> None:
@@ -16,11 +17,11 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
     unlike = f"{where} is not a result.json of an identification"
     if not isinstance(content, Mapping):
         raise UserError(f"{unlike}: it holds no mapping of names to values")
-    known = {f.name: f for f in dataclasses.fields(cls)}
+    own = {f.name: f for f in dataclasses.fields(cls)}
     for name in content:
-        if name not in known:
-            raise UserError(f"{unlike}: it has an unknown key '{name}'{among(name, known, 'Keys')}")
-    for name, f in known.items():
+        if name not in own:
+            raise UserError(f"{unlike}: it has an unknown key '{name}'{among(name, own, 'Keys')}")
+    for name, f in own.items():
         if name not in content and f.default is f.default_factory is dataclasses.MISSING:
             raise UserError(f"{unlike}: it lacks '{name}'")
     kinds = get_type_hints(cls)
@@ -91,7 +92,7 @@ def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
         if values.shape != t.shape:
             raise UserError(f"{name} has {len(values)} samples where t has {len(t)}; give as many")
     if len(t) < 2:
-        raise UserError(f"t has {len(t)} sample{'s' * (len(t) != 1)}; a prediction needs at least two")
+        raise UserError(f"t has {counted(len(t), 'sample')}; a prediction needs at least two")
     steps = np.diff(t)
     usual = float(np.median(steps))
     if not (usual > 0 and (np.abs(steps - usual) < usual / 2).all()):

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.errors import UserError
+from tractexp.record.change import runs
+
 HIGHEST_ORDER = 16
 SMALLEST = 1e-9  # pu: stands for the noise of a record that has none
 FEWEST = 20  # samples to estimate a noise model from
@@ -71,6 +74,15 @@ def white_noise(deviation: float) -> Autoregression:
     return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST)]))
 
 
+def check_count(samples: int) -> None:
+    """Raise `UserError` for too few quiet samples."""
+    if samples < FEWEST:
+        raise UserError(
+            f"the noise cannot be told from {samples} quiet samples before and after the dips: at least {FEWEST} are"
+            " needed; give records that start earlier"
+        )
+
+
 def fit_autoregression(
     stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER, sparing: bool = False
 ) -> Autoregression:
@@ -96,21 +108,20 @@ def fit_autoregression(
     price = np.log(max(count, 2)) if sparing else 2 * count / np.maximum(count - orders - 2, 1)
     criterion = count * np.log(variance) + (orders + 1) * price
     order = int(np.argmin(criterion))
-    coefficients = np.zeros((order + 1, order))
-    for k in range(order + 1):
-        coefficients[k, :k] = table[k]
-    return Autoregression(coefficients, np.sqrt(variance[: order + 1]))
+    return of_orders(table[: order + 1], variance)
+
+
+def of_orders(table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float]) -> Autoregression:
+    """The autoregression of the coefficients (k,) of each order k, and the variance of its shocks."""
+    coefficients = np.zeros((len(table), len(table) - 1), dtype=table[-1].dtype)
+    for k, row in enumerate(table):
+        coefficients[k, :k] = row
+    return Autoregression(coefficients, np.sqrt(variance[: len(table)]))
 
 
 def stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
     """The unbroken parts of `values` (N,)."""
     return [values[part] for part in runs(valid)]
-
-
-def runs(mask: np.ndarray) -> list[slice]:
-    """The unbroken stretches in which `mask` (N,) is True."""
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int)))
-    return [slice(a, b) for a, b in edges.reshape(-1, 2)]
 
 
 def _run_lengths(valid: np.ndarray) -> np.ndarray:

@@ -5,9 +5,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from tractexp.errors import UserError
 from tractexp.model.drive import Drive
-from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, fit_autoregression, white_noise
+from tractexp.noise.color import SMALLEST, Autoregression, check_count, fit_autoregression, white_noise
 from tractexp.noise.model import Noise
 from tractexp.noise.random_walk import RandomWalk, without_slow
 from tractexp.record import Event
@@ -48,11 +47,7 @@ def estimate(
     both = np.all(valid[measured], axis=0)
     pieces = [residuals[measured, part][:, both[part]] for part in quiet]
     count = sum(p.shape[1] for p in pieces)
-    if count < FEWEST:
-        raise UserError(
-            f"the noise cannot be told from {count} quiet samples before and after the dips: at least {FEWEST} are"
-            " needed; give records that start earlier"
-        )
+    check_count(count)
     together = np.concatenate(pieces, axis=1)
     covariance = together @ together.T / count
     covariance += 1e-18 * np.eye(len(covariance))

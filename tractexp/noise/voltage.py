@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.noise.color import runs
 from tractexp.noise.random_walk import Walk, cosines
 from tractexp.record import Event
+from tractexp.record.change import runs
 
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
 AGREE = 2.5  # standard deviations within which they do

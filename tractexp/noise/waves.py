@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.errors import UserError
-from tractexp.noise.color import FEWEST, SMALLEST, Autoregression, white_noise
+from tractexp.noise.color import SMALLEST, Autoregression, check_count, of_orders, white_noise
 from tractexp.noise.model import Noise
 
 HIGHEST = 48  # order of the autoregressions
@@ -37,11 +36,7 @@ def of_waves(
     """
     measured = np.any(valid, axis=1)
     count = sum(part.stop - part.start for part in quiet)
-    if count < FEWEST:
-        raise UserError(
-            f"the noise cannot be told from {count} quiet samples before and after the dips: at least {FEWEST} are"
-            " needed; give records that start earlier"
-        )
+    check_count(count)
     vector = residuals[0] + 1j * residuals[1] if phases == 3 else residuals[0]
     first = _fitted([vector[part][valid[0, part]] for part in quiet], answers[0])
     pair = [first, first if phases == 3 else white_noise(1.0), white_noise(1.0)]
@@ -98,7 +93,4 @@ def predicted(covariance: np.ndarray) -> Autoregression:
         table.append(np.concatenate([last - reflection * last[::-1].conj(), [reflection]]))
         variance.append(variance[-1] * max(1 - abs(reflection) ** 2, 1e-12))
     order = int(np.argmax(np.array(variance) <= GAINED * variance[-1]))
-    coefficients = np.zeros((order + 1, order), dtype=covariance.dtype)
-    for k in range(order + 1):
-        coefficients[k, :k] = table[k]
-    return Autoregression(coefficients, np.sqrt(variance[: order + 1]))
+    return of_orders(table[: order + 1], variance)

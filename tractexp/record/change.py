@@ -74,12 +74,17 @@ def _steps(
     beside = np.maximum(apart[: -4 * n], apart[4 * n :])
     usual = USUAL * float(np.percentile(change, 25))
     steps = (change - answer > max(least, usual)) & (change > ABRUPT * beside)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], steps, [False]]).astype(int)))
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
-        k = int(a + np.argmax(np.abs(after - before)[a:b]))
+    for run in runs(steps):
+        k = run.start + int(np.argmax(np.abs(after - before)[run]))
         earlier, later = before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n], after[k : k + (STAYS[0] - 1) * n + 1 : n]
         if abs(later.mean() - earlier.mean()) > STAYS[1] * abs(after[k] - before[k]):
             yield Change(k + n, k + 2 * n, complex(before[k]), complex(after[k]))
+
+
+def runs(mask: np.ndarray, least: int = 1) -> list[slice]:
+    """The unbroken stretches, of at least so many samples, in which `mask` (N,) is True."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], mask, [False])).astype(int))).tolist()
+    return [slice(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
 
 
 def without_gaps(x: np.ndarray) -> np.ndarray:

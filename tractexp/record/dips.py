@@ -8,7 +8,8 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.provenance import digest
 from tractexp.record.direction import OUTWARD, direction
-from tractexp.record.event import Event, detect, find_dips, steady
+from tractexp.record.event import Event, detect, steady
+from tractexp.record.fall import find_dips
 from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 

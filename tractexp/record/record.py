@@ -209,12 +209,10 @@ class Record:
     def _check_values(self, place: Callable[[int], str], still: bool = False) -> None:
         """Refuse what is no record; times may stand `still` where the record is to be resampled."""
         n = self.samples
-        for name, values in self.more.items():
+        for name, values in (*self.more.items(), *self.channels.items()):
             if values.shape != (n,):
                 raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")
         for name, values in self.channels.items():
-            if values.shape != (n,):
-                raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")
             bad = np.isinf(values) if name in ("P", "Q") else ~np.isfinite(values)
             if bad.any():
                 i = int(np.argmax(bad))

@@ -39,11 +39,11 @@ class Window:
     def on(self, step: float) -> np.ndarray:
         """Weights (odd,) of samples `step` [s] apart, for what is linear between them."""
         reach = int(np.ceil(np.abs(self.at).max() / step - 1e-9))
-        made = np.zeros(2 * reach + 2)
+        weights = np.zeros(2 * reach + 2)
         whole, part = np.divmod(self.at / step, 1)
-        np.add.at(made, whole.astype(int) + reach, (1 - part) * self.weights)
-        np.add.at(made, whole.astype(int) + reach + 1, part * self.weights)
-        return made[:-1]
+        np.add.at(weights, whole.astype(int) + reach, (1 - part) * self.weights)
+        np.add.at(weights, whole.astype(int) + reach + 1, part * self.weights)
+        return weights[:-1]
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data."""

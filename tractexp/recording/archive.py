@@ -12,6 +12,7 @@ from tractexp.record import Record, endings, reader_of
 from tractexp.record.foreign import is_record
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.reader import WaveformReader
+from tractexp.wording import counted
 
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
 BEGINNING = 65536  # bytes
@@ -108,7 +109,7 @@ def _record(folder: Path, name: str, where: str, see: "functools._lru_cache_wrap
         raise UserError(f"{where}: there is no file '{path.relative_to(folder)}' in {folder}{nearest(name, there)}")
     view = see(path)
     if not 1 <= load <= len(view.sights):
-        loads = f"{len(view.sights)} load{'s' * (len(view.sights) != 1)}"
+        loads = counted(len(view.sights), "load")
         raise UserError(f"{where}: {name}: {path} shows {loads}, and there is no load {load}; the first is 1")
     event = _select(view.sights[load - 1], dip, f"{where}: {name}")
     assert event.event is not None

@@ -278,10 +278,6 @@ def _angle(S: complex | np.complexfloating) -> float:
     return float(np.degrees(np.angle(S)))
 
 
-def _sensible(S: complex) -> bool:
-    return abs(_angle(S)) <= SENSIBLE
-
-
 def _mw(S: complex) -> str:
     P, Q = (0.0 if abs(x) < 1e-6 * abs(S) else x for x in (S.real, S.imag))
     return f"P = {P:.3g} MW, Q = {Q:.3g} Mvar"
@@ -299,7 +295,7 @@ def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > REACTIVE
     if confirmed or not middle or I2 > BALANCED * I1:
         return
-    better = [p for p in ((1, 2, 0), (2, 0, 1)) if _sensible(_power(live, p)) and _answers(live, p) >= 0]
+    better = [p for p in ((1, 2, 0), (2, 0, 1)) if abs(_angle(_power(live, p))) <= SENSIBLE and _answers(live, p) >= 0]
     if len(better) == 1:
         _refuse(
             feeder, live, better[0], f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages"

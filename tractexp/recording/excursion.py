@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.event import NOISE_FACTOR, RECOVERED, sample_noise
+from tractexp.record.fall import NOISE_FACTOR, RECOVERED, sample_noise
 from tractexp.record.record import DEAD
 from tractexp.recording.trace import Trace
 

@@ -11,17 +11,15 @@ from tractexp.errors import UserError
 from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
+from tractexp.recording.kirchhoff import closed_sums
 from tractexp.recording.label import Group, groups, kind, residual, words
 from tractexp.recording.recording import Recording
-from tractexp.recording.snapshot import Snapshots, frequency, nearest_nominal, snapshots
+from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.unit import in_doubt
 
 ALIKE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
 SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
-UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
-LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
-CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong to one bus
 SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
@@ -71,11 +69,11 @@ def propose(recording: Recording) -> list[Feeder]:
     buses = _groups(recording, phasors, volts)
     three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
     loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
-    level = max(_size(phasors, each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
+    level = max(phasors.size(each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
     options = [_feeders(recording, phasors, load, buses, level) for load in loads if buses and _fits(load, buses)]
     options += _single(recording, phasors, volts, amps, [*buses, *loads], level)
-    feeders = _with_others(_kirchhoff(phasors, [each[0] for each in options]), options)
-    level = max((_size(phasors, f.currents) for f in feeders), default=0.0)
+    feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
+    level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
     return sorted(marked, key=lambda f: not f.loaded)
 
@@ -100,7 +98,7 @@ def unrecognised(recording: Recording) -> str:
     if f is not None and nearest_nominal(f) is None:
         return f"the strongest line of its voltages is at {f:.3g} Hz, which is no network's"
     phasors = snapshots(recording, volts)
-    if phasors is None or not any(_size(phasors, [i]) > 0 for i in volts):
+    if phasors is None or not any(phasors.size([i]) > 0 for i in volts):
         return "its voltages are zero"
     return "no three voltages and currents have names or angles of phases"
 
@@ -247,9 +245,9 @@ def _buses(
     """
     if len(buses) == 1:
         return [(buses[0], "the only ones in the file")]
-    loaded = _size(phasors, load.numbers) > UNLOADED * level
-    greatest = max(_size(phasors, bus.numbers) for bus in buses)
-    alive = [b for b in buses if not _dead(phasors, b.numbers) and _size(phasors, b.numbers) > PICK_UP * greatest]
+    loaded = phasors.size(load.numbers) > UNLOADED * level
+    greatest = max(phasors.size(bus.numbers) for bus in buses)
+    alive = [b for b in buses if not _dead(phasors, b.numbers) and phasors.size(b.numbers) > PICK_UP * greatest]
     buses = alive if alive and loaded else buses
     if len(buses) == 1:
         return [(buses[0], "the only ones alive")]
@@ -289,15 +287,6 @@ def _text(recording: Recording, group: Group) -> set[str]:
     if len(channels) == 1:  # a phase is a name of its own there: "Ia" goes with "Ua"
         shared |= {f"phase {word[1:]}" for word in shared if word[0] in "uvi" and 1 < len(word) < 4}
     return shared
-
-
-def _size(phasors: Snapshots, numbers: Sequence[int]) -> float:
-    """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
-    size = np.nan_to_num(np.abs(phasors.of(numbers))).mean(axis=0)
-    if not len(size):
-        return 0.0
-    spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG, len(size) // 4)))
-    return float(np.percentile(spans, 25, axis=1).max())
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
@@ -343,62 +332,6 @@ def _single(
     return single
 
 
-def _kirchhoff(phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The feeders, with a note where the sum of their currents is zero, as they are or with one reversed.
-
-    The whole station first, then the feeders of each bus.
-    """
-    three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
-    level = max((_size(phasors, feeders[k].currents) for k in three), default=0.0)
-    loaded = [k for k in three if _size(phasors, feeders[k].currents) > UNLOADED * level]
-    if closed := _closed(phasors, feeders, loaded):
-        return _said(feeders, loaded, *closed)
-    for bus in sorted({feeders[k].voltages for k in loaded}):
-        own = [k for k in loaded if feeders[k].voltages == bus]
-        if closed := _closed(phasors, feeders, own):
-            feeders = _said(feeders, own, *closed)
-    return feeders
-
-
-def _closed(phasors: Snapshots, feeders: list[Feeder], loaded: list[int]) -> tuple[np.ndarray, float] | None:
-    """(signs, residual) of the simplest sum of three or more currents that closes; None where none does."""
-    if len(loaded) < 3:
-        return None
-    X = np.array([phasors.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
-    X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
-    if not X.size:
-        return None
-    plain, each = np.ones(len(loaded)), np.arange(len(loaded))
-    tried = [plain, *(np.where(each == k, s, plain) for k in each for s in (0, -1))]
-    if len(loaded) > 4:
-        tried += [np.where(np.isin(each, pair), 0, plain) for pair in combinations(each, 2)]
-    tried = [signs for signs in tried if np.count_nonzero(signs) >= 3]
-    closes = [_closure(X, signs) for signs in tried]
-    if min(closes) >= CLOSES:
-        return None
-    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * min(closes)))
-    return tried[simple], closes[simple]
-
-
-def _closure(X: np.ndarray, signs: np.ndarray) -> float:
-    """Sum of the currents over the sum of their magnitudes, root mean square over phases and time."""
-    total = np.tensordot(signs, X, axes=1)
-    return float(np.linalg.norm(total) / np.linalg.norm(np.tensordot(np.abs(signs), np.abs(X), axes=1)))
-
-
-def _said(feeders: list[Feeder], loaded: list[int], signs: np.ndarray, closes: float) -> list[Feeder]:
-    marked = list(feeders)
-    out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
-    for k, sign in zip(loaded, signs, strict=True):
-        said = f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of their magnitudes"
-        if out:
-            said += f", without {' and '.join(out)}" + (": a bus tie, or one of another bus" if sign == 0 else "")
-        if sign < 0:
-            said += " once this one's polarity is reversed"
-        marked[k] = replace(marked[k], reverse_current=bool(sign < 0), why=(*marked[k].why, said))
-    return marked
-
-
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     """Whether three voltages never turn as three phases do, in either order."""
     if len(numbers) < 3:
@@ -417,7 +350,7 @@ def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: flo
     if not any(phasors.pure(i) for i in feeder.currents):
         said = "no load here: the currents are no more than noise or harmonics"
         return replace(feeder, why=(*feeder.why, said), loaded=False)
-    size = _size(phasors, feeder.currents)
+    size = phasors.size(feeder.currents)
     step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):

@@ -4,8 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.change import SMALL, Change, load_changes
-from tractexp.record.event import FEWEST_BEFORE, OPEN_POLE, SHALLOWEST, STEADY, UNCLEARED
+from tractexp.record.change import SMALL, Change, load_changes, runs
+from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, STEADY
+from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.record.phasor import Phasors
 from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
@@ -180,10 +181,10 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
 def _open(trace: Trace, e: Excursion) -> Excursion | None:
     """The part of an excursion in which one phase carries no current, or is unbalanced too long for a fault."""
     if len(trace.I) == 3:
-        runs = [r for r in _open_runs(trace) if r[0] < e.end and r[1] > e.start]
-        if not runs:
+        spans = [span for span in _open_runs(trace) if span[0] < e.end and span[1] > e.start]
+        if not spans:
             return None
-        first, stop = max(runs[0][0], e.start), min(max(r[1] for r in runs), e.end)
+        first, stop = max(spans[0][0], e.start), min(max(span[1] for span in spans), e.end)
         return replace(e, start=first, end=max(stop, first + 1)) if stop - first > 0.5 * (e.end - first) else None
     unbalanced = trace.U2[e.start : e.end] > OPEN_POLE * trace.U[e.start : e.end]
     if np.count_nonzero(unbalanced) * trace.step > UNCLEARED:
@@ -194,15 +195,15 @@ def _open(trace: Trace, e: Excursion) -> Excursion | None:
 def _open_runs(trace: Trace) -> list[tuple[int, int]]:
     """Spans in which exactly one of three currents is gone while the other two carry load as it did before."""
     carries = CARRIES * np.percentile(trace.I, 95)
-    runs = []
+    spans = []
     for k in range(3):
         others = np.delete(trace.I, k, axis=0)
         gone = (trace.I[k] < OPEN_CURRENT * others.mean(axis=0)) & (others.min(axis=0) > carries)
-        runs += [
-            run for run in _runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
-            if run[0] >= 4 and (trace.I[k, : run[0]] > carries).any()
+        spans += [
+            (run.start, run.stop) for run in runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
+            if run.start >= 4 and (trace.I[k, : run.start] > carries).any()
         ]  # fmt: skip
-    return sorted(runs)
+    return sorted(spans)
 
 
 def _open_alone(trace: Trace, spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
@@ -216,12 +217,6 @@ def _open_alone(trace: Trace, spans: list[tuple[str, Excursion]]) -> list[tuple[
     ]
 
 
-def _runs(mask: np.ndarray, least: int) -> list[tuple[int, int]]:
-    """(start, end) of the runs of true values that are at least so long."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= least]
-
-
 def _inrush(trace: Trace) -> list[tuple[str, Excursion]]:
     """Spans in which the second harmonic of a current is that of a saturated transformer."""
     if not len(trace.I):
@@ -229,7 +224,7 @@ def _inrush(trace: Trace) -> list[tuple[str, Excursion]]:
     carries = CARRIES * np.percentile(trace.I, 99)
     rich = ((trace.second > SECOND * trace.I) & (carries < trace.I) & _clean(trace)).any(axis=0)
     least = max(3, round(INRUSH_CYCLES * trace.cycle / trace.step))
-    return [("inrush", _beside(trace, a, b)) for a, b in _runs(rich, least)]
+    return [("inrush", _beside(trace, run.start, run.stop)) for run in runs(rich, least)]
 
 
 def _clean(trace: Trace) -> np.ndarray:

@@ -19,7 +19,7 @@ from tractexp.recording.measure import phasors_of, waves_of
 from tractexp.recording.quality import Quality, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording
-from tractexp.recording.unit import check_known, in_doubt
+from tractexp.recording.unit import check_doubt, in_doubt
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -173,7 +173,7 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     for feeder in feeders:
         said = ()
         try:
-            check_known(recording, feeder.channels)
+            check_doubt(recording, feeder.channels)
             if feeder.loaded or not loaded:
                 feeder = arranged(recording, feeder)
         except UserError as error:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.record.change import runs
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
 from tractexp.recording.snapshot import frequency, nearest_nominal
 
@@ -101,10 +102,8 @@ def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: 
     if channel.limits is not None:
         least, most = channel.limits
         at |= (raw <= least) | (raw >= most)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], at, [False]]).astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    usual = _blunt(x, segment.rate / f, near + step)
-    return float(lengths[lengths >= max(CLIPPED, usual)].sum() / len(x))
+    flat = runs(at, max(CLIPPED, _blunt(x, segment.rate / f, near + step)))
+    return sum(run.stop - run.start for run in flat) / len(x)
 
 
 def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
@@ -166,10 +165,9 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
     with np.errstate(invalid="ignore", divide="ignore"):
         alike = np.diff(blocks, axis=0).var(axis=1) / both < REPEATS
         alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LEVEL
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], alike, [False]]).astype(int)))
-    runs = [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a + 1 >= FEWEST_CALM]
-    size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in runs]
-    for (a, b), rms in zip(runs, size, strict=True):
+    spans = [(run.start, run.stop) for run in runs(alike, FEWEST_CALM - 1)]
+    size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in spans]
+    for (a, b), rms in zip(spans, size, strict=True):
         if rms >= at_work * max(size):
             first, last = a + (a > 0), b + (b == len(alike))  # an edge may hold a part of what comes before or after
             return slice(first * cycle, len(x) if b == len(alike) else max(last, first + 2) * cycle)

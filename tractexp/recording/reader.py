@@ -20,7 +20,7 @@ from tractexp.recording.feeder import Feeder, propose, unrecognised
 from tractexp.recording.label import order
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
-from tractexp.recording.unit import check_known, check_units, in_units
+from tractexp.recording.unit import check_doubt, check_units, in_units
 from tractexp.wording import counted
 
 Stream = tuple[Phasors, Waves | None]  # of one segment
@@ -139,7 +139,7 @@ class WaveformReader(Reader):
                         f"{recording.channels[i].unit}; choose {key}"
                     )
         feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
-        check_known(recording, feeder.channels)
+        check_doubt(recording, feeder.channels)
         return arranged(recording, feeder)
 
     def _usual(self, recording: Recording) -> Any:
@@ -157,7 +157,7 @@ class WaveformReader(Reader):
             (only,) = proposed
             channels = ", ".join(recording.channels[i].name for i in (*only.voltages, *only.currents))
             why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *only.why)
-            check_known(recording, only.channels)
+            check_doubt(recording, only.channels)
             reverse = only.reverse_current != self.reverse_current
             return arranged(recording, replace(only, reverse_current=reverse, why=why))
         if not proposed:

@@ -12,6 +12,8 @@ OTHER_FREQUENCY = 0.06  # of the nominal one: what is farther off belongs to ano
 TUNED = 0.06  # of a nominal frequency: a network's frequency strays no farther
 MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a longer one is sampled
 PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave
+UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
+LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +38,14 @@ class Snapshots:
             return False
         large = size >= 0.5 * np.nanmax(size)
         return bool(np.nanmedian(self.rest[k][large] ** 2) <= (1 / PURE - 1) * np.nanmedian(size[large] ** 2))
+
+    def size(self, numbers: Sequence[int]) -> float:
+        """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
+        size = np.nan_to_num(np.abs(self.of(numbers))).mean(axis=0)
+        if not len(size):
+            return 0.0
+        spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG, len(size) // 4)))
+        return float(np.percentile(spans, 25, axis=1).max())
 
 
 def segments(recording: Recording, f: float) -> list[Segment]:

@@ -99,7 +99,7 @@ def in_doubt(channel: Channel) -> bool:
     return not unit_of(channel.unit)[0]
 
 
-def check_known(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
+def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
     """Raise `UserError` where a channel of {U: ..., I: ...} is in doubt: the question, and the setting that answers."""
     odd = {x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])] for x, ours in numbers.items()}
     odd = {letter: channels[0] for letter, channels in odd.items() if channels}

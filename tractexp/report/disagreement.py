@@ -3,14 +3,7 @@
 from tractexp.blocks import Report
 from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.investigate import Findings
-from tractexp.wording import in_words, joined
-
-NOISE_OF_WAVES = (
-    "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics that no"
-    " equation explains count as noise; noise of the voltage is passed on as the model does. Beside it each channel may"
-    " keep a small offset, and how steep the voltage is at the samples of an edge is known no better than two curves"
-    " through them agree."
-)
+from tractexp.wording import in_words
 
 
 def places(page: Report, findings: Findings) -> None:
@@ -39,21 +32,11 @@ def places(page: Report, findings: Findings) -> None:
 
 
 def noise(page: Report, findings: Findings) -> None:
-    level, free = findings.context.describe(findings.last.noise), joined(findings.catalogue.of_measurement)
-    if findings.context.waves:
-        unjudged = findings.last.noise.loudest_input_mode > findings.context.criteria.blurred
-        how = (
-            "and not judged: these offsets and edges would pass for them" if unjudged else "each held by what is likely"
-        )
-        faults = f" Faults of the measurement ({free}) are free in every fit, {how}." * bool(free)
-        page.heading("Noise").text(f"{level}. {NOISE_OF_WAVES}{faults}")
-        return
-    page.heading("Noise").text(
-        f"{level}. It is estimated where nothing happens, from what the fit leaves there, and"
-        " so contains what smoothing leaves of the voltage's noise. Time skew, measurement window and load drift are"
-        " free in every fit, each held by what is physically likely."
-    )
-    if (window := findings.context.records.window) is not None:
+    context, fit = findings.context, findings.last
+    judged = fit.noise.loudest_input_mode <= context.criteria.blurred
+    about = context.domain.about_noise(findings.catalogue.of_measurement, judged)
+    page.heading("Noise").text(f"{context.describe(fit.noise)}. {about}")
+    if (window := context.records.window) is not None:
         model = " The extended configuration does not do so." if findings.names else ""
         page.text(
             f"{window.describe().capitalize()}, of voltage and current alike: any other window would"

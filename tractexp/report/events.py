@@ -9,7 +9,7 @@ from tractexp.blocks import style
 from tractexp.blocks.chart import MOST, Chart
 from tractexp.record import Event
 
-FOUND = "#E69F00"  # shades what stands out
+EXCESS = "#E69F00"  # shades what stands out
 WITHIN = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
@@ -44,28 +44,28 @@ def event_chart(
     where that is not the recorded one.
     """
     record, t = event.record, event.record.t
-    made = Chart("t [s]", PANELS, heights=HEIGHTS, pixels=PIXELS)
-    made.line("measured", t, record.U, style.MEASURED, width=3)
+    chart = Chart("t [s]", PANELS, heights=HEIGHTS, pixels=PIXELS)
+    chart.line("measured", t, record.U, style.MEASURED, width=3)
     if driving is not None and not np.array_equal(driving, record.U):
-        made.line("voltage that the load saw", t, driving, style.VOLTAGE, width=1)
+        chart.line("voltage that the load saw", t, driving, style.VOLTAGE, width=1)
     for c, channel in enumerate("PQ"):
         above, measured = 1 + 2 * c, getattr(record, channel)
         if deviation is not None and around is not None:
             for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
-                _noise_band(made, t, middle, WITHIN * deviation[c], panel)
+                _noise_band(chart, t, middle, WITHIN * deviation[c], panel)
         for place in places:
             if place.channel == channel:
                 for panel in (above, above + 1):
-                    made.shade(place.start, place.end, FOUND, panel, "more than chance leaves", opacity=0.25)
-        made.line("measured", t, measured, style.MEASURED, above, width=3)
+                    chart.shade(place.start, place.end, EXCESS, panel, "more than chance leaves", opacity=0.25)
+        chart.line("measured", t, measured, style.MEASURED, above, width=3)
         for name, power, color, dash in curves:
-            made.line(name, t, power[c], color, above, dash=dash)
-            made.line(name, t, measured - power[c], color, above + 1, width=1.1, dash=dash)
-    return made.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
+            chart.line(name, t, power[c], color, above, dash=dash)
+            chart.line(name, t, measured - power[c], color, above + 1, width=1.1, dash=dash)
+    return chart.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
 
 
-def _noise_band(made: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
+def _noise_band(chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""
     some = slice(None, None, -(-len(t) // MOST))
     name = f"± {WITHIN:g} σ of the noise"
-    made.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)
+    chart.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

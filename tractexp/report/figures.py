@@ -45,13 +45,13 @@ def fit(
         panels = figure.subplots(4, 1, sharex=True, height_ratios=(1.0, 1.7, 1.7, 1.1))
         figure.subplots_adjust(left=0.1, right=0.975, bottom=0.06, top=top, hspace=0.13)
         panels[0].plot(*style.thin(t, U), color=style.VOLTAGE, label="voltage")
-        for panel, name, color, seen, made, error in zip(
+        for panel, name, color, seen, output, error in zip(
             panels[1:3], "PQ", (style.ACTIVE, style.REACTIVE), measured, calculated, epsilon, strict=True
         ):
             label = f"{name} calculated (epsilon_{name.lower()} = {100 * error:.3g} %)"
             panel.plot(*style.thin(t, seen), color=style.MEASURED, linewidth=2.6, label=f"{name} measured")
-            panel.plot(*style.thin(t, made), color=color, label=label)
-            panels[3].plot(*style.thin(t, seen - made), color=color, linewidth=0.8, alpha=0.75, label=name)
+            panel.plot(*style.thin(t, output), color=color, label=label)
+            panels[3].plot(*style.thin(t, seen - output), color=color, linewidth=0.8, alpha=0.75, label=name)
         panels[3].axhline(0.0, color=style.FAINT, linewidth=0.7, zorder=0.5)
         for panel, label in zip(panels, ("U [pu]", "P [pu]", "Q [pu]", "residual [pu]"), strict=True):
             _label_axis(panel, label, -0.085)

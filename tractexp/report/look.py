@@ -4,46 +4,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tractexp.blocks import Report, Table
-from tractexp.blocks.chart import Chart
-from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
-from tractexp.blocks.style import PHASES as COLORS
-from tractexp.recording import Channel, Feeder, Recording, Segment
-from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
-from tractexp.recording.quality import spectrum
-from tractexp.recording.recording import unit_of
-from tractexp.recording.trace import half_cycle_rms
-from tractexp.wording import as_sentence, change, degrees, figure, share
+from tractexp.report.look_charts import charts, unassigned
+from tractexp.wording import as_sentence, change, counted, degrees, figure, share
 
-MOST = 400_000  # samples of waveforms that a page holds: a megabyte
-MOST_PHASORS = 200_000  # values of phasors that a page holds
-MOST_OTHERS = 50_000  # samples of channels of no load
-MOST_ARROWS = 30_000  # values of phasors at the cursor that a chart holds
-LINES = 7  # that a load's phasors make
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
-DETAILED = 12  # events that have a chart of their own where the whole is thinned
-AROUND = (0.1, 0.3)  # s before and after an event in such a chart
-LONGEST = 3.0  # s of an event there
-CYCLES = 10  # of a spectrum
-HEIGHTS = (1.3, 1.3, 1, 1, 1, 1.2, 0.7)  # of the panels of a load
-TRACE, TRACES = 0.19, 24  # height of a status channel beside these; so many have room
-CYCLE = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
-PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
-LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
-BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
-SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
 NO_LOAD = "no load here: what happens to the voltage is listed with the loads of its bus"
-CAPTION = (
-    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
-    " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
-    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the first"
-    " voltage lies at 0°: voltages thin, currents thick."
-)
 
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
@@ -66,7 +35,7 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
             page.heading("Channels").add(channels(entry))
-            _unassigned(page, view)
+            unassigned(page, view)
     return page
 
 
@@ -96,7 +65,7 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     loads = sum(len(f["feeders"]) for f in files)
     events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
     worth = sum(e["worth"] for e in events)
-    return f"{_count(loads, 'load')}, {_count(len(events), 'event')}, {worth} worth fitting."
+    return f"{counted(loads, 'load')}, {counted(len(events), 'event')}, {worth} worth fitting."
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
@@ -159,50 +128,9 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
         page.text(as_sentence(quiet(entry)))
     if folded:
         with page.folded(f"Charts of {entry['name']}"):
-            _charts(page, view, shown)
+            charts(page, view, shown)
     else:
-        _charts(page, view, shown)
-
-
-def _charts(page: Report, view: View, shown: Sight) -> None:
-    """Charts to look into."""
-    if shown.record is not None:
-        page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
-    elif shown.phasors and view.recording is not None:
-        every, coarse = _every(view)
-        page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
-        with page.folded("Spectrum before anything happened"):
-            page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
-        if max(every, coarse) > 1:
-            _details(page, view, shown)
-
-
-def _unassigned(page: Report, view: View) -> None:
-    """The channels of no load, a panel for each unit."""
-    recording = view.recording
-    assert recording is not None
-    taken = {i for s in view.sights if s.feeder for i in (*s.feeder.voltages, *s.feeder.currents)}
-    panels: dict[str, list[Channel]] = {}
-    for number in sorted({*range(len(recording.channels))} - taken):
-        channel = recording.channels[number]
-        quantity = unit_of(channel.unit)[0]
-        unit = {"voltage": "u [kV]", "current": "i [kA]"}.get(quantity, channel.unit or "value")
-        panels.setdefault(unit, []).append(channel)
-    if not panels:
-        return
-    count = sum(map(len, panels.values()))
-    chart, every = (
-        Chart("t [s]", [*panels], pixels=150 + 200 * len(panels)),
-        -(-count * recording.samples // MOST_OTHERS),
-    )
-    for panel, group in enumerate(panels.values()):
-        for k, channel in enumerate(group):
-            for segment in (s for s in recording.segments if s.stop > s.first + 1):
-                y = channel.values(segment.first, segment.stop)
-                y, step = (y, 1) if every == 1 else (envelope(y, every), every)
-                chart.samples(channel.name, segment.start, step / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
-    with page.folded(f"The {_count(count, 'channel')} of no load"):
-        page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
+        charts(page, view, shown)
 
 
 def _described(entry: Mapping[str, Any]) -> list[str]:
@@ -233,188 +161,3 @@ def event_row(e: Mapping[str, Any]) -> list[str]:
         f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]), *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
     ]  # fmt: skip
-
-
-def _marked(chart: Chart, shown: Sight) -> Chart:
-    """Events shaded over all panels, each with its number or kind at the top."""
-    spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
-    room = LABEL * float(spans[-1][-1] - spans[0][0])
-    last = -np.inf
-    for seen in shown.events:
-        what = seen.what
-        text = "" if what.start < last + room else what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
-        last = what.start if text else last
-        chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text=text)
-    return chart
-
-
-def _of_record(shown: Sight) -> Chart:
-    record = shown.record
-    assert record is not None
-    panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
-    colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": FAINT}
-    sizes = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
-    panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
-    units = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
-            "[MW, Mvar]"}  # fmt: skip
-    used = [label for label, names in panels_of.items() if names]
-    chart = Chart("t [s]", [f"{label} {units.get(label, '')}".strip() for label in used])
-    for panel, label in enumerate(used):
-        for name in panels_of[label]:
-            values = record.channels[name] * sizes.get(name, 1.0)
-            chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
-    first = float(record.t[0])
-    return _marked(chart, shown).cursor(next((seen.what.start for seen in shown.events), first))
-
-
-def _every(view: View) -> tuple[int, int]:
-    """How many samples and how many phasors become one on a page, so that all loads of a file have room."""
-    recording = view.recording
-    assert recording is not None
-    lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
-    phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
-    return max(1, -(-lines * recording.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
-
-
-def _of_waves(
-    view: View, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
-) -> Chart:
-    """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
-    recording, states = view.recording, view.operations[:TRACES]
-    assert recording is not None
-    assert shown.feeder is not None
-    single = len(shown.phasors[0].V) == 1
-    sequences = "|U| [kV]" if single else "U seq. [kV]"
-    panels = [
-        "u [kV]",
-        "i [kA]",
-        "U RMS [kV]",
-        "I RMS [kA]",
-        sequences,
-        "P, Q [MW]",
-        "f [Hz]",
-        *["status"] * bool(states),
-    ]
-    heights = [*HEIGHTS, *[TRACE * len(states)] * bool(states)]
-    chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
-    for segment in recording.waveforms():
-        _waves(chart, recording, shown, segment, every, span)
-    for p in shown.phasors:
-        part = slice(*np.searchsorted(p.t, span)) if span else slice(None)
-        if len(p.t[part]) > 1:
-            _phasors(chart, p, part, recording.frequency, 1 if span else coarse)
-    chart.limits(6, (1 - BOUND / 2) * recording.frequency, (1 + BOUND / 2) * recording.frequency)
-    if states:
-        chart.states(states, len(panels) - 1, VOLTAGE)
-    first, last = span or (recording.waveforms()[0].start, float(shown.phasors[-1].t[-1]))
-    chart.limits(None, first, last)
-    if recording.trigger is not None and first <= recording.trigger <= last:
-        chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
-    happened = (seen.what.start for seen in shown.events if first <= seen.what.start <= last)
-    return _marked(chart, shown).cursor(next(happened, first) + CYCLE / recording.frequency)
-
-
-def _further(view: View) -> str:
-    """What is said of status channels below a chart."""
-    count = len(view.operations)
-    most = f", the first {TRACES} of {count}" if count > TRACES else ""
-    return f" Status channels that change are below{most}." if count else ""
-
-
-def _waves(
-    chart: Chart, recording: Recording, shown: Sight, segment: Segment, every: int, span: tuple[float, float] | None
-) -> None:
-    """The waveforms of a segment and their RMS."""
-    assert shown.feeder is not None
-    whole = FeederWaves.of(recording, shown.feeder, segment)
-    first, stop = (0, whole.shape[1]) if span is None else map(int, np.searchsorted(segment.t, span))
-    waves, start = whole[:, first:stop], segment.start + first / segment.rate
-    if waves.shape[1] < 2:
-        return
-    K, step = len(waves) // 2, 1 / segment.rate
-    colors, names = _colors(K), _named(recording, shown.feeder, K)
-    for k, wave in enumerate(waves):
-        y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
-        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
-    t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
-    if len(t) > 1:
-        for k, values in enumerate(rms):
-            name, color = PHASES[K][k % K], colors[k % K]
-            chart.samples(name, start + t[0], t[1] - t[0], values, color, panel=2 + k // K)
-
-
-def _colors(phases: int) -> tuple[str, ...]:
-    return COLORS if phases > 1 else (VOLTAGE,)
-
-
-def _named(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
-    """What the waves of a load are called at the cursor: by phase, and by channel where they are its channels."""
-    numbers = (*feeder.voltages, *feeder.currents)
-    if len(numbers) != 2 * phases:  # line voltages, or two current transformers, of which phases are made
-        return [*PHASES[phases]] * 2
-    return [f"{PHASES[phases][k % phases]} ({recording.channels[i].name})" for k, i in enumerate(numbers)]
-
-
-def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
-    """Symmetrical components, powers and frequency of one segment."""
-    t = p.t[part]
-    step = float(t[-1] - t[0]) / (len(t) - 1)
-    sparse = max(1, -(-4 * p.V.shape[0] * len(t) // MOST_ARROWS))
-    for panel, phases in enumerate((p.V, p.I)):
-        for name, color, turning in zip(PHASES[len(phases)], _colors(len(phases)), phases, strict=True):
-            chart.phasors(name, float(t[0]), step * sparse, turning[part][::sparse], color, panel)
-    lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
-    if len(p.V) == 3:
-        zero = np.abs(p.V.mean(axis=0))
-        lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
-                  ("zero sequence", zero, MEASURED, 4)]  # fmt: skip
-    else:
-        lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
-    alive = np.abs(p.f / nominal - 1) < BOUND
-    lines.append(("f", np.where(alive, p.f, np.nan), FAINT, 6))
-    for name, values, color, panel in lines:
-        drawn = values[part] if every == 1 else envelope(values[part], every)
-        chart.samples(name, float(t[0]), step * every, drawn, color, panel)
-
-
-def envelope(wave: np.ndarray, every: int) -> np.ndarray:
-    """The lowest and highest (2 M,) of each 2 `every` samples of a wave (N,), in the order in which they came."""
-    rows = np.full(-(-len(wave) // (2 * every)) * 2 * every, wave[-1])
-    rows[: len(wave)] = wave
-    parts = rows.reshape(-1, 2 * every)
-    held = np.where(np.isnan(parts), 0.0, parts)
-    order = np.sort(np.stack([held.argmin(1), held.argmax(1)], axis=1), axis=1)
-    return np.take_along_axis(parts, order, axis=1).ravel()
-
-
-def _spectrum(recording: Recording, shown: Sight) -> Chart:
-    """Of the first voltage and the first current, before the first event."""
-    assert shown.feeder is not None
-    segment = recording.waveforms()[0]
-    whole = FeederWaves.of(recording, shown.feeder, segment)
-    length = min(round(CYCLES * segment.rate / recording.frequency), whole.shape[1])
-    first = shown.events[0].what.start - segment.start if shown.events else np.inf
-    quiet = int(np.clip(first * segment.rate, length, whole.shape[1]))
-    waves = whole[:, quiet - length : quiet]
-    K = len(waves) // 2
-    chart = Chart("frequency [Hz]", ["of the fundamental [%]"], log_y=True, pixels=320)
-    for name, wave, color in (("voltage", waves[0], REACTIVE), ("current", waves[K], ACTIVE)):
-        f, rms = spectrum(wave, segment.rate)
-        if rms.max() > 0:
-            chart.line(name, f, np.maximum(100 * rms / rms.max(), 1e-3), color)
-    return chart
-
-
-def _details(page: Report, view: View, shown: Sight) -> None:
-    """A chart with every sample for each event, where the chart of the whole has not all of them."""
-    for seen in shown.events[:DETAILED]:
-        what = seen.what
-        span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
-        with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
-            page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
-    if len(shown.events) > DETAILED:
-        page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
-
-
-def _count(n: int, what: str) -> str:
-    return f"{n} {what}{'s' * (n != 1)}"

@@ -128,8 +128,8 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
     happened = [_event(event) for event in _common(bus)]
     more = [f"{len(happened) - LISTED} more"] * (len(happened) > LISTED)
-    told = joined([*happened[:LISTED], *more]) or (NOTHING if any(feeder["loaded"] for feeder in bus) else "")
-    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), told])
+    events = joined([*happened[:LISTED], *more]) or (NOTHING if any(feeder["loaded"] for feeder in bus) else "")
+    parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])
     return f"bus {number}: {'; '.join(parts)}"
 
 

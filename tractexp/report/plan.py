@@ -11,21 +11,21 @@ import numpy as np
 from tractexp.blocks import Report, Table
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
+from tractexp.domain import PHASORS, WAVES
 from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
 from tractexp.identification.problem import Problem
 from tractexp.wording import as_sentence
 
-DEPTH, DURATION, RATE, NOISE = "depth", "duration [s]", "samples per second", "noise, of P before the dip"
+DEPTH, DURATION, RATE = "depth", "duration [s]", "samples per second"
 JUMP, UNBALANCE = "phase jump [degrees]", "negative sequence, of the depth"
-CURRENT_NOISE = "noise of the currents, of P before the dip"
 AXES = {  # of a scan: what its axis says, and what a value is multiplied by
     DEPTH: ("depth of the dip [%]", 100.0),
     DURATION: ("duration of the dip [ms]", 1000.0),
     RATE: ("samples per second", 1.0),
-    NOISE: ("noise [% of P before the dip]", 100.0),
+    PHASORS.planned_noise: ("noise [% of P before the dip]", 100.0),
     JUMP: ("phase jump [degrees]", 1.0),
     UNBALANCE: ("U2, % of the depth", 100.0),
-    CURRENT_NOISE: ("noise of the currents [% of P]", 100.0),
+    WAVES.planned_noise: ("noise of the currents [% of P]", 100.0),
 }
 LINES = [(color, dash) for dash in ("solid", "dash", "dot") for color in PALETTE]
 CEILING = 10.0  # times the value: wider intervals are not told
@@ -77,7 +77,7 @@ def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
 
 def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     """The page."""
-    needed, waves = planned.needed, planned.problem.model.waves
+    needed = planned.needed
     answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
     page = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
@@ -99,8 +99,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
         [
             f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each parameter at"
             " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
-            "The planned dip falls from 1 pu and comes back along straight edges of"
-            f" {1000 * planned.problem.domain.edge:g} ms{', without zero sequence' * waves}.",
+            f"The planned dip falls from 1 pu and comes back along {planned.problem.domain.edges}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
     )

@@ -11,14 +11,14 @@ from tractexp.domain.playback import AFTER
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit
 from tractexp.record import WaveEvent
-from tractexp.report.events import FOUND, WITHIN
+from tractexp.report.events import EXCESS, WITHIN
 
 PHASES = ("a", "b", "c")
 CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
 FASTEST = 1300.0  # Hz: what a spectrum shows
 KILO = 1.0  # kA of a peak from which an axis is in kA
-TOLD = 4  # events of which it is told how they were prepared
+FEW = 4  # events of which it is told how they were prepared
 SPECTRUM = (
     "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
     " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on ({after:.0f} ms), below before"
@@ -67,35 +67,35 @@ def wave_chart(
     unit, one = ("kA", kA) if kA * np.abs(measured).max() >= KILO else ("A", 1000 * kA)
     start, step = float(event.record.t[event.lead]), event.record.step
     panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
-    made = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
+    chart = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
     colors = style.PHASES if event.phases > 1 else (style.VOLTAGE,)
     for name, u, color in zip(names, event.of_phases(_voltage(event))[:, part], colors, strict=False):
-        made.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
+        chart.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
-        _noise_bands(made, event, one * deviation, one * around)
+        _noise_bands(chart, event, one * deviation, one * around)
     for first, last in _together(places):
-        made.shade(first, last, FOUND, 1 + event.phases, "more than chance leaves", opacity=0.2)
+        chart.shade(first, last, EXCESS, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
-        made.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
+        chart.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
     for name, currents, color, dash in curves:
         calculated = event.of_phases(currents)[:, part]
         for k, phase in enumerate(names):
-            made.samples(name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash)
+            chart.samples(name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash)
             rest = one * (measured[k] - calculated[k])
             own = colors[k] if len(curves) == 1 and phase else color
-            made.samples(f"phase {phase}" if own != color else name, start, step, rest, own, len(names) + 1, dash=dash)
-    return made.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
+            chart.samples(f"phase {phase}" if own != color else name, start, step, rest, own, len(names) + 1, dash=dash)
+    return chart.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
 
 
-def _noise_bands(made: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
+def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
     """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
     t = event.record.t[event.lead :]
     compared = np.array(event.compared)[:, None]
     half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
     middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
     for k in range(event.phases):
-        made.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
-    made.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
+        chart.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
+    chart.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
 
 
 def _together(places: Sequence[Any]) -> list[tuple[float, float]]:
@@ -140,40 +140,42 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
     cycle = event.rate / event.f0
     after = min(AFTER * event.rate, left.shape[1] - event.start)
     size = abs(event.P0 + 1j * event.Q0) / event.U0  # of the fundamental's peak [pu]
-    made = []
+    parts = []
     for samples, last in ((after, None), (event.start - event.lead, event.start)):
         n = round(max(1, int(samples / cycle + 0.25)) * cycle)
         first = event.start if last is None else max(event.start - n, event.lead)
         part = left[:, first : min(first + n, left.shape[1])]
-        found = np.abs(np.fft.rfft(part)) / part.shape[1] * 2 / size
-        found[:, 0] /= 2
-        made.append(Spectrum(np.fft.rfftfreq(part.shape[1], event.record.step), found, part.shape[1] / event.rate))
-    return made[0], made[1]
+        amplitudes = np.abs(np.fft.rfft(part)) / part.shape[1] * 2 / size
+        amplitudes[:, 0] /= 2
+        parts.append(
+            Spectrum(np.fft.rfftfreq(part.shape[1], event.record.step), amplitudes, part.shape[1] / event.rate)
+        )
+    return parts[0], parts[1]
 
 
 def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     """The spectra above each other, and the caption."""
     after, before = spectra(event, currents)
-    made = Chart("frequency [Hz]", ["after [%]", "before [%]"], pixels=380)
+    chart = Chart("frequency [Hz]", ["after [%]", "before [%]"], pixels=380)
     names = [f"phase {n}" for n in PHASES[: event.phases]] if event.phases > 1 else ["residual"]
     highest = min(FASTEST, event.rate / 2)
     for panel, (frequencies, amplitudes, _) in enumerate((after, before)):
         shown = frequencies <= highest
         for name, row, color in zip(names, amplitudes, style.PHASES, strict=False):
-            made.line(name, frequencies[shown], 100 * row[shown], color, panel)
-        made.limits(panel, 0.0, 1.08 * 100 * max(float(amplitudes[:, shown].max()), 1e-4))
+            chart.line(name, frequencies[shown], 100 * row[shown], color, panel)
+        chart.limits(panel, 0.0, 1.08 * 100 * max(float(amplitudes[:, shown].max()), 1e-4))
     for order in HARMONICS:
         if order * event.f0 < highest:
-            made.edge(order * event.f0)
+            chart.edge(order * event.f0)
     marks = [order * round(event.f0, 1) for order in HARMONICS if order * event.f0 < highest and order != 9]
     notes = SPECTRUM.format(after=1000 * after.seconds, before=1000 * before.seconds)
-    return made.ticks(None, marks).limits(None, 0.0, highest), notes
+    return chart.ticks(None, marks).limits(None, 0.0, highest), notes
 
 
 def prepared(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     """What was done to each record before it was fitted, and how it is simulated, in sentences."""
     steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
-    return [*(_prepared(fit) for fit in fits[:TOLD] if fit.waves is not None), steps]
+    return [*(_prepared(fit) for fit in fits[:FEW] if fit.waves is not None), steps]
 
 
 def _prepared(fit: Fit) -> str:

@@ -99,9 +99,6 @@ class ComparisonResult(Written):
     def report(self) -> Report:
         return _report(self.comparison).report(self.comparison, self.source)
 
-    def write_results(self, folder: Path) -> list[Path]:
-        return [files.write_json(folder / "comparison.json", self.content)]
-
     def to_dict(self) -> dict[str, Any]:
         return {"call": dict(self.call), **self.content}
 

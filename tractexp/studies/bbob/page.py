@@ -9,6 +9,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.studies.bbob.runs import BbobRuns
 from tractexp.studies.comparison.charts import runtime_curves
+from tractexp.wording import counted
 
 
 def scale(benchmark: BbobRuns) -> str:
@@ -16,15 +17,15 @@ def scale(benchmark: BbobRuns) -> str:
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
-        f"{functions} BBOB function{'s' * (functions > 1)} in dimension {dimensions},"
-        f" {len(plan.instances)} instance{'s' * (len(plan.instances) > 1)} each,"
+        f"{counted(functions, 'BBOB function')} in dimension {dimensions},"
+        f" {counted(len(plan.instances), 'instance')} each,"
         f" {plan.multiplier:,} evaluations per dimension and run"
     )
 
 
 def sentences(benchmark: BbobRuns) -> list[str]:
     """One sentence to quote for each dimension, the best optimizer first."""
-    told = []
+    sentences = []
     plan = benchmark.plan
     for d in plan.dimensions:
         shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
@@ -34,11 +35,11 @@ def sentences(benchmark: BbobRuns) -> list[str]:
             f" {len(plan.functions)} functions"
             for name in ranked
         ]
-        told.append(
+        sentences.append(
             f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,} evaluations on each"
             f" function, {'; '.join(parts)}."
         )
-    return told
+    return sentences
 
 
 def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
@@ -75,16 +76,16 @@ def answer(benchmark: BbobRuns, dimension: int) -> str:
     if not others:
         return f"{best} met {share} of the targets in dimension {dimension}; task.against=[NAME] sets it beside others."
     second = f"{benchmark.share(others[0], dimension, functions):.0%} of {others[0]}"
-    told = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
+    sentence = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
     if share == second.partition(" ")[0]:
-        told = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
+        sentence = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
     elsewhere = []
     for group, chosen in benchmark.groups().items():
         shares = {name: benchmark.share(name, dimension, chosen) for name in (best, *others)}
         lead = max(shares, key=lambda name: shares[name])
         if shares[lead] > shares[best]:
             elsewhere.append(f"{group} ({lead} {shares[lead]:.0%}, {best} {shares[best]:.0%})")
-    return told + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
+    return sentence + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
 
 
 def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:

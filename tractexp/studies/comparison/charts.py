@@ -74,7 +74,7 @@ def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np
     return np.array([first, *x, last]), np.array([0, *y, *(y[-1:] if len(y) else [0])])
 
 
-def targets_told() -> str:
+def targets_in_words() -> str:
     """The targets of the ECDF in words."""
     return f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times the floor"
 

@@ -110,7 +110,7 @@ def _speed(page: Report, comparison: Comparison) -> None:
         caption = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
         costs = " An iteration may cost several populations." if by == "iterations" else ""
         _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), caption + costs)
-    caption = f"Runtimes: the share of {charts.targets_told()} reached by all runs, by simulations."
+    caption = f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
     _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
     page.table(
         columns,

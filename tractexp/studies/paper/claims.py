@@ -150,7 +150,7 @@ def table2(study: Study) -> list[Claim]:
 
 def how_read(name: str) -> str:
     """A reading as a sentence has it."""
-    return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(name, printed.READINGS[name].told)
+    return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(name, printed.READINGS[name].words)
 
 
 def table3(study: Study) -> list[Claim]:

@@ -55,18 +55,18 @@ def consistency() -> Consistency:
 
 def classical(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     """One step of the classical Runge-Kutta method."""
-    k1 = f(y)
-    k2 = f(y + h / 2 * k1)
-    k3 = f(y + h / 2 * k2)
-    k4 = f(y + h * k3)
-    return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+    return _runge_kutta(f, y, h, h / 2)
 
 
 def as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
     """One step of Eq. (4) as printed, h/6 in the second and third stage, its twice named K1 read as K3 and K4."""
+    return _runge_kutta(f, y, h, h / 6)
+
+
+def _runge_kutta(f: Field, y: np.ndarray, h: float, inner: float) -> np.ndarray:
     k1 = f(y)
-    k2 = f(y + h / 6 * k1)
-    k3 = f(y + h / 6 * k2)
+    k2 = f(y + inner * k1)
+    k3 = f(y + inner * k2)
     k4 = f(y + h * k3)
     return y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
 

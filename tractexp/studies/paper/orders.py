@@ -30,7 +30,7 @@ class Order:
     values: dict[str, float]
     objective: float
     fits: tuple[Fit, ...]
-    known: Uncertainty
+    uncertainty: Uncertainty
     nanoseconds: float  # per simulated sample and candidate
     substeps: int
     cost: Cost  # counted in the kernel
@@ -47,22 +47,22 @@ class Order:
 
     @property
     def free(self) -> int:
-        return len(self.known.names)
+        return len(self.uncertainty.names)
 
     @property
     def finite(self) -> int:
         """Parameters whose 95 % interval is finite and within the bounds."""
-        low, high = self.known.values - self.known.half, self.known.values + self.known.half
-        return int(np.count_nonzero((low > self.known.lower) & (high < self.known.upper)))
+        low, high = self.uncertainty.values - self.uncertainty.half, self.uncertainty.values + self.uncertainty.half
+        return int(np.count_nonzero((low > self.uncertainty.lower) & (high < self.uncertainty.upper)))
 
     @property
     def identified(self) -> int:
-        return sum(verdict.word == IDENTIFIED for verdict in self.known.verdicts.values())
+        return sum(verdict.word == IDENTIFIED for verdict in self.uncertainty.verdicts.values())
 
     @property
     def condition(self) -> float:
         """Of the information matrix, parameters in units of their ranges."""
-        return float(np.linalg.cond(self.known.information.J) ** 2)
+        return float(np.linalg.cond(self.uncertainty.information.J) ** 2)
 
     def spread(self, role: str) -> tuple[float, float]:
         """Root mean square over the events of a role of epsilon_p and of epsilon_q, fractions."""

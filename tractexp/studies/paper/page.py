@@ -117,7 +117,7 @@ def table1(sheet: Report, study: Study) -> None:
         " stages and the powers of the static load included; a step is as short as the accuracy asks for. The time, on"
         " this machine and among many candidates at once, decides nothing.",
     )  # fmt: skip
-    verdicts = [f"{m}: {n} {v}" for m, o in study.orders.items() for n, v in o.known.verdicts.items()
+    verdicts = [f"{m}: {n} {v}" for m, o in study.orders.items() for n, v in o.uncertainty.verdicts.items()
                 if v.word != "identified"]  # fmt: skip
     if verdicts:
         sheet.items(verdicts)
@@ -151,7 +151,7 @@ def _one(values: Any, what: str, table: Any = None, name: str = "") -> str:
 def _label(name: str) -> str:
     """ "issa_10_perceivers" -> "ISSA, 10 perceivers (section 4.2)"; the three of the tables are named alone."""
     reading = READINGS[name]
-    return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.told}"
+    return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.words}"
 
 
 def _parameters(sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
@@ -213,7 +213,7 @@ def _spent(study: Study, name: str) -> list[str]:
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         _label(name), _middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
-        "-" if literal else f"{study.found_floor(ends):.0%}",
+        "-" if literal else f"{study.floor_share(ends):.0%}",
         "-" if literal else _middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
@@ -416,10 +416,10 @@ def equations_section(sheet: Report, study: Study) -> None:
 
 def readings_section(sheet: Report, study: Study) -> None:
     sheet.heading("The readings of the text")
-    rows = [[READINGS[name].told, *(_middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name))]
+    rows = [[READINGS[name].words, *(_middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name))]
             for name in BOTH]  # fmt: skip
     alone = ("issa_by_stage", "issa_printed_levy")
-    rows += [[READINGS[name].told, "", _middle(study.objectives(name))] for name in alone]
+    rows += [[READINGS[name].words, "", _middle(study.objectives(name))] for name in alone]
     sheet.table(
         ["reading", "SSA", "ISSA"], rows,
         "Objective after 300 iterations [pu²], median (best .. worst). Unless said: unit cube, better-only,"

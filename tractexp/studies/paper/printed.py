@@ -49,7 +49,7 @@ class Reading:
     as it is printed."""
 
     optimizer: str
-    told: str
+    words: str
     settings: Mapping[str, Any] = field(default_factory=dict)
     literal: bool = False
 

@@ -40,12 +40,12 @@ class SearchStore:
             return SearchResult(**json.loads(str(entry["ending"])), values=entry["found"], history=history)
         return None
 
-    def put(self, settings: Mapping[str, Any], seed: int, found: SearchResult) -> None:
+    def put(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
         """Write the entry of a search."""
-        ending = {k: v for k, v in vars(found).items() if k not in ("values", "history")}
-        arrays = {name: getattr(found.history, name) for name in ARRAYS}
+        ending = {k: v for k, v in vars(result).items() if k not in ("values", "history")}
+        arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)
-        SEARCHES.write_arrays(key, ending=np.array(json.dumps(files.plain(ending))), found=found.values, **arrays)
+        SEARCHES.write_arrays(key, ending=np.array(json.dumps(files.plain(ending))), found=result.values, **arrays)
 
     def arrays(self, what: str, compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
         """Arrays of something else that is computed for this problem, as `what` says, or of its entry."""

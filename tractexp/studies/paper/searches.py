@@ -37,8 +37,8 @@ def run(
     results = {label: [stored.get(settings, seed) for seed in range(seeds)] for label, settings in variants.items()}
     missing = {label: [seed for seed in range(seeds) if several[seed] is None] for label, several in results.items()}
     done, total = 0, sum(map(len, missing.values()))
-    if known_before := seeds * len(variants) - total:
-        note(f"  {known_before} of them were made before by the same code on the same records, and are read back")
+    if earlier := seeds * len(variants) - total:
+        note(f"  {earlier} of them were made before by the same code on the same records, and are read back")
     chunks = [(label, part[k : k + CHUNK]) for label, part in missing.items() for k in range(0, len(part), CHUNK)]
     if not chunks:
         return results  # type: ignore[return-value]

@@ -244,7 +244,7 @@ class Study:
         others = {bounds: self.random_ends(valleys.within(self.problem, TRADED, *bounds)) for bounds in (WIDE, NARROW)}
         return {own: self.control, **others}
 
-    def found_floor(self, objectives: np.ndarray) -> float:
+    def floor_share(self, objectives: np.ndarray) -> float:
         """The share of objectives (n,) at the floor."""
         return float(np.mean(objectives <= AT_FLOOR * self.floor))
 

@@ -1,0 +1,48 @@
+"""Numbers and dates as the lines of recorders' files hold them, and a value of a file for a message."""
+
+import re
+from datetime import datetime
+from math import isfinite
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
+_DATE = re.compile(
+    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
+    re.ASCII,
+)
+
+
+def number(text: str) -> float | None:
+    """A finite number as files write it, or None."""
+    text = text.strip()
+    if not _NUMBER.fullmatch(text):
+        return None
+    value = float(text.replace("d", "e").replace("D", "e"))
+    return value if isfinite(value) else None
+
+
+def quoted(text: str) -> str:
+    """A value of the file for a message: not longer than a line bears."""
+    return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
+
+
+def date(text: str, american: bool) -> tuple[datetime | None, str]:
+    """A date in whichever order its numbers allow, and a remark on it; None where they allow none.
+
+    `american`: the month is written first (1991).
+    """
+    match = _DATE.fullmatch(text.strip())
+    if match is None:
+        return None, f"{quoted(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
+    a, b, c, hour, minute, second = map(int, match.groups()[:6])
+    micro = int((match[7] or "0")[:6].ljust(6, "0"))
+    orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
+    if len(match[1]) > 2:
+        orders = [(a, b, c), (a, c, b)]
+    for k, (year, month, day) in enumerate(orders):
+        year += (1900 if year >= 70 else 2000) if year < 100 else 0
+        try:
+            moment = datetime(year, month, day, hour, minute, second, micro)
+        except ValueError:
+            continue
+        return moment, f"date {quoted(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
+    return None, f"{quoted(text)} is not a day of the calendar; not used"

@@ -1,0 +1,117 @@
+"""A recording of waveforms from the columns of a table."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.filetypes.cells import is_number
+from tractexp.filetypes.columns import role
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped
+from tractexp.filetypes.table import TableFile
+from tractexp.filetypes.tabulated import seconds
+from tractexp.record.record import JITTER
+from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.unit import in_units
+
+GAP = 1.5  # usual steps: a longer one parts two segments
+HUGE = 1e38  # of a value: no unit makes sense of a greater one
+
+
+def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
+    """The waveforms of a table: every column of numbers is a channel; gaps in time part segments.
+
+    Raises `UserError` for a table of something else, and for times that are not even within a segment.
+    """
+    if mapping.kind != "waves":
+        raise UserError(
+            f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
+        )
+    t = mapping.columns["t"]
+    named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
+    numbers = {k: "number" for k in named if all(_numbers_of(table, k))}
+    others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, t.number)]
+    _refuse_other_rates(table, others)
+    cells = table.read({t.number: "time", **numbers})
+    for k in numbers:
+        wild = ~(np.abs(cells[k].values) <= HUGE)
+        if wild.any():
+            i = int(np.argmax(wild))
+            raise table.refuse(
+                i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
+            )
+    time, note = seconds(replace(cells[t.number], start=None), t.role.unit)
+    segments, odd = _segments(table, time)
+    named = {one.number: key for key, one in mapping.columns.items()}
+    channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
+    start, notes = cells[t.number].start, [*table.notes, *note, *odd]
+    return in_units(Recording(table.source, channels, segments, nominal, start=start, notes=notes), {}, {})
+
+
+def _numbers_of(table: TableFile, number: int) -> list[bool]:
+    """Which of a column's first cells are numbers."""
+    cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
+    return [is_number(cell) or is_number(cell, ",") for cell in cells]
+
+
+def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
+    """Raise `UserError` for a column of samples that has a number in some rows only."""
+    for number in numbers:
+        there = _numbers_of(table, number)
+        if any(there):
+            raise UserError(
+                f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its first {len(there)}"
+                " rows only; voltage and current of one record are sampled at the same times: keep the rows that have"
+                " all of them, or interpolate what was sampled more slowly"
+            )
+
+
+def _channel(table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
+    """A column as a channel; its key says what it measures, else its name."""
+    name, unit = table.label(number), table.heading.units[number]
+    meaning = role(name, unit)
+    key = key or (meaning.key if meaning else "")
+    unit = mapping.columns[key].role.unit if key in mapping.columns else unit
+    quantity = {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
+    phase = key[1:].upper() if key[1:] in (*PHASES, *LINES) else ""
+    return Channel(name, values, unit, quantity, phase)
+
+
+def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]]:
+    """Runs of even sampling; a note on jitter and on gaps."""
+    if not np.isfinite(t).all():
+        i = int(np.argmin(np.isfinite(t)))
+        raise UserError(f"{table.source}: {table.place(i)}: t = {t[i]} is not a finite number")
+    steps = np.diff(t)
+    if len(t) < 3 or (steps <= 0).any():
+        i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
+        raise UserError(
+            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give "
+            "the unit of time (data.units={t: ms}), or more digits"
+            if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
+        )  # fmt: skip
+    usual = float(np.median(steps))
+    breaks = [0, *(np.flatnonzero(steps > GAP * usual) + 1).tolist(), len(t)]
+    segments, widest = [], 0.0
+    for first, stop in itertools.pairwise(breaks):
+        if stop - first < 3:
+            continue
+        grid = np.linspace(t[first], t[stop - 1], stop - first)
+        step = float(grid[1] - grid[0])
+        off = np.abs(t[first:stop] - grid) / step
+        if off.max() > 0.5:
+            i = first + int(off.argmax())
+            raise UserError(
+                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is {off.max():.2g} steps "
+                "off the uniform grid; waveforms must be sampled evenly"
+            )
+        widest = max(widest, float(off.max()))
+        segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
+    notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > JITTER else []
+    if len(segments) > 1:
+        notes.append(
+            f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"
+        )
+    return segments, notes

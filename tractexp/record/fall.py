@@ -1,0 +1,106 @@
+"""Where a voltage falls and rises: the dips and the swells in its samples."""
+
+import numpy as np
+
+from tractexp.record.change import voltage_changes
+from tractexp.record.record import DEAD
+
+SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
+NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
+RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
+FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
+MERGED = 0.02  # s: dips closer than one cycle are one
+STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
+
+
+def find_dips(t: np.ndarray, U: np.ndarray) -> list[tuple[int, int]]:
+    """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if never recovered.
+
+    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference that starts at
+    the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips, and a
+    swell leaves the reference where it was.
+    """
+    return falls(t, U)[0]
+
+
+def falls(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+    """(dips, swells) of a voltage (N,), both as (start, end) sample numbers."""
+    margin = margin_of(U)
+    block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
+    reference = float(np.median(U[:FEWEST_BEFORE]))
+    dips: list[tuple[int, int]] = []
+    swells: list[tuple[int, int]] = []
+    k = 0
+    while k < len(U):
+        part = U[k : k + block]
+        below = part < (1 - margin) * reference
+        if not below.any():
+            if float(np.median(part)) > (1 + margin) * reference and (swell := _swell(t, U, k, reference, margin)):
+                swells.append(swell)
+                k = swell[1]
+                continue
+            reference += 0.1 * (float(np.median(part)) - reference)
+            k += len(part)
+            continue
+        crossing = k + int(np.argmax(below))
+        start = _onset(U, dips[-1][1] if dips else 0, crossing, reference, margin)
+        if crossing - start > block:
+            start = _after_a_step(t, U, start, crossing, margin)
+        end = _recovery(U, crossing, reference, margin)
+        if dips and t[start] - t[dips[-1][1]] < MERGED:
+            start = dips.pop()[0]
+        dips.append((start, end))
+        if end < len(U):  # the higher: the short one where another dip follows soon, the long one while U still rises
+            reference = max(float(np.median(U[end : end + n])) for n in (FEWEST_BEFORE, block))
+        k = end
+    return dips, swells
+
+
+def margin_of(U: np.ndarray) -> float:
+    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to exceed."""
+    alive = U[DEAD * U.max() < U]
+    if len(alive) < FEWEST_BEFORE:
+        return SHALLOWEST
+    return max(SHALLOWEST, NOISE_FACTOR * float(sample_noise(alive) / np.median(alive)))
+
+
+def sample_noise(x: np.ndarray) -> np.ndarray:
+    """Standard deviation of the noise from sample to sample of x (..., N): robust, and blind to slow changes."""
+    return np.median(np.abs(np.diff(x)), axis=-1) / 0.6745 / np.sqrt(2)
+
+
+def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
+    """The swell in the block from k on; None where the voltage stays at its new level, or falls from it after long."""
+    first = k + int(np.argmax(U[k:] > (1 + margin) * reference))
+    back = U[first:] <= (1 + margin) * reference
+    if not back.any():
+        return None
+    end = first + int(np.argmax(back))
+    near = np.flatnonzero(U[:first] <= (1 + margin / 10) * reference)
+    first = int(near[-1]) + 1 if len(near) else first
+    landed = float(np.median(U[end : end + FEWEST_BEFORE])) >= (1 - margin) * reference
+    return (first, end) if landed or t[end] - t[first] <= STEADY else None
+
+
+def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
+    """The sample after the last one, not before `first`, that was still within a tenth of the margin."""
+    high = np.flatnonzero(U[first:crossing] >= (1 - margin / 10) * reference)
+    return first + int(high[-1]) + 1 if len(high) else crossing
+
+
+def _after_a_step(t: np.ndarray, U: np.ndarray, start: int, crossing: int, margin: float) -> int:
+    """The onset of a dip that comes long after a small step of the voltage, which is none of it."""
+    begin = max(0, 2 * start - crossing)
+    steps = voltage_changes(U[begin:crossing], MERGED * (len(t) - 1) / float(t[-1] - t[0]))
+    if not steps:
+        return start
+    stop = begin + steps[-1].stop
+    return _onset(U, stop, crossing, float(np.median(U[stop:crossing])), margin)
+
+
+def _recovery(U: np.ndarray, crossing: int, reference: float, margin: float) -> int:
+    """The first sample that has recovered from the lowest voltage so far, or len(U)."""
+    after = U[crossing:]
+    missing = reference - np.minimum.accumulate(after)
+    recovered = after >= reference - np.maximum(margin * reference, RECOVERED * missing)
+    return crossing + int(np.argmax(recovered)) if recovered.any() else len(U)
