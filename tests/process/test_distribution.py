@@ -17,7 +17,7 @@ if not (ROOT / "setup.py").is_file():
 
 TOP = ("pyproject.toml", "setup.py", "README.md", "LICENSE")
 FOLDERS = ("tractexp", "conf", "plugins")
-KINDS = {".py", ".yaml", ".csv", ".json", ".cfg", ".dat", ".typed"}
+KINDS = {".py", ".yaml", ".csv", ".json", ".cfg", ".dat", ".css", ".js", ".typed"}
 
 
 def tree(folder: Path, mode: int, seconds: float) -> Path:
@@ -65,7 +65,7 @@ def test_the_wheel_holds_the_package_and_nothing_else(first):
     assert tops == {"tractexp", "tractexp_plugins"}
     inside = [name for name in names if not name.parts[0].endswith(".dist-info")]
     assert {name.suffix for name in inside} == KINDS
-    sources = [path for name in FOLDERS for path in (ROOT / name).rglob("*") if path.suffix in KINDS]
+    sources = [p for name in FOLDERS for p in (ROOT / name).rglob("*") if p.is_file() and "__pycache__" not in p.parts]
     assert Counter(name.name for name in inside) == Counter(path.name for path in sources)
 
 
