@@ -1,8 +1,9 @@
 """What is lost when something fails: `python benchmarks/faults.py [--part jobs,logging,...] [--seed 1]`.
 
-Faults are injected into small searches, their logging, sweeps, an investigation and a survey: kills at a chosen write
-of a file or statement of the database or at a random moment, disks that are full from a chosen write on or really are
-(a small tmpfs, where it may be mounted), stores that are away, locked, cut short or of another version, signals. Then
+Faults are injected into small searches, their logging, sweeps and an investigation: kills at a chosen write of a file
+or statement of the database or at a random moment, disks that are full from a chosen write on or really are (a small
+tmpfs, where it may be mounted), stores that are away, locked, cut short or of another version, signals, folders and
+homes that cannot be written, a cache that several share, umasks and other ways to start Python. Then
 the command is repeated, or `sync` and `doctor` are called, as the program itself says. Of each fault faults.json tells
 what was observed. Nothing may be lost: files are whole, results are the same as without the fault, every run is in the
 store once and finished, none says it is running, and no user reads a traceback. The exit code says whether that holds.
@@ -36,7 +37,9 @@ STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
 SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2")
 WRITTEN, RESULT = 8, 4  # files of a search; which of them is the result, after the three of its configuration
-WORKERS, MACHINES, DISKS = 5, 5, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
+WORKERS, MACHINES, DISKS = 5, 10, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
+MOMENTS, STATEMENTS = 16, 18  # kills of a search at any moment; of what logs, at a statement
+SHARING = 4  # commands that begin at once on one cache
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 
@@ -234,6 +237,17 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
             halves(folder), lost, trace(said), "" if code == expected else f"NOT EXIT {expected}",
             "" if sentence else "NO SENTENCE", same(folder, found), "" if again == 0 else f"THEN EXIT {again}: {more}",
         )  # fmt: skip
+    started = time.monotonic()
+    forked(job(fresh("timed")))
+    took = time.monotonic() - started
+    for k in range(MOMENTS):
+        folder, after = fresh(f"moment{k}"), chance.uniform(0, took)
+        code, said = forked(job(folder), after)
+        wrong, again = halves(folder), forked(job(folder))
+        yield told(
+            f"kill -9 of a search after {after:.2f} s of its {took:.2f}", f"exit {code}; repeated, the same result",
+            wrong, same(folder, found), trace(again[1]), f"THEN EXIT {again[0]}" if again[0] else "",
+        )  # fmt: skip
     for k, way in enumerate([signal.SIGTERM] * 4 + [signal.SIGINT] * 2):
         folder = made(work / f"signal{k}")
         after = chance.uniform(0.3, 2.0)
@@ -285,7 +299,7 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     code, said = forked(logs(fresh("whole"), None))
     assert code == 0, said
     most = int(said.split()[-1])
-    for n in sorted(chance.sample(range(1, most + 1), 14)):
+    for n in sorted(chance.sample(range(1, most + 1), STATEMENTS)):
         folder = fresh(f"statement{n}")
         code, said = forked(logs(folder, n))
         with contextlib.closing(sqlite3.connect(folder / "outputs" / "mlflow.db")) as store:
@@ -346,8 +360,8 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
     for share in (0.0, 0.3, 0.9):
         folder, _ = with_store(f"cut{share}", sound[: int(share * len(sound))])
         yield observed(f"store cut short to {share:.0%}", folder, runs=1)
-    folder, _ = with_store("junk", bytes(chance.randrange(256) for _ in range(5000)))
-    yield observed("store overwritten with noise", folder, runs=1)
+    folder, database = with_store("junk", bytes(chance.randrange(256) for _ in range(5000)))
+    yield observed("store overwritten with noise, which nobody knows for ours, moved away", folder, database.unlink, 1)
     folder, database = with_store("torn", torn(sound, chance))
     yield observed("a page of the store overwritten", folder, runs=1)
     folder, database = with_store("locked", sound)
@@ -384,10 +398,10 @@ def version_of(sound: bytes, work: Path) -> str:
 # Sweeps, in processes of their own
 
 
-def begun(folder: Path, *arguments: str) -> subprocess.Popen[str]:
+def begun(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     said = (folder / "said.txt").open("w")
-    whole = [sys.executable, "-m", "tractexp", *arguments]
-    return subprocess.Popen(whole, cwd=folder, stdout=said, stderr=said, text=True, start_new_session=True)
+    whole, there = [sys.executable, "-m", "tractexp", *arguments], os.environ | environment
+    return subprocess.Popen(whole, cwd=folder, stdout=said, stderr=said, text=True, start_new_session=True, env=there)
 
 
 def everyone(leader: int) -> list[int]:
@@ -507,7 +521,7 @@ def disks(work: Path, found: dict) -> Iterator[Fault]:
                 "" if again == 0 else log.read_text()[-300:],
             )  # fmt: skip
         finally:
-            subprocess.run(["umount", str(folder)], check=False)
+            subprocess.run(["umount", "-l", str(folder)], check=False)  # what logs may be in it still
 
 
 def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
@@ -547,6 +561,104 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
     )  # fmt: skip
 
 
+def places(work: Path, chance: random.Random) -> Iterator[Fault]:
+    """Folders that cannot be written, caches that are shared, umasks, and other ways to start Python."""
+    reference = made(work / "reference")
+    cache = {"TRACTEXP_CACHE_DIR": str(made(work / "cache"))}
+    search = (*SEARCH, "hydra.run.dir=run")
+    assert started_in(reference, search, **cache)[0] == 0
+    found = result(reference / "run" / "result.json")
+
+    def same_result(fault: str, name: str, *flags: str, umask: int = -1, **more: str) -> Fault:
+        folder = made(work / name)
+        code, said = started_in(folder, search, *flags, umask=umask, **cache | more)
+        return told(
+            fault, f"exit {code}, the same result", same(folder, found), trace(said), halves(folder),
+            f"EXIT {code}" if code else "", in_store(folder, 1), readable(folder),
+        )  # fmt: skip
+
+    def refusal(fault: str, folder: Path, **more: str) -> Fault:
+        code, said = started_in(folder, search, **cache | more)
+        left = sorted(path.name for path in folder.rglob("*"))
+        return told(
+            fault, f"exit {code}, '{shorter(said.strip(), folder)}'", "" if code == 2 else "NOT EXIT 2", trace(said),
+            "" if said.startswith("tractexp: ") else "NO SENTENCE", f"LEFT: {', '.join(left)}" if left else "",
+        )  # fmt: skip
+
+    for umask in (0o000, 0o077, 0o027):
+        yield same_result(f"a search under umask {umask:03o}", f"umask{umask}", umask=umask)
+    yield same_result("a search under python -O", "optimized", "-O")
+    yield same_result("a search under python -X dev -W error", "dev", "-X", "dev", "-W", "error")
+    yield same_result("a search under LC_ALL=C and another PYTHONHASHSEED", "plain", LC_ALL="C", PYTHONHASHSEED="7")
+    with unwritable(work / "home") as home:
+        gone = {"TRACTEXP_CACHE_DIR": "", "XDG_CACHE_HOME": "", "HOME": str(home), "MPLCONFIGDIR": ""}
+        yield same_result("a home folder that cannot be written", "homeless", **gone)
+    with unwritable(work / "folder") as folder:
+        yield refusal("a folder that cannot be written", folder)
+    with unwritable(work / "store") as folder:
+        yield refusal("a cache that cannot be written", made(work / "cacheless"), TRACTEXP_CACHE_DIR=str(folder))
+    shared = made(work / "shared")
+    shared.chmod(0o777)
+    yield refusal("a cache that others can write to", made(work / "open"), TRACTEXP_CACHE_DIR=str(shared))
+    yield from side_by_side(work, chance, search, found)
+
+
+def side_by_side(work: Path, chance: random.Random, search: tuple[str, ...], found: dict) -> Iterator[Fault]:
+    """Commands that begin at once on one empty cache, one of which is killed; then one more on what that left."""
+    cache = str(made(work / "common"))
+    folders = [made(work / f"common{k}") for k in range(SHARING)]
+    jobs_of = [begun(folder, *search, TRACTEXP_CACHE_DIR=cache) for folder in folders]
+    time.sleep(chance.uniform(1.0, 4.0))
+    kill(everyone(jobs_of[0].pid))
+    for k, (folder, process) in enumerate(zip(folders, jobs_of, strict=True)):
+        code, said = process.wait(), (folder / "said.txt").read_text()
+        expected = (-signal.SIGKILL, 0) if k == 0 else (0,)
+        yield told(
+            f"{SHARING} commands at once on an empty cache, the first killed: number {k + 1}", f"exit {code}",
+            halves(folder), trace(said), "" if code in expected else f"EXIT {code}",
+            same(folder, found) if code == 0 else "",
+        )  # fmt: skip
+    code = begun(folders[0], *search, TRACTEXP_CACHE_DIR=cache).wait()
+    said = (folders[0] / "said.txt").read_text()
+    yield told(
+        "the killed command repeated on that cache", f"exit {code}, the same result", same(folders[0], found),
+        trace(said), f"EXIT {code}" if code else "",
+    )  # fmt: skip
+
+
+def started_in(folder: Path, arguments: tuple[str, ...], *flags: str, umask: int = -1, **environment: str):
+    """Exit code, and what was printed, of a command in a process of its own; an empty variable is taken away."""
+    there = {name: value for name, value in (os.environ | environment).items() if value}
+    command = [sys.executable, *flags, "-m", "tractexp", *arguments]
+    done = subprocess.run(
+        command, cwd=folder, env=there, umask=umask, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+    return done.returncode, done.stdout
+
+
+@contextlib.contextmanager
+def unwritable(folder: Path) -> Iterator[Path]:
+    """A folder in which nobody can write: of modes, or, where this process may do as it likes, of a mount."""
+    made(folder)
+    mount = ["mount", "-t", "tmpfs", "-o", "ro,size=64k", "tmpfs", str(folder)]
+    as_mount = os.geteuid() == 0 and not subprocess.run(mount, capture_output=True).returncode
+    if not as_mount:
+        folder.chmod(0o555)
+    try:
+        yield folder
+    finally:
+        folder.chmod(0o755) if not as_mount else subprocess.run(["umount", "-l", str(folder)], check=True)
+
+
+def readable(folder: Path) -> str:
+    """What is wrong with modes: files that their owner cannot read, and what names the store open to others."""
+    files_of = [path for path in folder.rglob("*") if path.is_file()]
+    closed = [path.name for path in files_of if not path.stat().st_mode & 0o400]
+    wide = [path.name for path in files_of if path.name == "mlflow.json" and path.stat().st_mode & 0o077]
+    wrong = [f"NOT READABLE: {', '.join(closed)}"] * bool(closed)
+    return ", ".join(wrong + ["mlflow.json IS OPEN TO OTHERS"] * bool(wide))
+
+
 def shorter(sentence: str, folder: Path) -> str:
     return sentence.replace(f"{folder}/", "").replace(str(folder), ".")[:160]
 
@@ -556,7 +668,7 @@ def made(folder: Path) -> Path:
     return folder
 
 
-PARTS = {"jobs": jobs, "logging": logging, "stores": stores, "sweeps": sweeps, "longer": longer}
+PARTS = {"jobs": jobs, "logging": logging, "stores": stores, "sweeps": sweeps, "longer": longer, "places": places}
 
 
 def ready() -> None:

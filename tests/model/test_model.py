@@ -119,6 +119,25 @@ def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
     assert error[0] < 1e-7
 
 
+def test_a_long_simulation_is_done_in_calls_between_which_signals_are_heard(model, monkeypatch):
+    """Their results are those of one call, bit for bit; each is as short as a block of candidates allows."""
+    drive = Drive.of([dip(), dip(depth=0.5)])
+    values = TRUTH * np.random.default_rng(3).uniform(0.9, 1.1, (3 * LANES + 5, len(TRUTH)))
+    whole, sums = model.simulate(drive, values, 2), model.errors(drive, values, 2)
+    run, calls = model.kernel.run, []
+    monkeypatch.setattr(model.kernel, "run", lambda *arrays: (calls.append(arrays[0].shape[2]), run(*arrays)))
+    monkeypatch.setattr("tractexp.model.model.LONGEST", 2 * LANES * 2 * drive.samples + 1)
+    parts = model.simulate(drive, values, 2)
+    assert calls == [2 * LANES, LANES + 5]
+    np.testing.assert_array_equal(parts.outputs, whole.outputs)
+    np.testing.assert_array_equal(parts.miss, whole.miss)
+    np.testing.assert_array_equal(model.errors(drive, values, 2).sums, sums.sums)
+    calls.clear()
+    monkeypatch.setattr("tractexp.model.model.LONGEST", 1.0)
+    model.errors(drive, values, 2)
+    assert calls == [LANES] * 3 + [5]
+
+
 @pytest.mark.parametrize(("integration", "order"), [("classical", 4), ("printed", 1)])
 def test_the_kernel_is_of_the_order_that_its_integration_has(model, integration, order):
     """Eq. (4) as printed goes h/6 ahead in its second and third stage, which leaves one order of the four.

@@ -11,6 +11,7 @@ import uncertainty as study
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
+from tractexp.identification import agreement
 from tractexp.identification.agreement import compare_events
 from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
@@ -284,6 +285,21 @@ def test_each_event_is_credited_and_the_one_that_does_not_belong_is_named(model)
     mixed = compare_events(study.judged(Problem(model, [*good, odd]), study.TYPICAL).uncertainty)
     assert mixed.odd == ["changed"]
     assert "changed does not fit with the rest: deviance higher by" in mixed.notes[0]
+
+
+def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monkeypatch):
+    """Of P before the dips and of Q, however many events there are."""
+    known = study.judged(Problem(model, records((0.3, 0.4, 0.5, 0.6), 0.003)), study.TYPICAL).uncertainty
+    assert known.exact
+    only, sizes = agreement.only, []
+
+    def counted(likelihood, groups):
+        rows = only(likelihood, groups)
+        return lambda unit, lanes: (sizes.append(len(unit) / len(groups)), rows(unit, lanes))[1]
+
+    monkeypatch.setattr(agreement, "only", counted)
+    assert agreement.disagreeing(known) == ([], [])
+    assert max(sizes) == known.likelihood.free + 2
 
 
 def test_a_fit_at_a_bound_says_so(model):

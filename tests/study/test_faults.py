@@ -16,7 +16,7 @@ def test_the_stored_run_lost_nothing():
     stored = json.loads(faults.STORED.read_text())
     assert set(stored) == set(faults.PARTS)
     every = [fault for part in stored.values() for fault in part]
-    assert len(every) >= 50
+    assert len(every) >= 100
     assert [fault for fault in every if fault["lost"]] == []
 
 

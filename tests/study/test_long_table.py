@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.plugin import build
+from tractexp.identification.problem import Problem
+from tractexp.model.model import compose
+from tractexp.plugin import build, get
 from tractexp.provenance import digest
-from tractexp.record import Record, detect
+from tractexp.record import Event, Record, detect
 from tractexp.record.dips import around
 
 
@@ -51,3 +53,18 @@ def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
 def test_shorter_records_are_as_they_are():
     for event in tractexp.read("tibet_50pct"):
         assert around(event) is event
+
+
+def test_the_step_of_a_long_record_is_that_of_its_dip():
+    """A motor that stalled runs away ever faster: an hour of that would ask for the finest step there is."""
+    load = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+    steps = [Problem(load, [swung(length)]).step.substeps.tolist() for length in (20.0, 120.0)]
+    assert steps == [[32], [32]]
+
+
+def swung(length: float) -> Event:
+    """A dip in the middle of a record at 50 Hz."""
+    t = np.arange(round(length * 50)) / 50
+    shape = np.clip(np.minimum(t - length / 2, length / 2 + 0.4 - t) / 0.1, 0, 1)
+    U = 1 - 0.4 * (0.5 - 0.5 * np.cos(np.pi * shape))
+    return detect(Record("swung", t, U, 0.8 * U, 0.6 * U))

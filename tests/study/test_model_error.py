@@ -1,26 +1,35 @@
 """The size of a model's error: known answers, noise and drift told from it, the headline, `result.json` and MLflow."""
 
+import functools
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import uncertainty as study
+from scipy import stats
 
 import tractexp
 from tractexp.identification.model_error import ModelError, in_percent, model_error, noise_variance
 from tractexp.identification.result import Fit
+from tractexp.noise.random_walk import SLOW
 
 
-def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="dip"):
-    """An event of the printed equations, and a model that is off by a share of the response in P and in Q."""
+@functools.cache
+def shaped(depth):
+    """t, U and the power (2, N) of the printed equations in a dip."""
     t, U = study.Shape(depth).voltage()
-    clean = study.printed(study.TYPICAL, t, U, 0.35)
+    return t, U, study.printed(study.TYPICAL, t, U, 0.35)
+
+
+def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="dip", base=1.0):
+    """An event of the printed equations, and a model that is off by a share of the response in P and in Q."""
+    t, U, clean = shaped(depth)
     rng = np.random.default_rng(seed)
     power = clean + noise * rng.standard_normal(clean.shape) + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
-    event = study.event(t, U, power, name)
+    event = study.event(t, U, base * power, name)
     response = clean - clean[:, :1]
-    P, Q = clean[0] + off_P * response[0], clean[1] + off_Q * response[1]
+    P, Q = base * (clean[0] + off_P * response[0]), base * (clean[1] + off_Q * response[1])
     return Fit(event=event, role="train", P=P, Q=Q, epsilon_p=0.0, epsilon_q=0.0)
 
 
@@ -72,6 +81,37 @@ def test_what_is_missing_of_the_record_counts_nowhere_and_what_diverged_counts_w
     gaps = replace(fit, event=replace(fit.event, record=replace(fit.event.record, P=P)))
     assert model_error([gaps]).value == pytest.approx(0.1, rel=1e-3)
     assert model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value == np.inf
+
+
+def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
+    """By hand, over blocks of 0.1 s; Student's t has the freedom of the blocks."""
+    fit = played(-0.1, -0.05, noise=0.01, seed=3)
+    record, start = fit.event.record, fit.event.start
+    S, noise = (record.P + 1j * record.Q)[start:], noise_variance(fit.event)
+    left = np.abs((fit.P + 1j * fit.Q)[start:] - S) ** 2 - noise
+    response = np.abs(S - S_before(fit)) ** 2 - noise
+    block = np.arange(len(S)) // 50
+    squares = [left[block != b].sum() / response[block != b].sum() for b in range(block[-1] + 1)]
+    whole, count = left.sum() / response.sum(), len(squares)
+    reach = stats.t.ppf(0.975, count - 1) * np.sqrt((count - 1) / count * np.sum((squares - whole) ** 2))
+    error = model_error([fit])
+    assert error.square == pytest.approx(whole)
+    assert error.interval == pytest.approx((np.sqrt(max(whole - reach, 0)), np.sqrt(whole + reach)))
+
+
+def test_an_error_depends_on_no_base_and_comes_back_as_it_was_stored():
+    error, small = (model_error([played(-0.1, -0.1, base=base)]) for base in (1.0, 1e-9))
+    assert (small.value, small.of_S) == pytest.approx((error.value, error.of_S), rel=1e-6)
+    back = ModelError.of(error.to_dict())
+    assert back.to_dict() == error.to_dict()
+    assert back.square == pytest.approx(error.square)
+    assert str(ModelError(0.1, (0.0, 0.2), 0.05)) == "10 % of its response (5 % of S)"
+
+
+def test_too_few_samples_before_a_dip_show_no_noise():
+    event = played(noise=4e-3).event
+    shorter = [replace(event, steady=slice(0, n)) for n in (4 * SLOW, 4 * SLOW + 1)]
+    assert noise_variance(shorter[0]) == 0.0 < noise_variance(shorter[1])
 
 
 def test_shares_are_told_to_two_digits():

@@ -1,5 +1,6 @@
-"""CI's oldest versions are the lower bounds that the project declares."""
+"""CI's oldest versions are the lower bounds that the project and its extras declare."""
 
+import itertools
 import re
 import tomllib
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
+EXTRAS = ("posterior", "slurm", "dask", "cmaes", "benchmark")  # what users may add; the others are tools of ours
 
 
 def release(version: str) -> list[int]:
@@ -20,9 +22,12 @@ def release(version: str) -> list[int]:
 def test_what_is_installed_is_each_lower_bound():
     if not (ROOT / ".ci").is_dir():
         pytest.skip("no checkout: .ci is not in the package")
-    lines = (ROOT / ".ci" / "oldest.txt").read_text(encoding="utf-8").splitlines()
+    files = (ROOT / ".ci" / name for name in ("oldest.txt", "oldest-extras.txt"))
+    lines = "".join(file.read_text(encoding="utf-8") for file in files).splitlines()
     pins = {name.lower(): version for name, _, version in (line.partition("==") for line in lines) if version}
-    declared = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["dependencies"]
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = [project["optional-dependencies"][name] for name in EXTRAS]
+    declared = {*project["dependencies"], *itertools.chain(*extras)}
     bounds = dict(re.findall(r"^([\w-]+)>=([\d.]+)", "\n".join(declared), re.MULTILINE))
     assert len(bounds) == len(declared)
     assert {name: release(pins[name]) for name in bounds} == {name: release(bound) for name, bound in bounds.items()}

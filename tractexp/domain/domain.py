@@ -43,6 +43,7 @@ class Domain(ABC):
     # integration
     finest: ClassVar[float]  # pu, largest error of the automatic Runge-Kutta step
     probed: ClassVar[float]  # share of the candidates across the box on which that is judged
+    aftermath: ClassVar[float]  # s after a dip until when: a stalled motor runs away ever faster, for ever finer steps
     stiff: ClassVar[bool]  # whether some candidates of the box diverge at any step, and are refused
     # noise
     quiet_order: ClassVar[int]  # of an autoregression of the few samples before a dip

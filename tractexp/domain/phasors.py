@@ -30,7 +30,7 @@ class PhasorDomain(Domain):
     setting = ""
     compared = "P and Q"
     epsilons = ("epsilon_p", "epsilon_q")
-    finest, probed, stiff = 5e-6, 1.0, False  # noise of records starts near 1e-4
+    finest, probed, aftermath, stiff = 5e-6, 1.0, 10.0, False  # noise of records starts near 1e-4
     quiet_order, noise_from_model = 4, False
     windowed = calibrated = recordable = True
     nearest_gap = False

@@ -35,7 +35,7 @@ class WaveDomain(Domain):
     setting = "domain=waves "
     compared = "the currents"
     epsilons = ("epsilon_p", "epsilon_q", "epsilon_i")
-    finest, probed, stiff = 5e-5, 0.75, True  # noise of sampled currents starts near 1e-3
+    finest, probed, aftermath, stiff = 5e-5, 0.75, float("inf"), True  # noise of sampled currents starts near 1e-3
     quiet_order, noise_from_model = 0, True  # harmonics are no colored noise
     windowed = calibrated = recordable = False
     nearest_gap = True

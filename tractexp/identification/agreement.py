@@ -63,7 +63,8 @@ def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
     while len(left) > 1:
         groups = [left, *([o for o in left if o != e] for e in left), *([e] for e in left)]
-        deviance = descend(only(likelihood, groups), np.tile(uncertainty.unit, (len(groups), 1))).deviance
+        start = np.tile(uncertainty.unit, (len(groups), 1))
+        deviance = descend(only(likelihood, groups), start, apart=likelihood.apart).deviance
         n = len(left)
         excess = deviance[0] - deviance[1 : n + 1] - deviance[n + 1 :]
         worst = int(excess.argmax())

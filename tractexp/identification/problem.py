@@ -260,10 +260,12 @@ class Problem:
             return Step(given, np.full(len(self.events), np.nan))
         probes = self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
         fine, share = self.domain.finest, self.domain.probed
-        chosen, error = self.model.substeps(self.drive, probes, fine, share)
+        ends = [e.record.t[min(e.end, e.record.samples - 1)] - e.record.t[0] for e in self.events]
+        until = [end + self.domain.aftermath for end in ends]
+        chosen, error = self.model.substeps(self.drive, probes, fine, share, until)
         # Stiff circuits of the box may diverge, and are refused; the step of a fit is checked by itself.
         if self.domain.stiff and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
-            chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share)
+            chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share, until)
         if self.model.integration == CLASSICAL and not (error <= fine).all():
             worst = int(np.argmax(error))
             raise UserError(

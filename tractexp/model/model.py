@@ -12,7 +12,7 @@ import numpy as np
 from tractexp.errors import UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel, width
-from tractexp.kernel.layout import EVENT
+from tractexp.kernel.layout import EVENT, INPUTS, LANES
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
@@ -21,6 +21,7 @@ from tractexp.texts import text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
+LONGEST = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
 CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
 
 
@@ -219,21 +220,32 @@ class Model:
         return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
     def substeps(
-        self, drive: Drive, values: np.ndarray, tolerance: float = TOLERANCE, share: float = 1.0
+        self,
+        drive: Drive,
+        values: np.ndarray,
+        tolerance: float = TOLERANCE,
+        share: float = 1.0,
+        until: Sequence[float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by step doubling.
 
         The error is the largest difference of any output between n and 2 n steps over the candidates that have a
-        steady state, or over that `share` of them which leaves least. Both results have shape (E,). Integrated as
-        printed a model takes one step per sample, as the paper does, whatever error that leaves.
+        steady state, or over that `share` of them which leaves least; of each event `until` so many seconds after
+        its first sample, by default all. Both results have shape (E,). Integrated as printed a model takes one step per
+        sample, as the paper does, whatever error that leaves.
         """
         most = MOST_SUBSTEPS if self.integration == CLASSICAL else 1
         chosen, left = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
+        parts = [drive.part(e) for e in range(drive.events)]
+        if until is not None:
+            t = drive.inputs[INPUTS.index("t")]  # from each event's first sample on
+            ends = [p.start + int(np.searchsorted(t[p], end)) for p, end in zip(parts, until, strict=True)]
+            parts = [slice(p.start, end) for p, end in zip(parts, ends, strict=True)]
         coarse = self.simulate(drive, values, chosen)
         while True:
             fine = self.simulate(drive, values, 2 * chosen)
-            for e in range(drive.events):
-                good, part = coarse.miss[e] == 0, drive.part(e)
+            for e, part in enumerate(parts):
+                good = coarse.miss[e] == 0
                 gaps = np.abs(coarse.outputs[:, good, part] - fine.outputs[:, good, part])
                 worst = np.sort(np.nan_to_num(gaps.max(axis=(0, 2), initial=0.0), nan=np.inf))
                 left[e] = worst[: max(1, int(np.ceil(share * len(worst))))].max(initial=0.0)
@@ -304,6 +316,15 @@ class Model:
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
+        lanes = LANES * max(1, int(LONGEST / (LANES * max(np.diff(drive.first) @ steps, 1))))
+        if n > lanes:
+            for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
+                some = np.ascontiguousarray(candidates[..., part])
+                written = np.empty((len(outputs), some.shape[2], drive.samples)) if outputs.size else NOTHING
+                sums[..., part], miss[..., part] = self._run(drive, some, steps, written)
+                if outputs.size:
+                    outputs[:, part] = written
+            return sums, miss
         self.kernel.run(
             candidates,
             drive.event,
