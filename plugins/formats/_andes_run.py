@@ -115,7 +115,4 @@ def response(system, motor, bus):
 
 if __name__ == "__main__":
     andes.config_logger(40)
-    tables, dip, target = sys.argv[1:]
-    np.savez(
-        target, allow_pickle=False, **play(json.loads(Path(tables).read_text()), json.loads(Path(dip).read_text()))
-    )
+    np.savez(sys.argv[1], allow_pickle=False, **play(*json.load(sys.stdin)))

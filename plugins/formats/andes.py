@@ -118,15 +118,14 @@ def respond(python, tables, told):
     import numpy as np
 
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
-        load, played, target = (Path(folder) / name for name in ("load.json", "dip.json", "response.npz"))
-        load.write_text(tables)
-        played.write_text(json.dumps(told))
+        target = Path(folder) / "response.npz"
+        case = json.dumps([json.loads(tables), told])
         program = Path(__file__).with_name("_andes_run.py").read_text(encoding="utf-8")
         try:
             GENERATED.mkdir(exist_ok=True)
             stack.enter_context(held(GENERATED / "tractexp.lock", LONGEST))
-            command = [python, "-c", program, load, played, target]  # by its text: this module has ANDES's own name
-            done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST, cwd=folder)
+            command = [python, "-c", program, target]  # by its text: this module has ANDES's own name
+            done = subprocess.run(command, input=case, capture_output=True, text=True, timeout=LONGEST, cwd=folder)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise UserError(f"not played back in ANDES: {error}") from error
         if done.returncode:

@@ -30,7 +30,7 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 TUTORIALS = ("start.md", "ten-minutes.md")  # followed by tests of their own
 SHOWN = [c for page in PAGES for c in commands.of(page)]
 ALL = SHOWN + [c for page in PAGES for c in commands.inline(page)]
-WORDS = ("ui", "look", "sync", "doctor", "list", "new")  # subcommands
+WORDS = ("ui", "look", "sync", "doctor", "list", "new", "again")  # subcommands
 JOBS = {
     f"{c.page.stem}: {' '.join(c.arguments)}": c.arguments
     for c in ALL
@@ -48,6 +48,7 @@ RUN = {
 TWO = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")  # channels of two loads
 QUICK = ("task=export", "task=simulate", "task=convert", "task=survey")  # tasks that search nothing
 RUN |= {" ".join(a): a for a in JOBS.values() if {*QUICK} & {*a}}
+RUN |= {" ".join(a): a for a in (c.arguments or [] for c in SHOWN) if "again" in a and {*QUICK} & {*a}}
 
 
 @pytest.fixture(scope="module")
@@ -74,6 +75,7 @@ def desk(tmp_path_factory):
     quick = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false", "hydra.run.dir=RUN")
     done = run_command("data=csv", "data.train=[dip1.csv]", *quick, cwd=folder)
     assert done.returncode == 0, done.stderr
+    shutil.copytree(folder / "RUN", folder / "outputs" / "RUN")
     return folder
 
 
@@ -201,6 +203,7 @@ def test_every_command_is_seen_to():
         "pipx",
         "pytest",
         "venv",
+        "build",
         "bash",
         "cd",
         "eval",

@@ -45,7 +45,11 @@ def written(path: Path) -> set[str]:
 
 
 def test_nothing_but_the_one_door_opens_a_file_to_write():
-    sources = [p for folder in ("tractexp", "plugins") for p in sorted((ROOT / folder).rglob("*.py")) if p != DOOR]
+    """But the program that ANDES's own process runs, in a folder that goes with it."""
+    others = {DOOR, ROOT / "plugins" / "formats" / "_andes_run.py"}
+    sources = [
+        p for folder in ("tractexp", "plugins") for p in sorted((ROOT / folder).rglob("*.py")) if p not in others
+    ]
     assert len(sources) > 200
     assert set().union(*map(written, sources)) == set()
     assert len(written(DOOR)) >= 6  # what is looked for is found where it is

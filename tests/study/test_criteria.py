@@ -58,6 +58,19 @@ def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
     return Assessment(gap, SimpleNamespace(criteria=c), (), p_left)
 
 
+def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
+    """273 came out once, where less was left than noise leaves by that much more than there had been."""
+
+    def closed(before, after):
+        curves = (SimpleNamespace(error=SimpleNamespace(square=square)) for square in (before, after))
+        return GapTest(*curves, 1.0, 1.0, 1.0, 10.8, None).closed
+
+    assert closed(4e-4, 1e-4) == pytest.approx(0.75)
+    assert closed(4e-4, -4e-5) == pytest.approx(1.1)
+    assert closed(4e-4, 8e-4) == pytest.approx(-1.0)
+    assert all(np.isnan(closed(before, after)) for before, after in ((1e-6, -2.7e-4), (0.0, 1e-5), (-1e-6, 1e-6)))
+
+
 def deviance(left):
     """What a set leaves of held-out events."""
     return PredictedDeviance(refitted(0.0, 1), left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)

@@ -16,6 +16,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
+from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, extended, overlay
 from tractexp.report.events import WITHIN
 from tractexp.wording import joined
@@ -39,7 +40,9 @@ def unexplained():
 
 def page(found, folder):
     """The words of the page, and what its charts draw."""
-    path = discrepancy.report(found, content(found), "event1, event2").save(folder / "discrepancy.html")
+    path = discrepancy.report(found, content(found), [Identity.at(e.record) for e in found.context.events]).save(
+        folder / "discrepancy.html"
+    )
     return words_of(path), charts(path.read_text(encoding="utf-8"))
 
 

@@ -12,6 +12,7 @@ from tractexp.discrepancy import families, fitting, held_out, survivors
 from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
 from tractexp.discrepancy.fitting import Refit, scattered
@@ -142,6 +143,7 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     rows = np.array([[0.0, 0.0], [2.0, 0.0], [14.0, 0.0]])
     at = SimpleNamespace(
         criteria=Criteria(), catalogue=SimpleNamespace(of_measurement=(), of_load=("chosen", "better", "far")),
+        effort=Effort(),
         coordinates=SimpleNamespace(parameters=lambda names: []), rows=lambda *_: rows,
     )  # fmt: skip
     monkeypatch.setattr(

@@ -100,7 +100,7 @@ def export(
     form.check_parts(identified)
     text = form.text(identified)
     notes = [
-        *map(str, distinct(fit.result.identities)),
+        *filter(None, map(str, distinct(fit.result.identities))),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
         _powers(identified),
         *form.notes(identified),

@@ -54,9 +54,10 @@ class GapTest:
     @property
     def closed(self) -> float:
         """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
-        below 0 where more is left than before, nan where the one before is no larger than its own standard error."""
-        before = self.before.error
-        return 1 - self.after.error.square / before.square if before.stands_out else np.nan
+        below 0 where more is left than before. nan where that falls short of the noise by more than there was before,
+        which was within the error of the noise's level then."""
+        before, after = self.before.error.square, self.after.error.square
+        return 1 - after / before if 0 < before < np.inf and after >= -before else np.nan
 
     @property
     def explained(self) -> float:

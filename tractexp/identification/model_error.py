@@ -41,11 +41,6 @@ class ModelError:
     of_S: float
     square: float = np.nan
 
-    @property
-    def stands_out(self) -> bool:
-        """Whether the square is larger than its own standard error, which is half of the interval's reach."""
-        return (self.interval[1] ** 2 - self.square) / 2 < self.square
-
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
         return {"value": self.value, "interval": list(self.interval), "of_S": self.of_S}
