@@ -20,10 +20,12 @@ from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment, HeldOut, searched_again, weighed
 from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.linearization import tangent
 from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
+from tractexp.model.declaration import Refused
 from tractexp.plugin import discover, get
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
@@ -50,6 +52,33 @@ def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
 def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
     monkeypatch.setattr(families, "wide_refits", lambda *_: pytest.fail("a member was fitted"))
     assert found(None, 1.0, 3, TRIPS).verdict.word == "none"
+
+
+class Narrow(Family):
+    """A family in which effects `b` and `m` do not go together."""
+
+    def with_effects(self, names, pushed=False):
+        names = {*names}
+        clashes = lambda more: {"b", "m"} <= {*names, *more}  # noqa: E731
+
+        def compiled():
+            if clashes(()):
+                raise Refused("m", "the model has a state 'x' already")
+
+        def acceptance(name):
+            return SimpleNamespace(refusal="the model has a state 'x' already" if clashes([name]) else None)
+
+        return SimpleNamespace(names=names, pushed=pushed, compile=compiled, acceptance=acceptance)
+
+
+def test_what_a_member_does_not_take_beside_it_is_not_tested_there():
+    some = type("", (dict,), {"of_load": ("a", "b", "c"), "of_measurement": ()})
+    here = Narrow(None, some({n: SimpleNamespace(effect=n) for n in "abcm"}))
+    for names, tested in (((), "abc"), (("a", "b"), "abc"), (("m",), "acm")):
+        model = here.of(here.key(names, tested=True))
+        assert (model.names, model.pushed) == ({*tested}, True)
+    fitted = here.of(here.key(("m", "a")))
+    assert (fitted.names, fitted.pushed) == ({"m", "a"}, False)
 
 
 def fit(deviance, parameters, *names):
