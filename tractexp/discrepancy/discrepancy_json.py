@@ -4,8 +4,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from tractexp import files, quoting
 from tractexp.discrepancy import recommended
 from tractexp.discrepancy.forms import by_name, forms
@@ -89,7 +87,7 @@ def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
 
 
 def _gap(gap: GapTest) -> dict[str, Any]:
-    return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": _number(gap.closed)}
+    return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": files.plain(gap.closed)}
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
@@ -104,10 +102,10 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     gaps = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
-        "explained": _number(near.fitted),
-        "explained_held_out": _number(near.held_out),
+        "explained": files.plain(near.fitted),
+        "explained_held_out": files.plain(near.held_out),
         **({"gap": gaps} if gaps else {}),
-        "others": [{"effects": list(names), "explained": _number(share)} for names, share in near.others],
+        "others": [{"effects": list(names), "explained": files.plain(share)} for names, share in near.others],
         "parameters": {name: _estimate(by_name[name]) for name in own},
     }
 
@@ -123,7 +121,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     gap = investigation.validate or investigation.train
     return {
         "model_error": _error(nearest or gap.after.error),
-        "share": _number(1 - gap.closed) if investigation.names else None,
+        "share": files.plain(1 - gap.closed) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
@@ -136,16 +134,15 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
 def contributions(investigation: Findings) -> list[dict[str, Any]]:
     """The model's error with the names added one at a time, the one that helps most first; on held-out events."""
     steps = investigation.contributions
-    return [{"effects": list(names), "model_error": _number(error)} for names, error in steps]
+    return [{"effects": list(names), "model_error": files.plain(error)} for names, error in steps]
 
 
 def _error(error: ModelError) -> dict[str, Any]:
-    return {"value": _number(error.value), "interval": [_number(end) for end in error.interval]}
+    return files.plain({"value": error.value, "interval": error.interval})
 
 
 def _estimate(estimate: ParameterEstimate) -> dict[str, Any]:
-    interval = [_number(end) for end in estimate.interval]
-    return {"value": estimate.value, "standard_error": _number(estimate.error), "interval": interval}
+    return files.plain({"value": estimate.value, "standard_error": estimate.error, "interval": estimate.interval})
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
@@ -183,7 +180,7 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
         status = "rejected" if rival.rejected else "adequate" if rival.adequate else "not adequate"
         labels = [p.name for n in names for p in investigation.catalogue[n].effect.parameters]
         values = {n: {"value": at.value(n, rival.fit.unit), "standard_error": None} for n in labels}
-        ratio = _number(rival.lowered)
+        ratio = files.plain(rival.lowered)
         rows.append({"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values})
     return rows
 
@@ -196,19 +193,14 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
         if j.score is not None:
             null = {p.name: p.absent for p in investigation.catalogue[j.name].sizes}
             values = {
-                n: {"value": null[n] + size, "standard_error": _number(j.score.deviation[n])}
+                n: {"value": null[n] + size, "standard_error": files.plain(j.score.deviation[n])}
                 for n, size in j.score.size.items()
             }
-        ratio = None if j.score is None else _number(j.score.drop)
+        ratio = None if j.score is None else files.plain(j.score.drop)
         rows.append(
             {"effects": [j.name], "status": j.status, "why": j.why, "likelihood_ratio": ratio, "parameters": values}
         )
     return rows
-
-
-def _number(value: float) -> float | None:
-    """JSON knows no nan and no infinity."""
-    return float(value) if np.isfinite(value) else None
 
 
 def use_of(domain: str, conf: str) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.identification.descent import Rows, descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
@@ -24,9 +25,7 @@ class EventAgreement:
 
     def fields(self) -> dict[str, Any]:
         """What `result.json` gains; None where a parameter is not identifiable without the event."""
-        finite = lambda ratio: ratio if np.isfinite(ratio) else None  # noqa: E731
-        gains = {event: {name: finite(ratio) for name, ratio in gain.items()} for event, gain in self.gains.items()}
-        return {"gains": gains, "odd_events": self.odd}
+        return {"gains": files.plain(self.gains), "odd_events": self.odd}
 
 
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:

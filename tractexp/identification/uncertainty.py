@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.identification.blocks import LEVEL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
@@ -127,11 +128,10 @@ class Uncertainty:
 
     def fields(self) -> dict[str, Any]:
         """What `result.json` gains; numbers that do not exist are None."""
-        number = lambda x: float(x) if np.isfinite(x) else None  # noqa: E731
         errors = self.information.standard_errors
         pairs = zip(self.names, self.intervals.tolist(), strict=True)
         return {
-            "standard_errors": {n: number(e) for n, e in zip(self.names, errors, strict=True)},
+            "standard_errors": files.plain(dict(zip(self.names, errors, strict=True))),
             "intervals": dict(pairs),
             "verdicts": {name: str(verdict) for name, verdict in self.verdicts.items()},
             "uncertainty": {

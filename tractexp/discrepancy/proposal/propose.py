@@ -2,9 +2,11 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.fitting import Refit
@@ -190,7 +192,7 @@ def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
             _named(proposal.term)
             | {
                 "function_of_voltage": not proposal.term.exogenous,
-                "parameters": {k.name: _number(k) for k in proposal.estimates},
+                "parameters": {k.name: _estimate(k) for k in proposal.estimates},
             }
         ],
         "closed": {"train": proposal.train.closed, "validate": proposal.validate.closed},
@@ -210,10 +212,5 @@ def _named(term: Term) -> dict[str, object]:
     return {**names, "words": term.words, "latex": term.latex}
 
 
-def _number(estimates: TermEstimate) -> dict[str, object]:
-    interval = [_finite(end) for end in estimates.interval]
-    return {"value": estimates.value, "standard_error": _finite(estimates.error), "interval": interval}
-
-
-def _finite(value: float) -> float | None:
-    return float(value) if np.isfinite(value) else None
+def _estimate(estimate: TermEstimate) -> dict[str, Any]:
+    return files.plain({"value": estimate.value, "standard_error": estimate.error, "interval": estimate.interval})
