@@ -75,9 +75,9 @@ def _combined(path: Path, encoding: str | None) -> Recording:
 
 def _sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
-    content = files.read(path)
     sections: dict[str, ByteRange] = {}
-    at = 0
+    content: Any = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.empty(0, np.uint8)
+    counted, line, at = 0, 1, 0
     while (match := _SECTION.search(content, at)) is not None:
         name, length = match[1].decode().upper(), match[3]
         begin = match.end()
@@ -86,8 +86,9 @@ def _sections(path: Path) -> dict[str, ByteRange]:
         else:
             following = _SECTION.search(content, begin)
             stop = following.start() if following else len(content)
-        sections[name] = ByteRange(path, begin, stop, content.count(b"\n", 0, begin) + 1)
-        at = stop
+        line += int(np.count_nonzero(content[counted:begin] == ord("\n")))
+        sections[name] = ByteRange(path, begin, stop, line)
+        counted, at = begin, stop
     return sections
 
 

@@ -17,7 +17,7 @@ from tractexp.filetypes.comtrade_header import VALUE, Header
 from tractexp.filetypes.remarks import Remarks
 
 LACKING = 0.01  # of the announced samples: so many may be missing at the end, with a note
-LARGE = 256 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
+LARGE = 64 * 2**20  # bytes: a larger binary file stays on the disk and is mapped
 BLOCK = 8 * 2**20  # bytes of text parsed at once
 HUGE = 1e38  # of a value: FLOAT32 holds no greater
 NONE = 0xFFFFFFFF  # a missing time stamp
@@ -112,7 +112,7 @@ def _enough(
 
 def _counted(place: ByteRange, header: Header, numbers: np.ndarray) -> None:
     """Sample numbers that do not count up show that the rows are not where the header puts them."""
-    steps = np.diff(numbers.astype(np.int64))
+    steps = np.diff(numbers).view(np.int32)  # a counter that runs over goes on by one, too
     if not len(steps):
         return
     usual = int(np.median(steps))

@@ -212,13 +212,16 @@ def measure(
     window: Callable[[float, float], Averager] = one_cycle,
     harmonics: Sequence[int] = (),
     block: int = BLOCK,
+    tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
     """Phasors of `waves` (2 K, N) sampled at `rate` [Hz] from `start` [s], measured `block` samples at a time, about.
 
     One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
     than the time stamp each channel is sampled. `window(rate, nominal)` is what the estimator averages over. With
     `harmonics`, `more` has their powers P_3, ..., that of all but the fundamental, P_H [MW], and the total distortions
-    THD_u and THD_i. N must span two cycles, and the window, at least; raises `UserError` otherwise.
+    THD_u and THD_i. `tracked` has the frequencies that were tracked in the blocks of the same voltages before, by their
+    first sample, and gets those that are tracked here: loads of one bus share it. N must span two cycles, and the
+    window, at least; raises `UserError` otherwise.
     """
     n, K, over, every = waves.shape[-1], waves.shape[0] // 2, window(rate, nominal), max(1, round(step * rate))
     needed = max(2 * rate / (SLOWEST * nominal) + 4, 2 * (over.reach + every) + 1)
@@ -227,11 +230,12 @@ def measure(
             f"{n} samples at {rate:g} Hz are too short: phasors need {1000 * needed / rate:.0f} ms, over two cycles of "
             f"{nominal:g} Hz and more than their window"
         )
+    tracked = {} if tracked is None else tracked
     least = DEAD * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
     at, angle, pieces, distortions = np.arange(over.reach, n - over.reach, every), 0.0, [], []
     for (first, stop), (a, b) in _overlapping(n, rate, nominal, over.reach, block):
         x = waves[:, first:stop]
-        f = track(x[:K], rate, nominal, least=least)
+        f = tracked[a] = tracked[a] if a in tracked else track(x[:K], rate, nominal, least=least)
         here = at[(at >= a) & (at < b)] - first
         turned = frame(f, rate)
         X = fundamental(x, rate, f, here, over.means, (1, *harmonics))

@@ -18,6 +18,7 @@ LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered i
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
 DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
 SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
+TOGETHER = 1024  # half cycles that are compared with their reference at once
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
 LONGEST = 60.0  # s: what lasts longer is a new level
 ABRUPT = 3.0  # cycles within which a fault or a switch changes the voltage
@@ -53,12 +54,10 @@ def excursions(trace: Trace) -> list[Excursion]:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
         events.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
     reference = _reference(levels, k, count)
-    share = 1 - np.exp(-trace.step / SLIDING)
     while k < len(trace.t):
-        off = levels[:, k] / reference - 1
-        if (np.abs(off) <= limits).all():
-            reference = reference + share * (levels[:, k] - reference)
-            k += 1
+        inside, reference = _inside(levels[:, k : k + TOGETHER], limits, reference, trace.step)
+        if inside:
+            k += inside
             continue
         event = _one(trace, levels, limits, reference, k, events[-1].end if events else 0)
         events.append(event)
@@ -68,6 +67,16 @@ def excursions(trace: Trace) -> list[Excursion]:
         if event.returned:
             k, reference = _after(trace, levels, limits, reference, k, count)
     return events
+
+
+def _inside(levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, step: float) -> tuple[int, np.ndarray]:
+    """How many samples of the levels (K, M) stay within the limits of the reference, which slides, and its end."""
+    decay = np.exp(-step / SLIDING * np.arange(levels.shape[1] + 1))
+    reached = np.cumsum(levels / decay[1:], axis=1) * (1 - decay[1])
+    references = decay * (reference[:, None] + np.concatenate([np.zeros((len(levels), 1)), reached], axis=1))
+    inside = (np.abs(levels / references[:, :-1] - 1) <= limits[:, None]).all(axis=0)
+    count = len(inside) if inside.all() else int(np.argmin(inside))
+    return count, references[:, count]
 
 
 def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:

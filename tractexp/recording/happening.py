@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.record.change import SMALL, Change, load_changes, runs
 from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, STEADY
 from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
-from tractexp.record.phasor import Phasors
+from tractexp.record.phasor import Phasors, WaveSource
 from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
@@ -54,7 +54,7 @@ class Happening:
     why: str  # what makes it (not) worth fitting, one sentence
 
 
-def happenings(waves: np.ndarray, rate: float, start: float, nominal: float, phasors: Phasors) -> list[Happening]:
+def happenings(waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors) -> list[Happening]:
     """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from `start` [s] on.
 
     `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency.

@@ -24,23 +24,35 @@ class FeederWaves:
     recording: Recording
     feeder: Feeder
     segment: Segment
-    matrices: tuple[np.ndarray, np.ndarray]  # (K, channels) of voltages and of currents
+    sums: np.ndarray  # (2 K, channels) the weights with which the feeder's channels make up each
 
     @classmethod
     def of(cls, recording: Recording, feeder: Feeder, segment: Segment) -> "FeederWaves":
         connection = chosen("connection", feeder.connection)
-        reverse = -1.0 if feeder.reverse_current else 1.0
-        return cls(recording, feeder, segment, (connection.voltage(), reverse * connection.current()))
+        V, I = connection.voltage(), (-1.0 if feeder.reverse_current else 1.0) * connection.current()
+        sums = np.zeros((len(V) + len(I), V.shape[1] + I.shape[1]))
+        sums[: len(V), : V.shape[1]], sums[len(V) :, V.shape[1] :] = V, I
+        return cls(recording, feeder, segment, sums)
+
+    @property
+    def numbers(self) -> tuple[int, ...]:
+        """The feeder's channels, voltages first."""
+        return (*self.feeder.voltages, *self.feeder.currents)
 
     @property
     def shape(self) -> tuple[int, int]:
-        return sum(len(m) for m in self.matrices), self.segment.stop - self.segment.first
+        return len(self.sums), self.segment.stop - self.segment.first
 
     def __getitem__(self, at: tuple[slice, slice]) -> np.ndarray:
-        rows, (first, stop, _) = at[0], at[1].indices(self.shape[1])
+        sums, (first, stop, _) = self.sums[at[0]], at[1].indices(self.shape[1])
         part = replace(self.segment, first=self.segment.first + first, stop=self.segment.first + stop)
-        sides = zip(self.matrices, (self.feeder.voltages, self.feeder.currents), strict=True)
-        return np.concatenate([m @ self.recording.matrix(numbers, part) for m, numbers in sides])[rows]
+        waves = np.zeros((len(sums), stop - first))
+        for number, weights in zip(self.numbers, sums.T, strict=True):
+            if weights.any():
+                (values,) = self.recording.matrix([number], part)
+                for k in np.flatnonzero(weights):
+                    waves[k] += weights[k] * values
+        return waves
 
     @property
     def late(self) -> np.ndarray:
@@ -48,17 +60,15 @@ class FeederWaves:
 
         Raises `UserError` where one combines channels that differ in it.
         """
-        delays = []
-        for matrix, numbers in zip(self.matrices, (self.feeder.voltages, self.feeder.currents), strict=True):
-            skew = np.array([self.recording.channels[i].skew for i in numbers])
-            for row in matrix:
-                if np.ptp(skew[row != 0]) > 1e-9:
-                    names = ", ".join(self.recording.channels[i].name for i in np.array(numbers)[row != 0])
-                    raise UserError(
-                        f"data.skew=true: the channels {names} are sampled at different times, and the connection "
-                        "needs them at once; leave data.skew out"
-                    )
-                delays.append(skew[row != 0][0])
+        delays, skew = [], np.array([self.recording.channels[i].skew for i in self.numbers])
+        for used in self.sums != 0:
+            if np.ptp(skew[used]) > 1e-9:
+                names = ", ".join(self.recording.channels[i].name for i in np.array(self.numbers)[used])
+                raise UserError(
+                    f"data.skew=true: the channels {names} are sampled at different times, and the connection "
+                    "needs them at once; leave data.skew out"
+                )
+            delays.append(skew[used][0])
         return np.array(delays)
 
 
@@ -74,11 +84,13 @@ def phasors_of(
     estimator: Any = None,
     skew: bool = False,
     harmonics: Sequence[int] = (),
+    tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
     """The phasors of a feeder within one segment, by an estimator: its name, or name and settings; None: the usual one.
 
-    `skew` corrects what the file says of late channels; `harmonics` are measured besides the fundamental. Raises
-    `UserError` for a segment that is too short, and for harmonics the sampling cannot show.
+    `skew` corrects what the file says of late channels; `harmonics` are measured besides the fundamental; `tracked` is
+    what the loads of a bus share (`measure`). Raises `UserError` for a segment that is too short, and for harmonics
+    the sampling cannot show.
     """
     for h in harmonics:
         if h < 2 or h * 1.1 * recording.frequency >= segment.rate / 2:
@@ -88,7 +100,7 @@ def phasors_of(
     try:
         return measure(
             waves, segment.rate, recording.frequency, segment.start, skew=waves.late if skew else None,
-            window=estimator_of(estimator).averager, harmonics=harmonics,
+            window=estimator_of(estimator).averager, harmonics=harmonics, tracked=tracked,
         )  # fmt: skip
     except UserError as error:
         raise UserError(f"{recording.source}: segment from {segment.start:.3f} s: {error}") from error

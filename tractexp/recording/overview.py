@@ -15,14 +15,28 @@ from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, propose
 from tractexp.recording.happening import OF_LOADS, Happening, happenings, happenings_of
-from tractexp.recording.measure import phasors_of, waves_of
-from tractexp.recording.quality import Quality, quality
+from tractexp.recording.measure import FeederWaves, phasors_of
+from tractexp.recording.quality import Quality, quality, stamped
 from tractexp.recording.reader import WaveformReader
-from tractexp.recording.recording import Recording
+from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.unit import check_doubt, in_doubt
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
+
+
+@dataclass(frozen=True)
+class _Bus:
+    """What the loads of one bus have in common, by segment: tracked frequencies, phasors of the voltages."""
+
+    tracked: dict[Segment, dict[int, np.ndarray]] = field(default_factory=dict)
+    phasors: dict[Segment, Phasors] = field(default_factory=dict)
+
+    def measure(self, recording: Recording, feeder: Feeder, segment: Segment) -> Phasors:
+        """The phasors of a load."""
+        measured = phasors_of(recording, feeder, segment, tracked=self.tracked.setdefault(segment, {}))
+        first = self.phasors.setdefault(segment, measured)
+        return replace(measured, t=first.t, V=first.V, f=first.f)
 
 
 @dataclass(frozen=True)
@@ -110,7 +124,8 @@ class View:
         if recording is None:
             return []
         segment = max(recording.segments, key=lambda s: s.rate)
-        return [quality(recording, number, segment) for number in range(len(recording.channels))]
+        stamps = stamped(recording, segment)
+        return [quality(recording, number, segment, stamps) for number in range(len(recording.channels))]
 
     @functools.cached_property
     def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
@@ -169,7 +184,7 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
     feeders = propose(recording)
     loaded = any(feeder.loaded for feeder in feeders)
-    sights = []
+    sights, buses = [], dict[str, _Bus]()
     for feeder in feeders:
         said = ()
         try:
@@ -178,16 +193,21 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
                 feeder = arranged(recording, feeder)
         except UserError as error:
             said = (str(error),)
-        shown = sight(reader, recording, feeder, events=feeder.loaded or not loaded)
+        bus = buses.setdefault(str((feeder.voltages, feeder.connection)), _Bus())
+        shown = sight(reader, recording, feeder, feeder.loaded or not loaded, bus)
         sights.append(replace(shown, said=(*said, *shown.said)))
     return sights
 
 
-def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True) -> Sight:
+def sight(
+    reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True, bus: _Bus | None = None
+) -> Sight:
     """The view of one load of a recording. What cannot be analysed is noted in `said`, and raises nothing.
 
-    Without `events` no event is sought: beside loaded feeders, an unloaded one shows noise only.
+    Without `events` no event is sought: beside loaded feeders, an unloaded one shows noise only. What loads of
+    the same `bus` share is measured once.
     """
+    bus = bus or _Bus()
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
@@ -198,13 +218,13 @@ def sight(reader: WaveformReader, recording: Recording, feeder: Feeder, events: 
         return replace(blank, said=(*said, str(error)))
     for segment in segments:
         try:
-            measured = phasors_of(recording, feeder, segment)
-            waves = waves_of(recording, feeder, segment)
+            measured = bus.measure(recording, feeder, segment)
         except UserError as error:
             said.append(str(error))
             continue
         phasors.append(measured)
         if events:
+            waves = FeederWaves.of(recording, feeder, segment)
             changes += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
     dips, refused = [], ""
     try:

@@ -16,6 +16,9 @@ WHITE = 3.0  # standard errors that the lag-1 correlation of white noise stays w
 GAP = 1.5  # steps: time stamps farther apart leave a gap
 HARMONICS = 25  # as many as the rate allows are taken away to see the noise
 QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated, if so many are calm
+LONGEST_CALM = 60.0  # s of it in which they are sought
+SORTED = 1 << 20  # samples among which the least difference of two is sought
+TOGETHER = 1024  # cycles that are compared at once
 FEWEST_CALM = 2  # cycles in a row that repeat: one alone is no calm
 REPEATS = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
 LEVEL = 0.05  # by which their RMS differs at most
@@ -42,14 +45,14 @@ class Quality:
     fit: str  # what it is fit for, one sentence
 
 
-def quality(recording: Recording, number: int, segment: Segment) -> Quality:
-    """The quality of channel `number` in one segment of a recording."""
+def quality(recording: Recording, number: int, segment: Segment, stamps: tuple[float, int] | None = None) -> Quality:
+    """The quality of channel `number` in one segment of a recording, whose time stamps are as `stamped` says."""
+    jitter, holes = stamps or stamped(recording, segment)
     channel = recording.channels[number]
     x = channel.values(segment.first, segment.stop)
     valid = np.isfinite(x)
-    jitter, holes = _stamps(recording, segment)
     gaps = int(np.count_nonzero(~valid)) + holes
-    step, span = _step(channel, x[valid])
+    step, span = _step(channel, x if valid.all() else x[valid])
     f = _frequency(recording, number, segment)
     clipped = _clipped(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE))
@@ -60,21 +63,23 @@ def quality(recording: Recording, number: int, segment: Segment) -> Quality:
     )  # fmt: skip
 
 
-def _stamps(recording: Recording, segment: Segment) -> tuple[float, int]:
+def stamped(recording: Recording, segment: Segment) -> tuple[float, int]:
     """(jitter in steps, holes) of the time stamps of a segment; (nan, 0) where the file has none."""
     stamps = recording.extra.get("stamps")
     if stamps is None or len(stamps) < segment.stop or segment.stop - segment.first < 3:
         return float("nan"), 0
-    t = np.asarray(stamps[segment.first : segment.stop], dtype=float)
+    t = np.array(stamps[segment.first : segment.stop], dtype=float)
     steps = np.diff(t)
     usual = float(np.median(steps))
     if not usual > 0:
         return float("nan"), 0
     holes = steps > GAP * usual
-    course = t - np.concatenate([[0.0], np.cumsum(np.where(holes, steps - usual, 0.0))])
-    k = np.arange(len(t))
-    line = np.polynomial.Polynomial.fit(k, course, 1)
-    return float(np.abs(course - line(k)).max() / usual), int(np.count_nonzero(holes))
+    t -= t[0]
+    if holes.any():
+        t[1:] -= np.cumsum(np.where(holes, steps - usual, 0.0))
+    k = np.arange(len(t)) - (len(t) - 1) / 2
+    t -= t.mean() + k * (k @ t / (k @ k))  # about the line of least squares
+    return float(np.abs(t).max() / usual), int(np.count_nonzero(holes))
 
 
 def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
@@ -84,7 +89,7 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     span = float(np.ptp(x))
     if channel.raw.dtype.kind in "iu":
         return abs(channel.gain * channel.ratio * channel.factor), span
-    steps = np.diff(np.unique(x))
+    steps = np.diff(np.unique(x[:SORTED]))
     steps = steps[steps > 1e-9 * max(span, 1e-300)]
     return (float(steps.min()) if len(steps) else 0.0), span
 
@@ -93,14 +98,13 @@ def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: 
     """Share of samples in runs at a limit: the converter's where the file says it, else the extreme values."""
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
-    raw = np.asarray(channel.raw[segment.first : segment.stop], dtype=float)
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
     near = FLAT_TOP * (high - low)
     if near == 0:
         return 0.0
     at = (x >= high - near) | (x <= low + near)
     if channel.limits is not None:
-        least, most = channel.limits
+        (least, most), raw = channel.limits, channel.raw[segment.first : segment.stop]
         at |= (raw <= least) | (raw >= most)
     flat = runs(at, max(CLIPPED, _blunt(x, segment.rate / f, near + step)))
     return sum(run.stop - run.start for run in flat) / len(x)
@@ -133,7 +137,7 @@ def _quiet(
     if f is None or rate < 2.5 * f:
         rest = x[valid]
         return (float(rest.mean()) if len(rest) else none), none, none, none, 0, none
-    x = x[_calm(x, round(rate / f), at_work)]
+    x = x[_calm(x, round(rate / f), at_work)][: round(LONGEST_CALM * rate)]
     n = min(round(QUIET_CYCLES * rate / f), len(x))
     if n < 2 * round(rate / f):
         return none, none, none, none, 0, none
@@ -160,10 +164,10 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
     What comes after a fault or a trip is another state, however quiet, and a fault is quiet for its size.
     """
     blocks = x[: len(x) // cycle * cycle].reshape(-1, cycle)
-    energy, whole = blocks.var(axis=1), slice(0, len(x))
-    both = energy[1:] + energy[:-1]
+    energy, changed = _variances(blocks)
+    both, whole = energy[1:] + energy[:-1], slice(0, len(x))
     with np.errstate(invalid="ignore", divide="ignore"):
-        alike = np.diff(blocks, axis=0).var(axis=1) / both < REPEATS
+        alike = changed / both < REPEATS
         alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LEVEL
     spans = [(run.start, run.stop) for run in runs(alike, FEWEST_CALM - 1)]
     size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in spans]
@@ -172,6 +176,14 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
             first, last = a + (a > 0), b + (b == len(alike))  # an edge may hold a part of what comes before or after
             return slice(first * cycle, len(x) if b == len(alike) else max(last, first + 2) * cycle)
     return whole
+
+
+def _variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Variances of cycles (M, n), (M,), and of what each differs by from the one before, (M - 1,); some at a time."""
+    parts = [cycles[max(first - 1, 0) : first + TOGETHER] for first in range(0, len(cycles), TOGETHER)]
+    own = [part[min(k, 1) :].var(axis=1) for k, part in enumerate(parts)]
+    changed = [np.diff(part, axis=0).var(axis=1) for part in parts]
+    return np.concatenate([np.empty(0), *own]), np.concatenate([np.empty(0), *changed])
 
 
 def _quietest(x: np.ndarray, n: int, cycle: int) -> int:

@@ -61,6 +61,13 @@ class Segment:
         """Times of the samples (M,) [s]."""
         return self.start + np.arange(self.stop - self.first) / self.rate
 
+    def between(self, start: float, end: float) -> "Segment":
+        """The part of it from time `start` up to `end` [s]."""
+        first, stop = (
+            min(max(int(np.ceil((t - self.start) * self.rate - 1e-6)), 0), self.stop - self.first) for t in (start, end)
+        )
+        return Segment(self.first + first, self.first + stop, self.rate, self.start + first / self.rate)
+
 
 @dataclass(frozen=True, eq=False)
 class Channel:
@@ -93,7 +100,9 @@ class Channel:
         """Values (M,) in `unit`, on the side that was recorded; nan where missing."""
         raw = self.raw[first:stop]
         with np.errstate(invalid="ignore"):  # a damaged float may be a signalling nan
-            values = np.asarray(raw, dtype=np.float64) * self.gain + self.offset
+            values = raw.astype(np.float64)
+        values *= self.gain
+        values += self.offset
         if self.missing is not None:
             values[raw == self.missing] = np.nan
         return values

@@ -1,11 +1,12 @@
 """A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers, second harmonic."""
 
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.phasor import Phasors, frame
+from tractexp.record.phasor import BLOCK, Phasors, WaveSource, frame
 from tractexp.record.record import Record
 
 
@@ -40,49 +41,73 @@ class Trace:
         return float(360 * np.trapezoid(np.nan_to_num(extra), self.t[first : stop + 1]))
 
 
-def of_waves(waves: np.ndarray, rate: float, start: float, nominal: float, phasors: Phasors) -> Trace:
-    """The trace of waveforms (2 K, N), voltages first; `phasors` are those measured from them."""
-    K, n = len(waves) // 2, waves.shape[-1]
+def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors) -> Trace:
+    """The trace of waveforms (2 K, N), voltages first, read a block at a time; `phasors` are those measured of them."""
+    K, n = waves.shape[0] // 2, waves.shape[-1]
     first, last = phasors.t[0], phasors.t[-1]
     t = np.arange(first, last + 1e-9, 0.5 / nominal)
     f = _tracked(phasors, nominal)
     width = rate / np.interp(t, phasors.t, f)  # samples in a window
     center = (t - start) * rate + 0.5  # sample k lies between k and k + 1
-    mean = functools.partial(_means, low=np.clip(center - width / 2, 0, n), high=np.clip(center + width / 2, 0, n))
-    at_samples = np.interp(start + np.arange(n) / rate, phasors.t, f)
-    turn = np.exp(-1j * frame(at_samples, rate))
-    currents = waves[K:]
-    content = np.sqrt(np.maximum(mean(currents**2) - mean(currents) ** 2, 0))
+    low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
+    pieces: list[tuple[np.ndarray, np.ndarray]] = []
+    for windows, (a, b) in _blocks(low, high):
+        x, mean = waves[:, a:b], functools.partial(_means, low=low[windows] - a, high=high[windows] - a)
+        turn = np.exp(-1j * frame(np.interp(start + np.arange(a, b) / rate, phasors.t, f), rate))
+        pieces.append(
+            (mean(np.concatenate([x**2, x[K:]])), np.abs(mean(np.concatenate([x[K:] * turn, x[K:] * turn**2]))))
+        )
+    means, turned = (np.concatenate([piece[k] for piece in pieces], axis=1) for k in (0, 1))
+    squares, offset = means[: 2 * K], means[2 * K :]
     return Trace(
         t,
         np.interp(t, phasors.t, np.abs(phasors.V1)),
-        np.sqrt(mean(waves[:K] ** 2)),
+        np.sqrt(squares[:K]),
         np.interp(t, phasors.t, np.abs(phasors.V2)) if K == 3 else np.full(len(t), np.nan),
         np.interp(t, phasors.t, phasors.S.real),
         np.interp(t, phasors.t, phasors.S.imag),
         _turning(t, phasors.t, phasors.f),
-        np.sqrt(2) * np.abs(mean(currents * turn)),
-        np.sqrt(2) * np.abs(mean(currents * turn**2)),
-        content,
+        np.sqrt(2) * turned[:K],
+        np.sqrt(2) * turned[K:],
+        np.sqrt(np.maximum(squares[K:] - offset**2, 0)),
         1 / nominal,
     )
 
 
-def half_cycle_rms(waves: np.ndarray, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+def half_cycle_rms(waves: WaveSource, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
     """RMS over one cycle, taken anew each half cycle (IEC 61000-4-30, U_rms(1/2)) of waves (K, N).
 
     Returns the times of the windows' centers (M,) [s] from the first sample on and the values (K, M).
     """
     cycle = rate / frequency  # samples, not whole
     low = np.arange(0.0, waves.shape[-1] - cycle + 1e-9, cycle / 2)
-    return (low + (cycle - 1) / 2) / rate, np.sqrt(np.maximum(_means(waves**2, low, low + cycle), 0.0))
+    squares = [
+        _means(waves[:, a:b] ** 2, low[windows] - a, low[windows] + cycle - a)
+        for windows, (a, b) in _blocks(low, low + cycle)
+    ]
+    return (low + (cycle - 1) / 2) / rate, np.sqrt(np.maximum(np.concatenate(squares, axis=1), 0.0))
+
+
+def _blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[int, int]]]:
+    """Windows from `low` to `high` (M,), about as many at a time as lie in a block, and the samples that they need."""
+    first = 0
+    while first < len(low):
+        windows = slice(first, max(int(np.searchsorted(low, low[first] + BLOCK)), first + 1))
+        yield windows, (int(low[windows].min()), int(np.ceil(high[windows].max())))
+        first = windows.stop
 
 
 def _means(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Means (K, M) of x (K, N) from `low` to `high` (M,), sample k lying between k and k + 1."""
     total = np.concatenate([np.zeros((len(x), 1), x.dtype), np.cumsum(x, axis=1)], axis=1)
-    at = np.arange(x.shape[-1] + 1)
-    return np.array([np.interp(high, at, row) - np.interp(low, at, row) for row in total]) / (high - low)
+    return (_between(total, high) - _between(total, low)) / (high - low)
+
+
+def _between(values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Values (K, N) at fractions of samples `at` (M,), by straight lines."""
+    k = np.minimum(at.astype(int), values.shape[1] - 2)
+    left = values.take(k, axis=1)
+    return left + (at - k) * (values.take(k + 1, axis=1) - left)
 
 
 def of_record(record: Record) -> Trace:

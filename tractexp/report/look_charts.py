@@ -1,5 +1,7 @@
 """The charts of a look: each load with what happened to it, zoomable, and the channels of no load."""
 
+import functools
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, MEASURED, PALETTE, REACTIVE, VOLTAGE
 from tractexp.blocks.style import PHASES as COLORS
+from tractexp.record.phasor import BLOCK
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import FeederWaves
 from tractexp.recording.overview import Sight, View
@@ -74,9 +77,8 @@ def unassigned(page: Report, view: View) -> None:
     for panel, group in enumerate(panels.values()):
         for k, channel in enumerate(group):
             for segment in (s for s in recording.segments if s.stop > s.first + 1):
-                y = channel.values(segment.first, segment.stop)
-                y, step = (y, 1) if every == 1 else (envelope(y, every), every)
-                chart.samples(channel.name, segment.start, step / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
+                y = _thinned(functools.partial(_read, channel, segment), segment.stop - segment.first, every)
+                chart.samples(channel.name, segment.start, every / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
     with page.folded(f"The {counted(count, 'channel')} of no load"):
         page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
 
@@ -172,17 +174,16 @@ def _waves(
 ) -> None:
     """The waveforms of a segment and their RMS."""
     assert shown.feeder is not None
-    whole = FeederWaves.of(recording, shown.feeder, segment)
-    first, stop = (0, whole.shape[1]) if span is None else map(int, np.searchsorted(segment.t, span))
-    waves, start = whole[:, first:stop], segment.start + first / segment.rate
+    waves = FeederWaves.of(recording, shown.feeder, segment if span is None else segment.between(*span))
+    rate, start = segment.rate, waves.segment.start
     if waves.shape[1] < 2:
         return
-    K, step = len(waves) // 2, 1 / segment.rate
+    K = waves.shape[0] // 2
     colors, names = _colors(K), _named(recording, shown.feeder, K)
-    for k, wave in enumerate(waves):
-        y, dt = (wave, step) if every == 1 else (envelope(wave, every), step * every)
-        chart.samples(PHASES[K][k % K], start, dt, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
-    t, rms = half_cycle_rms(waves, segment.rate, recording.frequency)
+    for k in range(2 * K):
+        y = _thinned(functools.partial(_row, waves, k), waves.shape[1], every)
+        chart.samples(PHASES[K][k % K], start, every / rate, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
+    t, rms = half_cycle_rms(waves, rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
             name, color = PHASES[K][k % K], colors[k % K]
@@ -221,6 +222,21 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     for name, values, color, panel in lines:
         drawn = values[part] if every == 1 else envelope(values[part], every)
         chart.samples(name, float(t[0]), step * every, drawn, color, panel)
+
+
+def _read(channel: Channel, segment: Segment, a: int, b: int) -> np.ndarray:
+    return channel.values(segment.first + a, segment.first + b)
+
+
+def _row(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
+    return waves[k : k + 1, a:b][0]
+
+
+def _thinned(read: Callable[[int, int], np.ndarray], n: int, every: int) -> np.ndarray:
+    """A wave of n samples, or its `envelope`, of what `read(first, stop)` gives a block at a time."""
+    block = max(BLOCK // (2 * every), 1) * 2 * every
+    parts = (read(a, min(a + block, n)) for a in range(0, n, block))
+    return np.concatenate([part if every == 1 else envelope(part, every) for part in parts])
 
 
 def envelope(wave: np.ndarray, every: int) -> np.ndarray:
