@@ -3,10 +3,12 @@
 One small record, written in every format that is read, is damaged in ways that happen to files - bits, bytes, digits,
 fields and lines changed, lost, doubled or swapped, files cut - and given to `tractexp.read` in a process of its own.
 Allowed is a reading, or one sentence. Not allowed: another exception, a warning, words of Python in what a user reads,
-more than 5 s, more than 500 MB. Counts and worst figures go to mutated_files.json; the exit code says whether all held.
+more than 5 s, more than 500 MB (a workbook's rows come from a process whose own memory is limited).
+Counts and worst figures go to mutated_files.json; the exit code says whether all held.
 """
 
 import argparse
+import io
 import json
 import multiprocessing
 import re
@@ -15,6 +17,7 @@ import tempfile
 import time
 import traceback
 import warnings
+import zipfile
 from datetime import datetime
 from pathlib import Path
 
@@ -126,7 +129,34 @@ def tables(made):
         rows = zip(*(v.tolist() for v in given.values()), strict=True)
         return "\n".join([mark.join(given), *(mark.join(f"{x:.6g}" for x in row) for row in rows)]) + "\n"
 
-    return columns, {".csv": text(columns, ","), ".tsv": text(columns, "\t"), "_waves.csv": text(waves, ",")}
+    rows = text(columns, ",").partition("\n")[2]
+    names = "b:tnow in s,m:u1:bus1 in p.u.,m:Psum:bus1 in p.u.,m:Qsum:bus1 in p.u.\n"
+    german = "Zeitpunkt in s;Bus 1\\m:u1 in p.u.;Last 1\\m:Psum:bus1 in p.u.;Last 1\\m:Qsum:bus1 in p.u.\n"
+    return columns, {
+        ".csv": text(columns, ","), ".tsv": text(columns, "\t"), "_waves.csv": text(waves, ","),
+        "_powerfactory.csv": f"All calculations,Bus 1,Load 1,Load 1\n{names}{rows}",
+        "_digsilent.csv": german + rows.replace(",", ";").replace(".", ","),
+    }  # fmt: skip
+
+
+def open_document(columns):
+    """A workbook of OpenDocument (.ods), as bytes."""
+    text = '<table:table-cell office:value-type="string"><text:p>{}</text:p></table:table-cell>'
+    number = '<table:table-cell office:value-type="float" office:value="{:.6g}"/>'
+    rows = [[text.format(name) for name in columns]]
+    rows += [[number.format(x) for x in row] for row in zip(*columns.values(), strict=True)]
+    spaces = "".join(f' xmlns:{k}="urn:oasis:names:tc:opendocument:xmlns:{k}:1.0"' for k in ("office", "table", "text"))
+    lines = "".join(f"<table:table-row>{''.join(row)}</table:table-row>" for row in rows)
+    content = (
+        f'<?xml version="1.0"?><office:document-content{spaces}><office:body><office:spreadsheet><table:table '
+        f'table:name="S">{lines}</table:table></office:spreadsheet></office:body></office:document-content>'
+    )
+    packed = io.BytesIO()
+    with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
+        archive.writestr("META-INF/manifest.xml", "<manifest/>")
+        archive.writestr("content.xml", content)
+    return packed.getvalue()
 
 
 def originals(folder):
@@ -149,6 +179,7 @@ def originals(folder):
     ]  # fmt: skip
     for ending, content in texts.items():
         formats[f"table {ending}"] = [files.write(folder / f"table{ending}", content)]
+    formats["table .ods"] = [files.write(folder / "table.ods", open_document(columns))]
     for ending, write in ((".parquet", "write_parquet"), (".xlsx", "write_excel")):
         try:
             import polars

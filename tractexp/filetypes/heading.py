@@ -39,10 +39,11 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
         return TableHeading(("",) * width, ("",) * width, first, None)
     width = max(len(rows[first]), len(rows[named]))
     parted = [split_unit(_text(cell)) for cell in rows[named]]
-    below = [_text(cell).strip("[]() ") for cell in rows[named + 1]] if named + 1 < first else []
-    unit_row = below if _are_units(below) else []
+    beside = _units_beside(rows, named, first, any(unit for _, unit in parted))
+    unit_row = [] if beside is None else _bare(rows[beside])
     units = [unit_row[k] if k < len(unit_row) and unit_row[k] else unit for k, (_, unit) in enumerate(parted)]
-    names = _joined(rows, named, [name for name, _ in parted])
+    groups = named - 2 if beside == named - 1 else named - 1
+    names = _joined(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
     return TableHeading(_padded(names, width), _padded(units, width), first, named)
 
 
@@ -78,9 +79,22 @@ def _named(rows: Sequence[Sequence[Any]], first: int) -> int | None:
         texts = [_text(cell) for cell in rows[i]]
         filled = [text for text in texts if text]
         enough = len(filled) >= 2 and 2 * len(filled) >= len(rows[first]) - 1
-        if enough and not (_are_units([text.strip("[]() ") for text in texts]) and i > 0):
+        if enough and not (_are_units(_bare(rows[i])) and i > 0):
             return i
     return None
+
+
+def _units_beside(rows: Sequence[Sequence[Any]], named: int, first: int, with_units: bool) -> int | None:
+    """The row of units below the names, or above names without units of their own (one letter alone is a group's)."""
+    if named + 1 < first and _are_units(_bare(rows[named + 1])):
+        return named + 1
+    above = _bare(rows[named - 1]) if named and not with_units else []
+    return named - 1 if _are_units(above) and len({text for text in above if text}) > 1 else None
+
+
+def _bare(row: Sequence[Any]) -> list[str]:
+    """The texts of a row without brackets."""
+    return [_text(cell).strip("[]() ") for cell in row]
 
 
 def _are_units(texts: Sequence[str]) -> bool:
@@ -93,9 +107,9 @@ def _names_too(filled: Sequence[str]) -> bool:
     return len(set(filled)) == len(filled) and "t" in (text.lower() for text in filled)
 
 
-def _joined(rows: Sequence[Sequence[Any]], named: int, names: list[str]) -> list[str]:
+def _joined(groups: Sequence[Any], names: list[str]) -> list[str]:
     """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is one."""
-    above = [_text(cell) for cell in rows[named - 1]] if named else []
+    above = [_text(cell) for cell in groups]
     if len(above) != len(names) or len(names) < 3 or sum(map(bool, above)) < len(names) - 1:
         return names
     return [f"{upper} {name}".strip() for upper, name in zip(above, names, strict=True)]
