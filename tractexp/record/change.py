@@ -16,7 +16,8 @@ CHANGED = 0.05  # of the apparent power: what a load that is steady does not lea
 CHANGED_U = 0.01  # of the voltage: a step of a tap changer
 ANSWERED = 4.0  # times the relative change of voltage: what a load answers to it at most
 ABRUPT = 3.0  # times the changes right before and after: what does not go on
-USUAL = 8.0  # times the lower quartile of all such changes, six standard deviations of noise: more is none of them
+USUAL = 8.0  # times the lower quartile of all such changes of P and Q, six standard deviations of noise: more is none
+USUAL_U = 19.0  # the same of the voltage: the lower quartile of one quantity is smaller than that of two
 SMALL = 0.2  # of the greatest apparent power: steps of a smaller load count as those of this one
 STAYS = 5, 0.5  # cycles over which a step is still seen, and how much of it
 
@@ -44,14 +45,14 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
         return []
     size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL * _greatest(S))
     answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), 1e-300)
-    return list(_steps(before, after, size, answer, CHANGED, n))
+    return list(_steps(before, after, size, answer, (CHANGED, USUAL), n))
 
 
 def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
     """The steps of a voltage (N,) of more than 1 %, with the voltages in place of powers."""
     n = max(1, round(cycle))
     low, high = _levels(U.astype(complex), n)
-    return list(_steps(low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), CHANGED_U, n))
+    return list(_steps(low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), (CHANGED_U, USUAL_U), n))
 
 
 def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
@@ -64,16 +65,19 @@ def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steps(
-    before: np.ndarray, after: np.ndarray, size: np.ndarray, answer: np.ndarray, least: float, n: int
+    before: np.ndarray, after: np.ndarray, size: np.ndarray, answer: np.ndarray, least: tuple[float, float], n: int
 ) -> Iterator[Change]:
-    """The changes that stand out; entry k compares the samples up to k + n with those from k + 2 n on."""
+    """The changes that stand out; entry k compares the samples up to k + n with those from k + 2 n on.
+
+    `least` is what a change exceeds, as a share of `size` and in lower quartiles of all changes.
+    """
     if not len(before):
         return
     change = np.abs(after - before) / size
     apart = np.pad(change, 2 * n)
     beside = np.maximum(apart[: -4 * n], apart[4 * n :])
-    usual = USUAL * float(np.percentile(change, 25))
-    steps = (change - answer > max(least, usual)) & (change > ABRUPT * beside)
+    enough = max(least[0], least[1] * float(np.percentile(change, 25)))
+    steps = (change - answer > enough) & (change > ABRUPT * beside)
     for run in runs(steps):
         k = run.start + int(np.argmax(np.abs(after - before)[run]))
         earlier, later = before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n], after[k : k + (STAYS[0] - 1) * n + 1 : n]
