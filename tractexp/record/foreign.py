@@ -16,6 +16,7 @@ FOREIGN = {
     ".hdf5": "HDF5, whose layout is everybody's own: write its signals as columns of a .csv or .parquet",
     ".tdms": "a LabVIEW file: export it as .csv, or write its channels as columns of a .parquet",
     ".pl4": "ATP's plot file: export it as COMTRADE with PlotXY",
+    ".psout": "PSCAD's own file of results: have it write .out files (project settings), which come with an .inf",
     ".rec": RECORDER, ".wfm": RECORDER, ".osc": RECORDER, ".dsr": RECORDER, ".tr0": RECORDER, ".icf": RECORDER,
     ".dmk": RECORDER, ".sig": RECORDER, ".trc": RECORDER, ".wdf": RECORDER, ".d01": RECORDER,
     ".pdf": DOCUMENT, ".docx": DOCUMENT,
