@@ -316,3 +316,11 @@ class TestFuse:
         with pytest.raises(UserError) as refusal:
             detect(self.record(left, U2, current=0.5))
         assert "fuse" not in str(refusal.value)
+
+
+def test_a_voltage_beyond_all_measure_ends_in_no_warning():
+    """Bits lost in a file may make 1e30 of a voltage, beside which all others are nothing."""
+    t = np.arange(800) / 200
+    U = np.where((t >= 2) & (t < 2.15), 0.7, 1.0)
+    U[500], U[600] = 1e30, 1e30
+    assert detect(Record("made", t, U, 0.8 * np.ones(800), 0.4 * np.ones(800))).depth == pytest.approx(0.3)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.record import Record
+from tractexp.record.record import DEAD, Record
 
 CHANGED = 0.05  # of the apparent power: what a load that is steady does not leave
 CHANGED_U = 0.01  # of the voltage: a step of a tap changer
@@ -44,7 +44,7 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
     if not len(before):
         return []
     size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL * _greatest(S))
-    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), 1e-300)
+    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), DEAD * _greatest(high))
     return list(_steps(before, after, size, answer, (CHANGED, USUAL), n))
 
 
