@@ -9,7 +9,7 @@ import pytest
 import tractexp
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.incomplete import PredictedDeviance
+from tractexp.discrepancy.incomplete import PredictedDeviance, bears_out
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import standard_errors
@@ -87,6 +87,16 @@ def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not()
     )
     assert one.clear_of(other)
     assert not other.clear_of(one)
+
+
+@pytest.mark.parametrize(("after", "chi2", "stands"), [(0.587, 44.0, False), (0.53, 44.0, True), (0.587, 1.5, True)])
+def test_what_most_of_a_loud_deviance_says_the_error_in_S_must_say_too(after, chi2, stands):
+    """A real transformer: 89 % of the deviance was gone, and 59 of 81 % of the response were missed still."""
+    before = SimpleNamespace(error=SimpleNamespace(value=0.81), chi2_per_sample=chi2)
+    judged = SimpleNamespace(
+        before=before, after=SimpleNamespace(error=SimpleNamespace(value=after)), telling=True, helps=True
+    )
+    assert bears_out(judged, Criteria()) is stands
 
 
 # a motor whose law nobody has
