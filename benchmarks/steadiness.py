@@ -3,7 +3,8 @@
 Dips of loads whose parameters, voltage, sampling rate and frequency are drawn, with noise of 0.1 and 1 %. In each kind
 the load, or its voltage, also changes for another reason, smeared over the cycle of a phasor. Counted is what
 `tractexp.record.detect` makes of it; a record without such a change is a false alarm where anything is noted, refused
-or cut. The seeds, of a series of their own, chose no constant. docs/records.md has the table from steadiness.json.
+or cut. The seeds are of a series of their own. They chose no constant but `USUAL_U`, whose fault
+they showed and whose value is six standard deviations. docs/records.md has the table from steadiness.json.
 """
 
 import json
