@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, g
 from tractexp.choices import CONF as CONF
 from tractexp.choices import configuration_folders as configuration_folders
 from tractexp.choices import entry_points, modules
-from tractexp.errors import Unknown, UserError, among
+from tractexp.errors import Unknown, UserError, among, setting
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -276,5 +276,5 @@ def chosen(group: str, given: Any) -> Any:
     if isinstance(given, str):
         return build(group, {"name": given})
     if not isinstance(given, Mapping) or "name" not in given:
-        raise UserError(f"data.{group}={given!r:.60} must be a name, or a mapping of 'name' and settings")
+        raise UserError(f"{setting(f'data.{group}')}={given!r:.60} must be a name, or a mapping of 'name' and settings")
     return build(group, given)

@@ -12,7 +12,7 @@ from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
 from tractexp.choices import choices, defaults, replaced
 from tractexp.composition import read_choice
-from tractexp.errors import UserError, among, check_choice
+from tractexp.errors import UserError, among, check_choice, setting
 from tractexp.outcome import Tabulated
 
 if TYPE_CHECKING:
@@ -177,7 +177,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     keys = [f.name for f in dataclasses.fields(LoadModel)]
     for key in given:
         if key not in keys:
-            raise UserError(f"model.{key}: there is no such key{among(key, keys, 'Keys')}")
+            raise UserError(f"{setting(f'model.{key}')}: there is no such key{among(key, keys, 'Keys')}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
     composed: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}

@@ -10,7 +10,7 @@ from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Outcome
 from tractexp.plugin import build, plugin
 from tractexp.progress import say
@@ -87,7 +87,7 @@ def export(
     check_choice("task.base", base, BASES)
     if fit.doubts and not doubtful:
         raise UserError(
-            f"this model is no physical load: {' and '.join(fit.doubts)}; task.doubtful=true exports it all the same"
+            f"this model is no physical load: {' and '.join(fit.doubts)}; {TASK.doubtful}=true exports it all the same"
         )
     own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
     file_power = power or (own.file_power if own.in_mva else POWER)
@@ -142,7 +142,9 @@ class Export(Task, call=export, given=("fit",)):
         from tractexp.identification.result import load
 
         if self.parameters is None:
-            raise UserError("task.parameters is not given; it is the path of a result.json, which task=identify writes")
+            raise UserError(
+                f"{TASK.parameters} is not given; it is the path of a result.json, which task=identify writes"
+            )
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)
         path = exported.write(job.folder / f"load{exported.suffix}")

@@ -14,7 +14,7 @@ from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.api.task import SEARCH, Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_range
+from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import build, plugin
 from tractexp.progress import Progress, tell
@@ -120,8 +120,8 @@ def generalise(
     setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
     if not setup.validate:
         raise UserError(
-            "task=generalise needs dips that are not fitted: name them in data.validate, a milder one to"
-            " interpolate and a deeper one to extrapolate"
+            f"{setting('task=generalise')} needs dips that are not fitted: name them in {DATA.validate}, a milder one "
+            "to interpolate and a deeper one to extrapolate"
         )
     chosen = Choice.several("optimizer", optimizers)
     tell(progress, setup.lines())

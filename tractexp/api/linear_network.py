@@ -14,7 +14,7 @@ from tractexp.api.setup import recorded
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import choices, defaults
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import tell
@@ -140,8 +140,8 @@ def _fitted(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
         return selection(boxes, train, held_out), boxes
     if len(boxes) <= of.order:
         raise UserError(
-            f"task.poles={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer poles,"
-            " or take a record that goes on longer"
+            f"{TASK.poles}={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer "
+            "poles, or take a record that goes on longer"
         )
     return boxes[-1], boxes
 

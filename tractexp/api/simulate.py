@@ -14,7 +14,7 @@ from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import TASK, UserError, among, check_range, setting
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
 
@@ -143,7 +143,8 @@ def simulate(
     if depth is None and (
         needless := [*given, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
     ):
-        raise UserError(f"task.{needless[0]} describes a dip made by hand; give its depth, too, or leave it out")
+        where = setting(f"task.{needless[0]}")
+        raise UserError(f"{where} describes a dip made by hand; give its depth, too, or leave it out")
     fit = model if isinstance(model, Identification) else None
     load = fit.model if fit else model_of(model)
     at = chosen(load.model.names, fit.result.parameters if fit else {}, values or {})
@@ -177,13 +178,13 @@ def chosen(names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str
     for name in given:
         if name not in names:
             raise UserError(
-                f"task.values.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
+                f"{TASK.values}.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
             )
     values = {**fitted, **given}
     if missing := [name for name in names if name not in values]:
         raise UserError(
-            f"no value for {', '.join(missing)}: give task.parameters=result.json of an identification,"
-            f" or task.values={{{', '.join(f'{name}: ...' for name in missing)}}}"
+            f"no value for {', '.join(missing)}: give {TASK.parameters}=result.json of an identification,"
+            f" or {TASK.values}={{{', '.join(f'{name}: ...' for name in missing)}}}"
         )
     return np.array([values[name] for name in names], dtype=float)
 

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.blocks import blocks_of, exceeds
 from tractexp.identification.descent import Descent, descend
@@ -134,7 +134,7 @@ def polished(problem: Problem) -> EstimationResult:
     if best is None:
         raise UserError(
             f"no parameter set tried can be simulated before {problem.events[0].record.name}; give values by"
-            " task.values=<result.json>, or narrow model.bounds"
+            f" {TASK.values}=<result.json>, or narrow {MODEL.bounds}"
         )
     return best
 

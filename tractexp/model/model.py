@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, check_choice
+from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel, width
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
@@ -351,5 +351,5 @@ def compose(
     check_choice("domain", domain, DOMAINS)
     names = [effect.name for effect in effects]
     if twice := next((n for n in names if names.count(n) > 1), None):
-        raise UserError(f"model.effects names '{twice}' twice; name each effect once")
+        raise UserError(f"{MODEL.effects} names '{twice}' twice; name each effect once")
     return Model(motor, static, effects, integration, domain)
