@@ -77,6 +77,8 @@ def plugin(cls: Class) -> Class:
     if group is None:
         raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
     if cls.sourced and "Source:" not in (cls.__doc__ or ""):
+        if sys.flags.optimize > 1:
+            raise UserError("python -OO takes away the docstrings in which plugins name their sources; run without -OO")
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
     others = _registry.setdefault(group, {})
     if name in others and others[name].__module__ != cls.__module__:

@@ -79,7 +79,7 @@ def export(
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import played
-    from tractexp.record.identity import distinct
+    from tractexp.record.identity import described
 
     for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
         if value is not None:
@@ -100,7 +100,7 @@ def export(
     form.check_parts(identified)
     text = form.text(identified)
     notes = [
-        *filter(None, map(str, distinct(fit.result.identities))),
+        *filter(None, described(fit.result.identities)),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
         _powers(identified),
         *form.notes(identified),

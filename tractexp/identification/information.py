@@ -22,6 +22,7 @@ class Information:
     width: np.ndarray
     J: np.ndarray
     structural: float = STRUCTURAL
+    held: tuple[str, ...] = ()  # those that cannot move to either side: a requirement of the model holds them
 
     @classmethod
     def of(
@@ -46,6 +47,11 @@ class Information:
         object.__setattr__(self, "_singular", singular)
         object.__setattr__(self, "_seen", seen & (singular > 0))
         object.__setattr__(self, "_blind", size == 0)
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Parameters that change nothing by themselves."""
+        return tuple(name for name, blind in zip(self.names, self._blind, strict=True) if blind)
 
     @property
     def covariance(self) -> np.ndarray:

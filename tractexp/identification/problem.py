@@ -15,6 +15,8 @@ from tractexp.identification.search import REFUSED
 from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
+from tractexp.noise.quiet import quiet_stretches
+from tractexp.noise.random_walk import Load
 from tractexp.parameter import Box, Parameter, even
 from tractexp.record import Event
 from tractexp.record.own_base import SMALLEST
@@ -182,6 +184,16 @@ class Problem:
     def steady(self) -> list[slice]:
         """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not compared."""
         return self.domain.steady(self.events, self.drive)
+
+    @property
+    def quiet(self) -> list[slice]:
+        """The samples of the drive in which little happens."""
+        return quiet_stretches(self.events, self.drive)
+
+    @property
+    def power(self) -> Load:
+        """What the load takes, over what it took before each event."""
+        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
 
     def _driven(self) -> Drive:
         """The events end to end, squared errors weighed as the loss says."""

@@ -18,7 +18,7 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, PROFILED, TRADES
 from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
-from tractexp.record.identity import Identity, distinct, title
+from tractexp.record.identity import Identity, described, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
@@ -107,7 +107,7 @@ def report(fit: "Identification") -> Report:
     result, details = fit.result, fit.details
     uncertainty, together = details.uncertainty, details.agreement
     names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
-    lead = "; ".join([*map(str, distinct(of)), f"{result.optimizer}, seed {result.seed}."])
+    lead = "; ".join([*described(of), f"{result.optimizer}, seed {result.seed}."])
     page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
         as_sentence(fit.headline),
