@@ -136,8 +136,12 @@ def packages() -> tuple[Any, ...]:
 
 
 def place_in_plugin(error: BaseException) -> str:
-    """File and line of the innermost frame of an exception that is in a plugin; "" where none is."""
-    folders = [Path(path) for package in packages() for path in package.__path__]
+    """File and line of the innermost frame of an exception that is in a plugin; "" where none is.
+
+    Our own tasks come in as plugins do; what fails in them is our mistake.
+    """
+    others = [package for package in packages() if not package.__name__.startswith("tractexp.")]
+    folders = [Path(path) for package in others for path in package.__path__]
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     inside = [(name, line) for name, line in frames if any(Path(name).is_relative_to(folder) for folder in folders)]
     return f"{inside[-1][0]}, line {inside[-1][1]}" if inside else ""

@@ -80,5 +80,6 @@ def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sym
         return a / (a**2 + b**2), -b / (a**2 + b**2)
     if isinstance(part, sympy.Pow) and part.exp.is_Integer and part.exp > 1:
         return _product([args[0]] * int(part.exp))
-    assert isinstance(part, sympy.Expr)
+    if not isinstance(part, sympy.Expr):  # the condition True of a piece
+        return part, zero  # pyright: ignore[reportReturnType]
     return part.as_real_imag()  # pyright: ignore[reportReturnType] # SymPy's own types allow for None

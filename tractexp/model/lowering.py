@@ -58,6 +58,8 @@ class _Hoister:
         return self._made[e]
 
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
+        if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition
+            return e.func(*map(self, arguments(e)))
         if self.is_constant(e):
             return self.constant(e)
         if self.is_signal(e):
