@@ -12,6 +12,7 @@ from tractexp.choices import defaults
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_distinct, settings_as
 from tractexp.kinds import check_kind
+from tractexp.outcome import Plain
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -47,7 +48,7 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
 
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Plain):
     """What is chosen in a group: the name of the choice, and the plugin's name and settings it stands for."""
 
     name: str

@@ -13,7 +13,7 @@ from tractexp.blocks import Table
 from tractexp.choices import choices, defaults, replaced
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_choice, setting
-from tractexp.outcome import Tabulated
+from tractexp.outcome import Plain, Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
@@ -30,7 +30,7 @@ class Portable:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadModel(Portable, Tabulated):
+class LoadModel(Portable, Plain, Tabulated):
     """A load model as a call takes it. Prints its parameters; in a notebook its equations, too."""
 
     motor: Mapping[str, Any]  # name and settings of the plugin

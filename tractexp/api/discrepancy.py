@@ -6,9 +6,9 @@ and `Investigation.write_results`.
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -233,17 +233,6 @@ class Investigation(Written):
         from tractexp.report import discrepancy
 
         return discrepancy.report(self.steps, self.content, self.result.identities)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(
-            Question.from_dict(content["question"]),
-            content["content"],
-            Result.of(content["result"], "the saved result"),
-        )
 
     def write_results(self, folder: Path) -> list[Path]:
         """discrepancy.json and result.json.

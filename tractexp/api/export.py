@@ -1,9 +1,8 @@
 """Write an identified load for another simulator."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING
 
 from tractexp import files
 from tractexp.api.arguments import public
@@ -46,14 +45,6 @@ class Exported(Outcome):
     def summary(self) -> Report:
         report = Report(f"{self.title}, as {self.format}").text(*(f"note: {note}" for note in self.notes), "")
         return report.text(*self.text.splitlines())
-
-    def to_dict(self) -> dict[str, Any]:
-        return {key: getattr(self, key) for key in ("format", "suffix", "title", "text", "notes", "agreement")}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        recorded = {key: content[key] for key in ("format", "suffix", "title", "text")}
-        return cls(**recorded, notes=tuple(content["notes"]), agreement=content.get("agreement"))
 
 
 @public

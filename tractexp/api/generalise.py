@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -78,13 +78,6 @@ class Generalised(Written):
     def drawings(self) -> Mapping[str, Drawing]:
         """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
         return {curve["file"]: functools.partial(_draw, curve) for curve in self.curves}
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"residuals": self.residuals, "identified": self.identified, "curves": self.curves}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(content["residuals"], content["identified"], content["curves"])
 
 
 @public

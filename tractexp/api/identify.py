@@ -17,7 +17,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
-from tractexp.outcome import Written
+from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
 from tractexp.wording import epsilon, joined
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
+FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
 MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 

@@ -3,12 +3,12 @@
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files, provenance
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
-from tractexp.api.read import Dips, dips_of, dips_together, event_from_dict, event_to_dict
+from tractexp.api.read import Dips, dips_of, dips_together
 from tractexp.api.response import Response, response_of
 from tractexp.api.setup import recorded
 from tractexp.api.task import Job, Task
@@ -88,15 +88,6 @@ class NetworkFit(Written):
         from tractexp.report import linear_network
 
         return linear_network.report(self)
-
-    def to_dict(self) -> dict[str, Any]:
-        events = {"train": list(map(event_to_dict, self.train)), "validate": list(map(event_to_dict, self.validate))}
-        return events | {"domain": self.domain, "order": self.order, "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        train, validate = (Dips(map(event_from_dict, content[key])) for key in ("train", "validate"))
-        return cls(train, validate, content["domain"], content["order"], content["content"])
 
 
 @public

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files
 from tractexp.api.setup import Setup
@@ -59,14 +59,6 @@ class Recommended(Written):
         from tractexp.report import next_event
 
         return next_event.report(self.event, title_of(e.record for e in self.setup.train))
-
-    def to_dict(self) -> dict[str, Any]:
-        rivals = [list(names) for names in self.rivals]
-        return {"setup": self.setup.to_dict(), "rivals": rivals, "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Setup.from_dict(content["setup"]), content["rivals"], content["content"])
 
 
 def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:

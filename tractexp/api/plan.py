@@ -4,7 +4,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -77,13 +77,6 @@ class Forecasts(Written):
         from tractexp.report import plan
 
         return plan.report(self.planned, self.content)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"setup": self.setup.to_dict(), "asked": dict(self.asked), "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
 
 @public

@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files, quoting
 from tractexp.api.arguments import public
@@ -89,13 +89,6 @@ class Surveyed(Written):
         from tractexp.report import survey
 
         return survey.report(self.content)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(content["content"])
 
     def write_results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
