@@ -83,11 +83,11 @@ class CSV(Tabular, Reader):
             self._check_numbers()
         elif not self.train:
             raise UserError(f"{DATA.train} is empty: name at least one CSV file to fit, e.g. {DATA.train}=[dip.csv]")
-        seen: set[str] = set()
+        files: set[str] = set()
         for path in [] if self.path else map(str, (*self.train, *(self.validate or []))):
-            if path in seen:
+            if path in files:
                 raise UserError(f"{DATA.train} and {DATA.validate} name '{path}' twice; a record may serve only once")
-            seen.add(path)
+            files.add(path)
         limits = {"base_voltage": SIZES["voltage"], "base_power": SIZES["power"], "frequency": SIZES["frequency"]}
         for key, allowed in (limits | {"pre": (0.05,), "post": (0.1,)}).items():
             value = getattr(self, key)

@@ -34,10 +34,10 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             if name not in named and not open_ended:
                 raise UserError(f"{where} has no argument '{name}'{among(name, named, 'Arguments')}")
         try:
-            given = signature.bind(*args, **keywords).arguments
+            arguments = signature.bind(*args, **keywords).arguments
         except TypeError as error:
             raise UserError(f"{where}: {error}; Arguments: {', '.join(named)}") from None
-        for name, value in given.items():
+        for name, value in arguments.items():
             parameter = signature.parameters[name]
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 check_kind(name, value, parameter.annotation)

@@ -70,11 +70,11 @@ class LoadModel(Portable, Plain, Tabulated):
 
     def with_(self, **changes: Any) -> "LoadModel":
         """The model with what is given (not None) in place; bounds and fixed values are added to those there are."""
-        given = {key: value for key, value in changes.items() if value is not None}
+        settings = {key: value for key, value in changes.items() if value is not None}
         for key in ("bounds", "fixed"):
-            if key in given:
-                given[key] = {**getattr(self, key), **given[key]}
-        return replace(self, **given)
+            if key in settings:
+                settings[key] = {**getattr(self, key), **settings[key]}
+        return replace(self, **settings)
 
     def fitting(self, events: Sequence["Event"]) -> "LoadModel":
         """The model with the effects that some of the events show, where it is one of `shown_effects`."""
@@ -133,11 +133,11 @@ def compose(
     parts = {
         part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
     }
-    given = {
+    settings = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
         "priors": priors, "shown_effects": shown_effects,
     }  # fmt: skip
-    composed = composed.with_(bounds=bounds, fixed=fixed, **given, **parts)
+    composed = composed.with_(bounds=bounds, fixed=fixed, **settings, **parts)
     _ = composed.parameters
     for key in composed.fixed:
         if key not in composed.parameters:

@@ -139,9 +139,9 @@ def simulate(
     """
     dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
     dip.check()
-    given = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
+    powers = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
     if depth is None and (
-        needless := [*given, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
+        needless := [*powers, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
     ):
         where = setting(f"task.{needless[0]}")
         raise UserError(f"{where} describes a dip made by hand; give its depth, too, or leave it out")
@@ -153,7 +153,7 @@ def simulate(
         raise UserError("give either records to play, or the depth of a dip")
     own = fit.result.base if fit else None
     ratio = own.ratio if own else 1.0
-    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in given.items()}
+    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in powers.items()}
     played = [respond_to(load.model, at, e, own) for e in events] or [_played(load, at, dip, before, ratio)]
     return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
 

@@ -148,10 +148,10 @@ def survey(
     if informative is None:
         return Surveyed(content)
     worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:CANDIDATES]
-    asked = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
+    settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with staged(progress) as stage:
         stage(f"choosing among {len(worth)} events")
-        best = _best(place, [row["event"] for row in worth], informative, model, values, asked)
+        best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
     content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
     content["command"] = typed({"name": reader, "path": str(folder), "train": [c.name for c in best]})

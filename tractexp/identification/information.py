@@ -29,8 +29,8 @@ class Information:
         cls, names: Sequence[str], values: np.ndarray, width: np.ndarray, jacobian: np.ndarray, nuisances: np.ndarray
     ) -> "Information":
         """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside them."""
-        seen = nuisances[:, np.any(nuisances != 0, axis=0)]
-        basis, _ = np.linalg.qr(seen)
+        active = nuisances[:, np.any(nuisances != 0, axis=0)]
+        basis, _ = np.linalg.qr(active)
         return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
 
     _directions: np.ndarray = field(init=False, repr=False)  # rows, in ranges

@@ -8,9 +8,9 @@ import sympy
 from tractexp.kernel.graph import Basic, Symbol
 
 
-def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
+def replaced(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
     """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
-    new: dict[Basic, Basic] = {**known}
+    new: dict[Basic, Basic] = {**substitutes}
 
     def visit(part: Basic) -> Basic:
         if part not in new:

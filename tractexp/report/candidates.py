@@ -32,9 +32,9 @@ def candidates(page: Report, findings: Findings) -> None:
     rows = evidence(findings)
     labels = _labels(rows)
     page.heading("Candidates by their evidence")
-    seen = [row for row in rows if np.isfinite(row.drop)]
-    if seen:
-        page.chart(_bars(findings, seen, labels), _bars_caption(findings, seen))
+    finite = [row for row in rows if np.isfinite(row.drop)]
+    if finite:
+        page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
     for sentence in (why_not_the_most_helpful(findings), beside(findings)):
         page.text(*[sentence] * bool(sentence))
     entries = [

@@ -244,17 +244,17 @@ def errors(fit: "Identification") -> Table:
 
 def samples(fit: "Identification") -> list[str]:
     """How many samples were fitted, in a sentence; [] of an early result."""
-    known = fit.result.uncertainty
-    if "samples" not in known:
+    statistics = fit.result.uncertainty
+    if "samples" not in statistics:
         return []
-    said = f"{known['samples']} samples compared, {known['parameters']} parameters searched"
-    return [f"fitted: {said}, {known['freedom']} degrees of freedom"]
+    said = f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
+    return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
 
 
 def correlations(fit: "Identification") -> list[str]:
     """The correlations that a terminal has room for, the strongest first; [] where none is strong."""
-    known = fit.result.uncertainty
-    names, matrix = known.get("names", []), known.get("correlation", [])
+    statistics = fit.result.uncertainty
+    names, matrix = statistics.get("names", []), statistics.get("correlation", [])
     pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
     strong = [f"{a} and {b} {r:+.3f}" for r, a, b in sorted(pairs, key=lambda p: -abs(p[0])) if abs(r) >= TRADES]
     return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
