@@ -2,8 +2,56 @@
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Collection, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import Any
+
+_spelling: ContextVar[Callable[[str], str]] = ContextVar("spelling", default=str)
+
+
+def setting(key: str) -> str:
+    """A key of the configuration, "model.bounds.C", as the user writes it: in Python the argument, "bounds.C"."""
+    return _spelling.get()(key)
+
+
+@contextmanager
+def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator[None]:
+    """Within it, keys of task, model and data that are among the arguments of a call are spelled as those.
+
+    The events to fit, `data.train`, are the argument `records` of a call that has it, and `task=NAME` is the call.
+    """
+    outer = _spelling.get()
+
+    def spelled(key: str) -> str:
+        if key == f"task={call}":
+            return f"{call}()"
+        section, _, rest = key.partition(".")
+        names = arguments() if section in ("task", "model", "data") else ()
+        rest = "records" if key == "data.train" and "records" in names else rest
+        return rest if rest.partition(".")[0] in names else outer(key)
+
+    token = _spelling.set(spelled)
+    try:
+        yield
+    finally:
+        _spelling.reset(token)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the configuration, to name its settings in sentences: `{DATA.units}` is `setting("data.units")`."""
+
+    name: str
+
+    def __getattr__(self, key: str) -> str:
+        if key.startswith("_"):
+            raise AttributeError(key)
+        return setting(f"{self.name}.{key}")
+
+
+DATA, MODEL, TASK = Section("data"), Section("model"), Section("task")
 
 
 class UserError(Exception):
@@ -52,23 +100,22 @@ def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
     allowed = tuple(allowed)
     if value not in allowed:
         names = tuple(map(str, allowed))
-        raise UserError(
-            f"{where}={' '.join(str(value).split())} is not one of {', '.join(names)}{nearest(str(value), names)}"
-        )
+        text = " ".join(str(value).split())
+        raise UserError(f"{setting(where)}={text} is not one of {', '.join(names)}{nearest(str(value), names)}")
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
     """Raise `UserError` for no values, or for one that is there twice; `where` is the setting's full key."""
     values = list(values)
     if not values:
-        raise UserError(f"{where} is empty; give at least one")
+        raise UserError(f"{setting(where)} is empty; give at least one")
     for value in values:
         if values.count(value) > 1:
-            raise UserError(f"{where} names {value} twice; name each once")
+            raise UserError(f"{setting(where)} names {value} twice; name each once")
 
 
 def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
     """Raise `UserError` unless low <= value <= high and it is finite; `where` is the setting's full key."""
     if not low <= value <= high or math.isinf(value):
         limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
-        raise UserError(f"{where}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")
+        raise UserError(f"{setting(where)}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")

@@ -6,7 +6,7 @@ from inspect import Parameter
 from numbers import Integral, Real
 from typing import Any, Union, get_args, get_origin
 
-from tractexp.errors import UserError
+from tractexp.errors import UserError, setting
 
 WORDS: Mapping[Any, str] = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
@@ -25,7 +25,7 @@ def check_kind(name: str, value: Any, annotation: Any) -> None:
     if not _is(value, annotation):
         kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
         allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
-        raise UserError(f"{name}={value!r:.60} is {_kind(value)}, but it must be {allowed}")
+        raise UserError(f"{setting(name)}={value!r:.60} is {_kind(value)}, but it must be {allowed}")
 
 
 def _is(value: Any, kind: Any) -> bool:

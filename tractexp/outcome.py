@@ -7,8 +7,9 @@ with the same records, settings and seed gives the same bits.
 
 import tempfile
 from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Self, get_origin
 
 from tractexp import files
 from tractexp.blocks import Report, Table
@@ -16,6 +17,7 @@ from tractexp.errors import UserError
 from tractexp.progress import say
 
 MARK = "tractexp"  # the key by which a saved result is known
+FORMS: dict[Any, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {}  # of types of fields: to plain data, and back
 Drawing = Callable[[Path], Path]  # makes the file of this path
 
 
@@ -41,8 +43,40 @@ class Tabulated:
         return self.summary().fragment
 
 
-class Outcome(Tabulated):
-    """Base of the results. A subclass names its `kind`, gives `to_dict` and `table`, and is made again by `from_dict`.
+class Plain:
+    """Base of dataclasses that are saved: plain data by their fields, and made again by the types of these.
+
+    A field whose type stands in quotes holds what is behind the others, and is computed again.
+    """
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything found, as plain data that JSON knows."""
+        return {f.name: _form(f)[0](getattr(self, f.name)) for f in _saved(type(self))}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """What `to_dict` gave."""
+        required = [f for f in _saved(cls) if f.name in content or (f.default is f.default_factory is MISSING)]
+        return cls(**{f.name: _form(f)[1](content[f.name]) for f in required})
+
+
+def _saved(cls: Any) -> list[Field[Any]]:
+    return [f for f in fields(cls) if not isinstance(f.type, str)]
+
+
+def _form(of: Field[Any]) -> tuple[Callable[[Any], Any], Callable[[Any], Any]]:
+    kind: Any = of.type
+    if isinstance(kind, type) and issubclass(kind, Plain):
+        return kind.to_dict, kind.from_dict
+    return FORMS.get(kind) or (_as_it_is, tuple if get_origin(kind) is tuple else _as_it_is)
+
+
+def _as_it_is(value: Any) -> Any:
+    return dict(value) if isinstance(value, Mapping) else value
+
+
+class Outcome(Plain, Tabulated):
+    """Base of the results: dataclasses. A subclass names its `kind` and gives `table`.
 
     The file that `save` writes is JSON: `tractexp` (the version), `kind`, and what `to_dict` holds.
     """
@@ -54,15 +88,6 @@ class Outcome(Tabulated):
         super().__init_subclass__(**settings)
         if "kind" in vars(cls):
             Outcome.kinds[cls.kind] = cls
-
-    def to_dict(self) -> dict[str, Any]:
-        """Everything found, as plain data that JSON knows."""
-        raise NotImplementedError
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result that `to_dict` gave."""
-        raise NotImplementedError
 
     @classmethod
     def revived(cls, content: Mapping[str, Any]) -> Self:

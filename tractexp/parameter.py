@@ -124,8 +124,8 @@ def best_distinct(unit: np.ndarray, f: np.ndarray, distance: float, count: int, 
     `unit` (n, d) in the unit cube, `f` (n,) objectives, lower is better. `norm` is the order of the distance's norm:
     `np.inf` takes the coordinate that differs most, 2 is Euclid's.
     """
-    left, chosen = np.argsort(f, kind="stable"), []
-    while len(left) and len(chosen) < count:
-        chosen.append(left[0])
-        left = left[np.linalg.norm(unit[left] - unit[left[0]], norm, axis=1) > distance]
+    remaining, chosen = np.argsort(f, kind="stable"), []
+    while len(remaining) and len(chosen) < count:
+        chosen.append(remaining[0])
+        remaining = remaining[np.linalg.norm(unit[remaining] - unit[remaining[0]], norm, axis=1) > distance]
     return np.array(chosen, dtype=int)

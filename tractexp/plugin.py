@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, dataclass_transform, g
 from tractexp.choices import CONF as CONF
 from tractexp.choices import configuration_folders as configuration_folders
 from tractexp.choices import entry_points, modules
-from tractexp.errors import Unknown, UserError, among
+from tractexp.errors import Unknown, UserError, among, setting
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
@@ -77,6 +77,8 @@ def plugin(cls: Class) -> Class:
     if group is None:
         raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
     if cls.sourced and "Source:" not in (cls.__doc__ or ""):
+        if sys.flags.optimize > 1:
+            raise UserError("python -OO takes away the docstrings in which plugins name their sources; run without -OO")
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
     others = _registry.setdefault(group, {})
     if name in others and others[name].__module__ != cls.__module__:
@@ -134,8 +136,12 @@ def packages() -> tuple[Any, ...]:
 
 
 def place_in_plugin(error: BaseException) -> str:
-    """File and line of the innermost frame of an exception that is in a plugin; "" where none is."""
-    folders = [Path(path) for package in packages() for path in package.__path__]
+    """File and line of the innermost frame of an exception that is in a plugin; "" where none is.
+
+    Our own tasks come in as plugins do; what fails in them is our mistake.
+    """
+    others = [package for package in packages() if not package.__name__.startswith("tractexp.")]
+    folders = [Path(path) for package in others for path in package.__path__]
     frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
     inside = [(name, line) for name, line in frames if any(Path(name).is_relative_to(folder) for folder in folders)]
     return f"{inside[-1][0]}, line {inside[-1][1]}" if inside else ""
@@ -276,5 +282,5 @@ def chosen(group: str, given: Any) -> Any:
     if isinstance(given, str):
         return build(group, {"name": given})
     if not isinstance(given, Mapping) or "name" not in given:
-        raise UserError(f"data.{group}={given!r:.60} must be a name, or a mapping of 'name' and settings")
+        raise UserError(f"{setting(f'data.{group}')}={given!r:.60} must be a name, or a mapping of 'name' and settings")
     return build(group, given)

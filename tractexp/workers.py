@@ -80,29 +80,29 @@ class Workers:
         suspects = yield from self._side_by_side(function, items, trace)
         alone = replace(self, n_jobs=1, apart=True)
         for item in suspects:  # each alone, since joblib takes items ahead of those that are in work
-            left = [item]
+            remaining = [item]
             for _ in range(tries - 1):
-                left = yield from alone._side_by_side(function, left, trace)
-            yield from ((item, None) for item in left)
+                remaining = yield from alone._side_by_side(function, remaining, trace)
+            yield from ((item, None) for item in remaining)
 
     def _side_by_side(
         self, function: Callable[[Item], Any], items: Sequence[Item], trace: Callable[[Item], Any]
     ) -> Generator[tuple[Item, Any], None, list[Item]]:
         """Yield results and return the items that were in work when a worker was killed."""
-        left, suspects, barren = dict(enumerate(items)), [], 0
-        while left:
+        remaining, suspects, barren = dict(enumerate(items)), [], 0
+        while remaining:
             barren += 1
-            keys, working = list(left), set[int]()
+            keys, working = list(remaining), set[int]()
             with contextlib.suppress(BrokenExecutor):
-                for k, result in self.completed(function, _noted(left, keys, working), len(keys)):
+                for k, result in self.completed(function, _noted(remaining, keys, working), len(keys)):
                     working.discard(k)
                     barren = 0
-                    yield left.pop(keys[k]), result
+                    yield remaining.pop(keys[k]), result
             for key in [keys[k] for k in sorted(working)]:
-                state = trace(left[key])
+                state = trace(remaining[key])
                 if state is False:
                     continue
-                barren, item = 0, left.pop(key)
+                barren, item = 0, remaining.pop(key)
                 if state is True:
                     suspects.append(item)
                 else:
@@ -133,11 +133,11 @@ def _numbered(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, A
     return k, function(item)
 
 
-def _noted(left: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
+def _noted(remaining: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
     """The items by their keys; the position of one that is taken is in work from then on."""
     for k, key in enumerate(keys):
         working.add(k)
-        yield left[key]
+        yield remaining[key]
 
 
 @contextlib.contextmanager

@@ -4,7 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import Connection, UserError, plugin
+from tractexp.extend import DATA, Connection, UserError, plugin
 
 from ._phases import check_pairs, from_lines
 
@@ -28,7 +28,7 @@ class LineVoltages(Connection):
 
     def check(self) -> None:
         if len(self.pairs) != 3:
-            raise UserError(f"data.connection.pairs={self.pairs} must be three pairs of phases, e.g. [ab, bc, ca]")
+            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be three pairs of phases, e.g. [ab, bc, ca]")
         check_pairs("data.connection.pairs", self.pairs)
 
     def voltage(self) -> np.ndarray:

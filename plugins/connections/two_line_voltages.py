@@ -4,7 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import Connection, UserError, plugin
+from tractexp.extend import DATA, Connection, UserError, plugin
 
 from ._phases import check_pairs, check_two, from_lines, from_two
 
@@ -29,7 +29,7 @@ class TwoLineVoltages(Connection):
 
     def check(self) -> None:
         if len(self.pairs) != 2:
-            raise UserError(f"data.connection.pairs={self.pairs} must be two pairs of phases, e.g. [ab, bc]")
+            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be two pairs of phases, e.g. [ab, bc]")
         check_pairs("data.connection.pairs", self.pairs)
         if self.phases != "abc":
             check_two("data.connection.phases", self.phases)

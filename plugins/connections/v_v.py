@@ -4,7 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import UserError, plugin
+from tractexp.extend import DATA, UserError, plugin
 
 from ._arms import _Arms
 from ._phases import check_pairs, line
@@ -28,7 +28,7 @@ class VV(_Arms):
     def check(self) -> None:
         super().check()
         if len(self.pairs) != 2:
-            raise UserError(f"data.connection.pairs={self.pairs} must be two pairs of phases, of alpha and beta")
+            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be two pairs of phases, of alpha and beta")
         check_pairs("data.connection.pairs", self.pairs)
 
     def rows(self) -> np.ndarray:

@@ -24,8 +24,8 @@ def opened(eq, level, delay, wait, margin, ramp, stage=""):
     returns = eq.define(f"relay_returns{stage}", high * gate(above - wait, TIME * eq.step), f"g_{{-{then}}}")
     eq.renews(below, low * (below + eq.step), 0)
     eq.renews(above, high * (above + eq.step), 0)
-    left = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
-    eq.renews(tripped, left + (1 - left) * goes, 0)
+    remaining = sympy.Max(0, tripped - returns * eq.step / (ramp + eq.step))
+    eq.renews(tripped, remaining + (1 - remaining) * goes, 0)
     return tripped
 
 

@@ -35,6 +35,6 @@ class ConstantPowerConverter(Effect):
     def edit(self, eq, converter_share, current_limit, control_delay):
         held = lambda u: smaller(1, u / current_limit, WIDTH)  # noqa: E731
         u = eq[sites.static_voltage]
-        seen = seen_late(eq, u, control_delay)
-        power = eq.P_s0 * held(seen) / held(1) * u / seen
+        delayed = seen_late(eq, u, control_delay)
+        power = eq.P_s0 * held(delayed) / held(1) * u / delayed
         eq.edit(sites.P_static, lambda P: (1 - converter_share) * P + converter_share * power)

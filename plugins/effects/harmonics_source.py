@@ -47,9 +47,9 @@ class HarmonicsSource(Measurement):
             inverse = np.linalg.pinv(basis[first:last])  # (2 H + 1, W)
             basis[:last] = 0.0
             compared = drive.weights[:, part].any(axis=1)
-            left = drive.measured[compared, None, part.start + first : part.start + last]
-            left = left - power[compared, :, part.start + first : part.start + last]
-            out[compared, :, part] += values["harmonics"][e][:, None] * (left @ inverse.T @ basis.T)
+            residual = drive.measured[compared, None, part.start + first : part.start + last]
+            residual = residual - power[compared, :, part.start + first : part.start + last]
+            out[compared, :, part] += values["harmonics"][e][:, None] * (residual @ inverse.T @ basis.T)
         return out
 
     @staticmethod

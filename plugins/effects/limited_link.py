@@ -39,8 +39,8 @@ class LimitedLink(Effect):
 
     def edit(self, eq, link_share, link_time, link_storage, link_most):
         u, v = eq[sites.static_voltage], eq.lag("link_voltage", "v_l")
-        asked = 1 + link_storage / link_time * (1 - v)
-        current = eq.define("link_current", smaller(asked, link_most, WIDTH) / smaller(1, link_most, WIDTH), "i_l")
+        demand = 1 + link_storage / link_time * (1 - v)
+        current = eq.define("link_current", smaller(demand, link_most, WIDTH) / smaller(1, link_most, WIDTH), "i_l")
         square = lambda v: v**2 / larger(v**2, EMPTY**2, WIDTH)  # noqa: E731
         eq.moves(v, (u * current - square(v) / square(1)) / (link_storage * larger(v, 0.1, WIDTH)), 1)
         drawn = eq.P_s0 * u * current

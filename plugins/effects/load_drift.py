@@ -39,8 +39,8 @@ class LoadDrift(Measurement):
                 drifted(power[:, :, part], rows["t"], rate, out[:, :, part])
                 continue
             turn, drawn = rows["turn_re"] + 1j * rows["turn_im"], power[:, :, part]
-            seen = (drawn[0] + 1j * drawn[1]) * np.conj(turn)
+            rotating = (drawn[0] + 1j * drawn[1]) * np.conj(turn)
             P, Q = rate[:, :, None] * rows["t"]
-            seen = turn * (seen + P * seen.real + 1j * Q * seen.imag)
-            out[0, :, part], out[1, :, part], out[2, :, part] = seen.real, seen.imag, drawn[2]
+            rotating = turn * (rotating + P * rotating.real + 1j * Q * rotating.imag)
+            out[0, :, part], out[1, :, part], out[2, :, part] = rotating.real, rotating.imag, drawn[2]
         return out

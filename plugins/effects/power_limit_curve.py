@@ -52,9 +52,9 @@ class PowerLimitCurve(Effect):
     def edit(self, eq, curve_limited, curve_full, curve_off, curve_time, limit_bend, limit_rest):
         allowed = lambda x: _allowed(x, curve_full, curve_off, limit_bend, limit_rest)  # noqa: E731
         u = eq[sites.static_voltage]
-        seen = eq.lag("measured_voltage", "x_u")
-        eq.moves(seen, (u - seen) / curve_time, 1)
-        power = eq.P_s0 * eq.define("power_allowed", allowed(seen) / allowed(1), "m") * u / seen
+        voltage = eq.lag("measured_voltage", "x_u")
+        eq.moves(voltage, (u - voltage) / curve_time, 1)
+        power = eq.P_s0 * eq.define("power_allowed", allowed(voltage) / allowed(1), "m") * u / voltage
         eq.edit(sites.P_static, lambda P: (1 - curve_limited) * P + curve_limited * power)
 
     def curve(self, curve_limited, curve_full, curve_off, curve_time, limit_bend, limit_rest):

@@ -36,6 +36,6 @@ class StaticVarCompensator(Effect):
         import sympy
 
         x = eq.lag("compensation", "x_c")
-        asked = compensator_gain * (eq.U0 - eq.U)
-        eq.moves(x, (sympy.Max(-1, sympy.Min(1, asked)) - x) / compensator_time, 0)
+        order = compensator_gain * (eq.U0 - eq.U)
+        eq.moves(x, (sympy.Max(-1, sympy.Min(1, order)) - x) / compensator_time, 0)
         eq.consume(0, -compensator * x * (eq.U / eq.U0) ** compensator_exponent)

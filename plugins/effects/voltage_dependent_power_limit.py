@@ -36,6 +36,6 @@ class VoltageDependentPowerLimit(Effect):
     def edit(self, eq, limited_share, full_level, off_level, limit_delay):
         allowed = lambda u: ramp((u - off_level) / (full_level - off_level), WIDTH)  # noqa: E731
         u = eq[sites.static_voltage]
-        seen = seen_late(eq, u, limit_delay)
-        power = eq.P_s0 * allowed(seen) / allowed(1) * u / seen
+        delayed = seen_late(eq, u, limit_delay)
+        power = eq.P_s0 * allowed(delayed) / allowed(1) * u / delayed
         eq.edit(sites.P_static, lambda P: (1 - limited_share) * P + limited_share * power)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.extend import Estimator, UserError, plugin
+from tractexp.extend import DATA, Estimator, UserError, plugin
 
 # {nominal frequency [Hz]: {reporting rate [1/s]: (reference frequency F_fr [Hz], order N at 16 samples a cycle)}}
 FILTERS = {
@@ -33,7 +33,7 @@ class MClass(Estimator):
         supported = sorted({rate for table in FILTERS.values() for rate in table})
         if self.reporting is not None and self.reporting not in supported:
             rates = ", ".join(map(str, supported))
-            raise UserError(f"data.estimator.reporting={self.reporting} is none of the standard's rates: {rates}")
+            raise UserError(f"{DATA.estimator}.reporting={self.reporting} is none of the standard's rates: {rates}")
 
     def filter(self, nominal: float) -> tuple[float, float]:
         """F_fr [Hz] and the window's length [s]; raises `UserError` where the standard has none."""
@@ -42,7 +42,7 @@ class MClass(Estimator):
         if rate not in table:
             rates = f": {', '.join(map(str, table))}" if table else ""
             raise UserError(
-                f"data.estimator=m_class: the standard has no M-class filter for {rate} phasors a second at "
+                f"{DATA.estimator}=m_class: the standard has no M-class filter for {rate} phasors a second at "
                 f"{nominal:g} Hz{rates}; choose another estimator, e.g. one_cycle"
             )
         reference, order = table[rate]

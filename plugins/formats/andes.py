@@ -76,11 +76,11 @@ class Andes(Format):
         python = sys.executable if importlib.util.find_spec("andes") else os.environ.get("TRACTEXP_ANDES_PYTHON")
         if not python:
             return None
-        told = {"step": STEP, "frequency": load.result.before["frequency"], "voltage": dip(STEP).tolist()}
-        found = respond(python, text, told)
-        speed = np.gradient(found["angle"], STEP, edge_order=2)
-        P, Q = (SYSTEM / load.power * found[power] for power in "PQ")
-        return Simulated(f"ANDES {found['version']}", STEP, found["U"], speed, P, Q)
+        dip_settings = {"step": STEP, "frequency": load.result.before["frequency"], "voltage": dip(STEP).tolist()}
+        response = respond(python, text, dip_settings)
+        speed = np.gradient(response["angle"], STEP, edge_order=2)
+        P, Q = (SYSTEM / load.power * response[power] for power in "PQ")
+        return Simulated(f"ANDES {response['version']}", STEP, response["U"], speed, P, Q)
 
     def _motor(self, load):
         c = load.circuit
@@ -110,7 +110,7 @@ class Andes(Format):
         return {"PQ": [pq], "ZIP": [{"idx": "law", "pq": "static", **{k: 100.0 * v for k, v in named.items()}}]}
 
 
-def respond(python, tables, told):
+def respond(python, tables, settings):
     """What ANDES has the load of these tables draw along a dip: U, angle, P, Q (N,), P and Q on its base.
 
     Raises `UserError` where it fails.
@@ -119,7 +119,7 @@ def respond(python, tables, told):
 
     with tempfile.TemporaryDirectory() as folder, contextlib.ExitStack() as stack:
         target = Path(folder) / "response.npz"
-        case = json.dumps([json.loads(tables), told])
+        case = json.dumps([json.loads(tables), settings])
         program = Path(__file__).with_name("_andes_run.py").read_text(encoding="utf-8")
         try:
             GENERATED.mkdir(exist_ok=True)

@@ -53,10 +53,10 @@ class Modelica(Format):
         return "\n".join(lines) + "\n"
 
     def read_back(self, text, load):
-        told = {name: float(value) for name, value in re.findall(r"parameter Real (\w+) = ([-+.\de]+) ", text)}
+        numbers = {name: float(value) for name, value in re.findall(r"parameter Real (\w+) = ([-+.\de]+) ", text)}
         model = {key: load.result.model[key] for key in ("motor", "static", "effects", "integration")
                  if key in load.result.model}  # fmt: skip
-        parameters = {p.name: told[p.name] for p in load.model.parameters}
+        parameters = {p.name: numbers[p.name] for p in load.model.parameters}
         static = load.before.get("P_static", 0.0), load.before.get("Q_static", 0.0)
         return Restored(model, parameters, static)
 

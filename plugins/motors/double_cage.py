@@ -72,16 +72,16 @@ class DoubleCage(Motor):
         first, second = X_prime * C, X_prime - X_second  # X - X' over X/X', and X' - X''
         slip = T_m * X_prime**2 / eq.U0**2 / (first * T_prime + second * open_second * (1 - C) ** 2)
 
-        def seen(k, slip):
+        def impedance(k, slip):
             """What both cages put in a slip's way, and R + jX of the motor there."""
             n_1, n_2 = (1 - C) ** 2 + (slip * T_prime) ** 2, 1 + (slip * open_second) ** 2
             R = eq.define(f"R_{k}", slip * (first * T_prime / n_1 + second * open_second / n_2), f"R_{k}")
             return n_1, n_2, R, eq.define(f"X_{k}", X_second + first * (1 - C) / n_1 + second / n_2, f"X_{k}")
 
-        n_1, n_2, R, X = seen(0, slip)
+        n_1, n_2, R, X = impedance(0, slip)
         for k in range(3):
             slip = eq.define(f"slip_{k}", slip * T_m * (R**2 + X**2) / (eq.U0**2 * R), f"s_{k}")
-            n_1, n_2, R, X = seen(k + 1, slip)
+            n_1, n_2, R, X = impedance(k + 1, slip)
         current = eq.U0 * (R - I * X) / (R**2 + X**2)
         E_0 = I * first * current * (1 - C - I * slip * T_prime) / n_1
         return E_0, I * second * current * (1 - I * slip * open_second) / n_2, slip

@@ -112,6 +112,6 @@ class LineSideConverter(Motor):
         low = (z - sqrt(z**2 + CORNER**2) + CORNER) / 2  # the smaller of z and 0, and 0 where z is
         load = eq.define("inverters", 1 + self.weakening * low, "P_l/P_{l0}")
         eq.moves(z, (re(u_c * conjugate(i)) - wanted * load) / dc_link, 0)
-        asked = eq.define("current_asked", eq.U0 / u_f * load - dc_bandwidth * dc_link * z / P_c, "h^*/h_0")
-        given = lambda a: a + current_limit - sqrt((a - current_limit) ** 2 + CORNER**2)  # noqa: E731
-        return eq.define("current_reference", i_0 * given(asked) / given(1) * e, "h e")
+        reference = eq.define("current_asked", eq.U0 / u_f * load - dc_bandwidth * dc_link * z / P_c, "h^*/h_0")
+        limited = lambda a: a + current_limit - sqrt((a - current_limit) ** 2 + CORNER**2)  # noqa: E731
+        return eq.define("current_reference", i_0 * limited(reference) / limited(1) * e, "h e")

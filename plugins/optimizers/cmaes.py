@@ -42,7 +42,7 @@ class CMAES(Iterative):
         cma = _pycma()
         population = self.population or 4 + int(3 * np.log(box.dimension))
         _, steps = self.laid_out(evaluate.budget, 0, population)
-        left = iter(steps)
+        remaining = iter(steps)
         for restart in range(self.restarts + 1):
             settings = {
                 "bounds": [0.0, 1.0],
@@ -52,7 +52,7 @@ class CMAES(Iterative):
                 "verbose": -9,
             }
             strategy = cma.CMAEvolutionStrategy(rng.random(box.dimension), self.sigma, settings)
-            while not strategy.stop() and next(left, None) is not None:
+            while not strategy.stop() and next(remaining, None) is not None:
                 points = strategy.ask()
                 strategy.tell(points, evaluate(box.from_unit(np.array(points)))[1])
                 yield

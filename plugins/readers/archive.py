@@ -3,7 +3,7 @@
 from dataclasses import field
 from pathlib import Path
 
-from tractexp.extend import Events, Reader, UserError, check_distinct, plugin
+from tractexp.extend import DATA, Events, Reader, UserError, check_distinct, plugin
 from tractexp.extend.files import records, survey_of
 
 
@@ -27,15 +27,15 @@ class Archive(Reader):
 
     def check(self) -> None:
         if not self.path:
-            raise UserError("data.path is missing: give the folder of the recordings, e.g. data.path=recordings")
+            raise UserError(f"{DATA.path} is missing: give the folder of the recordings, e.g. {DATA.path}=recordings")
 
     def read(self) -> Events:
         if not self.train:
             raise UserError(
-                f"data.train is empty: name events of {self.path} as FILE#LOAD.DIP; a survey lists them:"
+                f"{DATA.train} is empty: name events of {self.path} as FILE#LOAD.DIP; a survey lists them:"
                 f" {survey_of(self.path)}"
             )
-        check_distinct("data.train and data.validate", [*self.train, *self.validate])
+        check_distinct(f"{DATA.train} and {DATA.validate}", [*self.train, *self.validate])
         folder = Path(self.path)
-        dips = records(folder, [*self.train, *self.validate], "data.train and data.validate")
+        dips = records(folder, [*self.train, *self.validate], f"{DATA.train} and {DATA.validate}")
         return Events(dips[: len(self.train)], dips[len(self.train) :])

@@ -4,7 +4,7 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp.extend import Base, Events, Reader, Record, UserError, check_range, plugin
+from tractexp.extend import DATA, Base, Events, Reader, Record, UserError, check_range, plugin
 from tractexp.extend.files import (
     DECLARATION,
     LOAD,
@@ -82,12 +82,12 @@ class CSV(Tabular, Reader):
         if self.path:
             self._check_numbers()
         elif not self.train:
-            raise UserError("data.train is empty: name at least one CSV file to fit, e.g. data.train=[dip.csv]")
-        seen: set[str] = set()
+            raise UserError(f"{DATA.train} is empty: name at least one CSV file to fit, e.g. {DATA.train}=[dip.csv]")
+        files: set[str] = set()
         for path in [] if self.path else map(str, (*self.train, *(self.validate or []))):
-            if path in seen:
-                raise UserError(f"data.train and data.validate name '{path}' twice; a record may serve only once")
-            seen.add(path)
+            if path in files:
+                raise UserError(f"{DATA.train} and {DATA.validate} name '{path}' twice; a record may serve only once")
+            files.add(path)
         limits = {"base_voltage": SIZES["voltage"], "base_power": SIZES["power"], "frequency": SIZES["frequency"]}
         for key, allowed in (limits | {"pre": (0.05,), "post": (0.1,)}).items():
             value = getattr(self, key)
@@ -99,8 +99,8 @@ class CSV(Tabular, Reader):
         for each in (*self.train, *(self.validate or [])):
             if not isinstance(each, int) or isinstance(each, bool):
                 raise UserError(
-                    f"data.path={self.path} is given, so data.train and data.validate are numbers of its dips, and "
-                    f"'{each}' is none; leave data.path out to read whole files"
+                    f"{DATA.path}={self.path} is given, so {DATA.train} and {DATA.validate} are numbers of its dips, "
+                    f"and '{each}' is none; leave {DATA.path} out to read whole files"
                 )
         check_numbers(self.train or None, self.validate)
 
@@ -164,8 +164,8 @@ class CSV(Tabular, Reader):
         power = self.base_power or (sidecar.base and sidecar.base.power) or (same and same.power)
         if voltage is None and power is None and quantities.absolute["U"] and quantities.absolute["P"] is None:
             raise UserError(
-                f"{record.where}: U is in kV, and the unit of P and Q is not told; say data.units={{P: MW, Q: Mvar}} "
-                "or data.units={P: pu, Q: pu}, or the base, data.base_voltage and data.base_power"
+                f"{record.where}: U is in kV, and the unit of P and Q is not told; say {DATA.units}={{P: MW, Q: Mvar}} "
+                f"or {DATA.units}={{P: pu, Q: pu}}, or the base, {DATA.base_voltage} and {DATA.base_power}"
             )
         chosen_by = None if self.base_power else sidecar.base or same
         origin = chosen_by.origin if chosen_by else DECLARATION
@@ -175,7 +175,7 @@ class CSV(Tabular, Reader):
             if S < 1e-9:
                 raise UserError(
                     f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
-                    "data.base_power (MVA)"
+                    f"{DATA.base_power} (MVA)"
                 )
             if quantities.absolute["U"]:
                 check_load(record.where, U, S if quantities.absolute["P"] else 0.0)

@@ -4,11 +4,14 @@ import functools
 
 import numpy as np
 import pytest
+from sympy import Piecewise
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
+from tractexp.model.parts import Static
+from tractexp.parameter import Parameter
 from tractexp.plugin import build, get
 from tractexp.record import Record, detect
 
@@ -41,6 +44,35 @@ def test_a_static_load_alone_is_its_formula(static, values, P, Q):
     response = alone(static).simulate(Drive.of([event(VOLTAGES)]), np.array([values]))
     assert response.P[0] == pytest.approx(0.8 * P, rel=1e-11)
     assert response.Q[0] == pytest.approx(0.5 * Q, rel=1e-11)
+
+
+class Dimmed(Static):
+    """Out below a voltage: pieces whose conditions hold the voltage, a parameter, or neither.
+
+    Source: made here.
+    """
+
+    name = "dimmed"
+    parameters = (Parameter(0.7, (0.4, 0.95), "1", "voltage below which it is out", "made here", name="cut"),)
+
+    def law(self, u, cut):
+        P = Piecewise((0, u < 0.3), ((u - 0.3) / (cut - 0.3), u < cut), (1, True))
+        return P, Piecewise((u, cut > 2), (u**2, True))
+
+
+def test_a_law_in_pieces_is_its_formula():
+    load = compose(get("model/motor", "none")(), Dimmed())
+    response = load.simulate(Drive.of([event(VOLTAGES)]), np.array([[0.7]]))
+    P = np.where(SHARES < 0.3, 0.0, np.where(SHARES < 0.7, (SHARES - 0.3) / 0.4, 1.0))
+    assert response.P[0] == pytest.approx(0.8 * P, rel=1e-11)
+    assert response.Q[0] == pytest.approx(0.5 * SHARES**2, rel=1e-11)
+
+
+@pytest.mark.parametrize("motor", ["electromechanical", "stator_flux", "double_cage"])
+def test_a_law_in_pieces_stands_beside_a_motor(motor):
+    load = compose(get("model/motor", motor)(), Dimmed())
+    values = np.array([[p.default for p in load.parameters]])
+    assert np.isfinite(load.simulate(Drive.of([event(np.full(5, 0.98), P0=1.0)]), values).P).all()
 
 
 def test_the_frequency_exponent_counts_from_the_frequency_before_the_event():

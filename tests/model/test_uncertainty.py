@@ -11,7 +11,9 @@ import uncertainty as study
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 
-from tractexp.identification import agreement
+import tractexp
+from tractexp.identification import advice, agreement
+from tractexp.identification.advice import advise
 from tractexp.identification.agreement import compare_events
 from tractexp.identification.descent import descend
 from tractexp.identification.information import Information
@@ -19,6 +21,7 @@ from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.residual_tests import jarque_bera, ljung_box
+from tractexp.identification.uncertainty import conclude
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
 from tractexp.noise import Noise
 from tractexp.noise.color import Autoregression, fit_autoregression, stretches
@@ -308,6 +311,34 @@ def test_a_fit_at_a_bound_says_so(model):
     assert str(known.verdicts["M"]).startswith(
         "at its bound (0.005; the record asks for a value beyond it: widen model.bounds.M"
     )
+
+
+def test_what_a_requirement_of_the_model_holds_is_not_called_without_effect():
+    """All of P_s of constant impedance: a_I has no room below, and above it a share of constant power is negative."""
+    load = tractexp.compose({"motor": "electromechanical", "static": "zip"}).model
+    problem = Problem(load, records((0.5,), 0.002))
+    values = np.array([{"a_Z": 1.0, "a_I": 0.0}.get(p.name, p.default) for p in load.parameters])
+    likelihood = Likelihood.of(problem, Noise.white(0.003, 0.003))
+    known = conclude(likelihood, likelihood.to_unit(values)[0])
+    assert known.information.held == ("a_I",)
+    assert str(known.verdicts["a_I"]).endswith(
+        "a requirement of the model holds it there: beside it there is no steady state"
+    )
+    assert not any("requirement" in str(v) for name, v in known.verdicts.items() if name != "a_I")
+    sentences = advise(known, SimpleNamespace(grade=None))
+    assert any(sentence.startswith("fix a_I by model.fixed: a requirement") for sentence in sentences)
+    assert not any("does not change with it" in sentence for sentence in sentences)
+
+
+def test_where_every_depth_would_do_any_dip_is_advised(monkeypatch):
+    """Some of them are named by their depths."""
+    known = SimpleNamespace(names=("M",), lower=[0.0], upper=[1.0], values=[0.5])
+    monkeypatch.setattr(advice, "_goal", lambda *_: (0.1, []))
+    told = [
+        advice._further(known, 0, [SimpleNamespace(half=[h], shape=SimpleNamespace(depth=d)) for h, d in plan], "more")
+        for plan in ([(0.05, 0.2), (0.05, 0.4)], [(0.5, 0.2), (0.05, 0.4)])
+    ]
+    assert [line.partition(" more")[0] for line in told] == ["for M: any further dip", "for M: a further dip of 40 %"]
 
 
 def test_gaps_cost_precision_and_nothing_else(model):

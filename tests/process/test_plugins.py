@@ -261,6 +261,12 @@ def test_a_plugin_without_a_source_is_refused():
             """No origin."""
 
 
+def test_python_without_docstrings_is_told_from_a_plugin_without_a_source():
+    done = subprocess.run([sys.executable, "-OO", "-m", "tractexp", "--cfg", "job"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert done.stderr.endswith("run without -OO\n")
+
+
 def test_a_plugin_without_the_method_that_its_base_leaves_to_it_is_refused():
     with pytest.raises(UserError, match="lacks what every plugin of group 'optimizer' must do: define search"):
 
@@ -318,6 +324,7 @@ def effect(edit, **attributes):
         (load(lambda self, u: (1, 1), p_v=replace(PLAIN)), r"law\(\) does not take the parameter 'p_v'"),
         (load(lambda self, p_v: (1, 1), p_v=replace(PLAIN)), r"law\(\) must take u first"),
         (load(lambda self, u, *p: (1, 1), p_v=replace(PLAIN)), r"by name, so it cannot take \*p"),
+        (load(lambda self, u, f: (f, 1)), r"law\(\) asks for the frequency, f, .* say reads = \('f',\)"),
         (load(lambda self, u: (1, 1), reads=("frequency",)), "reads names the channel 'frequency'"),
         (load(lambda self, u, _c: (1, 1), _c=replace(PLAIN)), "called '_c': that is no name of Python's"),
         (load(lambda self, u, U0: (1, 1), U0=replace(PLAIN)), "called 'U0': the equations give that name"),

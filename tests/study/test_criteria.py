@@ -190,7 +190,7 @@ def test_a_looser_criterion_decides_otherwise(name):
 def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
     with pytest.raises(UserError, match=r"criteria\.adequatep: there is no such criterion; did you mean 'adequate_p'"):
         Criteria.of({"adequatep": 0.1})
-    with pytest.raises(UserError, match=r"criteria\.false_alarms=0\.7 is out of range: .* at most 0\.5"):
+    with pytest.raises(UserError, match=r"task\.false_alarms=0\.7 is out of range: .* at most 0\.5"):
         Criteria(false_alarms=0.7)
 
 

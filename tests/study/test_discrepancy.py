@@ -432,7 +432,7 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
-    monkeypatch.setattr(surprises, "statistics", lambda channels, layout: {})
+    monkeypatch.setattr(surprises, "statistics", lambda channels, problem: {})
     projection = SimpleNamespace(
         variance_component=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
         split=np.ones((1, 3)),
@@ -697,7 +697,7 @@ def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted, monkeypatch
     from tractexp.discrepancy import cores
 
     bench = planted.context
-    wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.power)
+    wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.problem.power)
     noise = replace(planted.last.noise, mix=np.eye(2), random_walk=wander)
     residuals = np.random.default_rng(1).normal(size=(150, *bench.valid.shape))
     rows = []

@@ -9,8 +9,15 @@ from test_discrepancy import base, events
 
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.recorder_window import RecorderWindow, window_mean, windows_of
+from tractexp.discrepancy.recorder_window import RecorderWindow, windows_of
 from tractexp.plugin import chosen
+from tractexp.record.window import average
+
+
+def mean(y, samples):
+    """Mean of y (..., N) over a recorder's window around each sample."""
+    return average(y, RecorderWindow(samples).weights(1.0))
+
 
 FEW = ("stator_resistance", "exponential_recovery", "second_motor_group")
 
@@ -24,19 +31,19 @@ def test_the_average_is_the_integral_over_the_window(samples):
         low, high = at - samples / 2, at + samples / 2
         knots = np.arange(np.ceil(low), np.ceil(high))
         area, _ = quad(curve, low, high, points=knots, limit=200)
-        assert window_mean(y, samples)[at] == pytest.approx(area / samples, abs=1e-10)
+        assert mean(y, samples)[at] == pytest.approx(area / samples, abs=1e-10)
 
 
 def test_a_straight_line_is_its_own_average():
     y = np.outer([1.0, -2.0], np.arange(50))
-    assert window_mean(y, 12.3)[:, 8:-8] == pytest.approx(y[:, 8:-8])
+    assert mean(y, 12.3)[:, 8:-8] == pytest.approx(y[:, 8:-8])
 
 
 @pytest.mark.parametrize("cycles", [1, 2, 4])
 def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
     (event,) = events(count=1)
     step, window = event.record.step, 0.02 * cycles
-    shown = replace(event, record=replace(event.record, U=window_mean(event.record.U, window / step)))
+    shown = replace(event, record=replace(event.record, U=mean(event.record.U, window / step)))
     back = RecorderWindow(window).sharpened(shown).record.U
     shows, error = shown.record.U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01

@@ -5,10 +5,9 @@ import itertools
 import numpy as np
 import pytest
 
-from tractexp.api.read import event_from_dict, event_to_dict
+from tractexp.api.read import record_from_dict, record_to_dict
 from tractexp.errors import UserError
 from tractexp.plugin import chosen
-from tractexp.record import detect
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording import Channel, Feeder, Recording, Segment
 from tractexp.recording.measure import phasors_of
@@ -231,8 +230,8 @@ def test_one_voltage_and_one_current_make_a_record(monkeypatch):
     assert record.window.name == "p_class"
     assert set(record.more) == {"P_3", "P_H", "THD_u", "THD_i"}
     assert any("p-class phasors every 1 ms" in note for note in record.notes)
-    told = event_to_dict(detect(record))
-    back = event_from_dict(told).record
+    told = record_to_dict(record)
+    back = record_from_dict(told)
     assert back.window.to_dict() == record.window.to_dict()
     assert back.more["THD_u"].tolist() == record.more["THD_u"].tolist()
 

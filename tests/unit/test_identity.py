@@ -7,7 +7,7 @@ import numpy as np
 import tractexp
 from tractexp.api.setup import recorded
 from tractexp.record import Base, Record, detect
-from tractexp.record.identity import UNKNOWN, Identity, distinct, label, title
+from tractexp.record.identity import UNKNOWN, Identity, described, distinct, label, title
 from tractexp.record.record import LOAD
 
 SOURCE = {
@@ -45,6 +45,15 @@ def test_a_base_that_nobody_told_is_said_to_be_unknown():
     told = str(Identity.at(record(base=Base(), identity={}, source="dip.csv")))
     assert told == f"dip.csv; {UNKNOWN}"
     assert str(Identity.at(record(base=Base(), identity={}, source=""))) == ""
+
+
+def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns():
+    known = Identity.at(record())
+    one, other = (Identity.at(record(base=Base(), identity={}, source=f"{name}.csv")) for name in "ab")
+    assert described([one, one]) == [f"a.csv; {UNKNOWN}"]
+    assert described([one, other]) == ["a.csv", "b.csv", f"{UNKNOWN} of each"]
+    assert described([one, known, other])[-1] == f"{UNKNOWN} of a.csv, b.csv"
+    assert described([known, one]) == [str(known.recording), str(one)]
 
 
 def test_dips_of_one_recording_are_one_load():

@@ -3,7 +3,6 @@
 import dataclasses
 import functools
 import inspect
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ParamSpec, TypeVar, get_type_hints
@@ -11,21 +10,19 @@ from typing import Any, ParamSpec, TypeVar, get_type_hints
 from tractexp import plugin
 from tractexp.choices import defaults
 from tractexp.composition import read_choice
-from tractexp.errors import UserError, among, check_distinct
+from tractexp.errors import UserError, among, check_distinct, settings_as
 from tractexp.kinds import check_kind
+from tractexp.outcome import Plain
 
 P = ParamSpec("P")
 R = TypeVar("R")
-
-SECTIONS = "task|model|data"  # of the configuration, whose keys the arguments of a call are
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
     """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one sentence.
 
-    Sentences from below name keys of the configuration (`model.bounds.C`); here they name the arguments (`bounds.C`),
-    and the call where they name the task.
-    The command line, whose keys they are, calls the function without this door (`inspect.unwrap`).
+    Sentences from below name a setting as the user wrote it: the argument (`bounds.C`) of this call, and the key of the
+    configuration (`model.bounds.C`) on the command line, which calls the function without this door (`inspect.unwrap`).
     """
     signature = inspect.signature(function)
     named = [p.name for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
@@ -37,27 +34,21 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             if name not in named and not open_ended:
                 raise UserError(f"{where} has no argument '{name}'{among(name, named, 'Arguments')}")
         try:
-            given = signature.bind(*args, **keywords).arguments
+            arguments = signature.bind(*args, **keywords).arguments
         except TypeError as error:
             raise UserError(f"{where}: {error}; Arguments: {', '.join(named)}") from None
-        for name, value in given.items():
+        for name, value in arguments.items():
             parameter = signature.parameters[name]
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 check_kind(name, value, parameter.annotation)
-        try:
+        with settings_as(function.__name__, lambda: {*named, *keywords, *(_settings("data") if open_ended else ())}):
             return function(*args, **keywords)
-        except UserError as error:
-            keys = "|".join([*named, *keywords, *(_settings("data") if open_ended else ())])
-            sentence = str(error).replace("data.train", "records") if "records" in named else str(error)
-            sentence = re.sub(rf"\btask={function.__name__}\b", where, sentence)
-            sentence = re.sub(rf"\b(?:{SECTIONS})\.(?=(?:{keys})\b)", "", sentence)
-            raise UserError(sentence) from error.__cause__
 
     return called
 
 
 @dataclass(frozen=True)
-class Choice:
+class Choice(Plain):
     """What is chosen in a group: the name of the choice, and the plugin's name and settings it stands for."""
 
     name: str

@@ -12,8 +12,8 @@ from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
 from tractexp.choices import choices, defaults, replaced
 from tractexp.composition import read_choice
-from tractexp.errors import UserError, among, check_choice
-from tractexp.outcome import Tabulated
+from tractexp.errors import UserError, among, check_choice, setting
+from tractexp.outcome import Plain, Tabulated
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
@@ -30,7 +30,7 @@ class Portable:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadModel(Portable, Tabulated):
+class LoadModel(Portable, Plain, Tabulated):
     """A load model as a call takes it. Prints its parameters; in a notebook its equations, too."""
 
     motor: Mapping[str, Any]  # name and settings of the plugin
@@ -70,11 +70,11 @@ class LoadModel(Portable, Tabulated):
 
     def with_(self, **changes: Any) -> "LoadModel":
         """The model with what is given (not None) in place; bounds and fixed values are added to those there are."""
-        given = {key: value for key, value in changes.items() if value is not None}
+        settings = {key: value for key, value in changes.items() if value is not None}
         for key in ("bounds", "fixed"):
-            if key in given:
-                given[key] = {**getattr(self, key), **given[key]}
-        return replace(self, **given)
+            if key in settings:
+                settings[key] = {**getattr(self, key), **settings[key]}
+        return replace(self, **settings)
 
     def fitting(self, events: Sequence["Event"]) -> "LoadModel":
         """The model with the effects that some of the events show, where it is one of `shown_effects`."""
@@ -133,11 +133,11 @@ def compose(
     parts = {
         part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
     }
-    given = {
+    settings = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
         "priors": priors, "shown_effects": shown_effects,
     }  # fmt: skip
-    composed = composed.with_(bounds=bounds, fixed=fixed, **given, **parts)
+    composed = composed.with_(bounds=bounds, fixed=fixed, **settings, **parts)
     _ = composed.parameters
     for key in composed.fixed:
         if key not in composed.parameters:
@@ -177,7 +177,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     keys = [f.name for f in dataclasses.fields(LoadModel)]
     for key in given:
         if key not in keys:
-            raise UserError(f"model.{key}: there is no such key{among(key, keys, 'Keys')}")
+            raise UserError(f"{setting(f'model.{key}')}: there is no such key{among(key, keys, 'Keys')}")
     if missing := [part for part in PARTS if not given.get(part)]:
         raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
     composed: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}

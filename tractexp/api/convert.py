@@ -10,7 +10,7 @@ from tractexp.api.read import GROUP, node_of
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
-from tractexp.errors import UserError, check_choice
+from tractexp.errors import TASK, UserError, check_choice
 from tractexp.filetypes.tidy import unique
 from tractexp.outcome import Tabulated
 from tractexp.plugin import build, discover, plugin
@@ -73,7 +73,9 @@ def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
         check_choice("task.what", what, WHAT)
     waves = isinstance(reader, WaveformReader)
     if what == WHAT[0] and not waves:
-        raise UserError("task.what=recording: the file holds U, P, Q, no recording of waveforms; use task.what=events")
+        raise UserError(
+            f"{TASK.what}=recording: the file holds U, P, Q, no recording of waveforms; use {TASK.what}=events"
+        )
     if waves and what in (None, WHAT[0]):
         return [(Path(reader.path).stem, reader.recording())]
     read = reader.read()
@@ -107,7 +109,7 @@ def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, An
         kind = type(source).__name__
         raise UserError(f"a value of type {kind} cannot be converted; give a file, or events as tractexp.read gives")
     if settings or what == WHAT[0]:
-        reason = ", ".join(settings) or "task.what=recording"
+        reason = ", ".join(settings) or f"{TASK.what}=recording"
         raise UserError(f"{reason}: events are taken as they are; give the file, whose recording or settings are meant")
     record = source.record if isinstance(source, Event) else source
     return [(record.name, record)]

@@ -6,9 +6,9 @@ and `Investigation.write_results`.
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,7 +22,7 @@ from tractexp.api.setup import Given, recorded
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
-from tractexp.errors import UserError, check_range
+from tractexp.errors import MODEL, UserError, check_range
 from tractexp.identification.result import Result
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
@@ -30,7 +30,6 @@ from tractexp.progress import Progress, console, say, telling
 from tractexp.wording import joined, shown_in_words, with_error
 
 if TYPE_CHECKING:
-    from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import Findings as Steps
 
 
@@ -235,17 +234,6 @@ class Investigation(Written):
 
         return discrepancy.report(self.steps, self.content, self.result.identities)
 
-    def to_dict(self) -> dict[str, Any]:
-        return {"question": self.question.to_dict(), "content": dict(self.content), "result": asdict(self.result)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(
-            Question.from_dict(content["question"]),
-            content["content"],
-            Result.of(content["result"], "the saved result"),
-        )
-
     def write_results(self, folder: Path) -> list[Path]:
         """discrepancy.json and result.json.
 
@@ -302,23 +290,25 @@ def investigate(
     Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
     values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.
     """
+    from tractexp.discrepancy.criteria import Criteria
+
     check_range("seed", seed, 0)
-    chosen = {"false_alarms": false_alarms, **(criteria or {})}
-    _criteria(chosen)
+    thresholds = Criteria.of({"false_alarms": false_alarms, **(criteria or {})})
     base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
-        raise UserError(f"model.per_event={list(base.per_event)} has no meaning in an investigation; leave it out")
+        raise UserError(f"{MODEL.per_event}={list(base.per_event)} has no meaning in an investigation; leave it out")
     train, held = dips_together(records, validate)
     base = base.fitting(train)
     question = Question(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
-        false_alarms=chosen["false_alarms"], criteria=dict(criteria or {}),
+        false_alarms=thresholds.false_alarms, criteria=dict(criteria or {}),
     )  # fmt: skip
     return _concluded(question, _steps(question, progress))
 
 
 def _steps(question: Question, progress: Progress) -> "Steps":
     """The investigation."""
+    from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import investigate as found
 
     q, base = question, question.model
@@ -326,22 +316,11 @@ def _steps(question: Question, progress: Progress) -> "Steps":
         if base.shown:
             tell(shown_in_words(base.shown))
         if base.priors:
-            tell("model.priors holds no fit of an investigation, which judges by the records alone")
+            tell(f"{MODEL.priors} holds no fit of an investigation, which judges by the records alone")
         return found(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
-            criteria=_criteria({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
+            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
         )  # fmt: skip
-
-
-def _criteria(chosen: Mapping[str, float]) -> "Criteria":
-    """The thresholds. Raises `UserError`, as the command line names them, for an unknown one or one out of range."""
-    from tractexp.discrepancy.criteria import Criteria
-
-    try:
-        return Criteria.of(chosen)
-    except UserError as error:
-        whole = str(error).replace("criteria.false_alarms", "task.false_alarms")
-        raise UserError(whole if whole.startswith("task.") else f"task.{whole}") from None
 
 
 def _concluded(question: Question, steps: "Steps") -> Investigation:

@@ -1,16 +1,15 @@
 """Write an identified load for another simulator."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING
 
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Outcome
 from tractexp.plugin import build, plugin
 from tractexp.progress import say
@@ -47,14 +46,6 @@ class Exported(Outcome):
         report = Report(f"{self.title}, as {self.format}").text(*(f"note: {note}" for note in self.notes), "")
         return report.text(*self.text.splitlines())
 
-    def to_dict(self) -> dict[str, Any]:
-        return {key: getattr(self, key) for key in ("format", "suffix", "title", "text", "notes", "agreement")}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        recorded = {key: content[key] for key in ("format", "suffix", "title", "text")}
-        return cls(**recorded, notes=tuple(content["notes"]), agreement=content.get("agreement"))
-
 
 @public
 def export(
@@ -79,7 +70,7 @@ def export(
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import played
-    from tractexp.record.identity import distinct
+    from tractexp.record.identity import described
 
     for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
         if value is not None:
@@ -87,7 +78,7 @@ def export(
     check_choice("task.base", base, BASES)
     if fit.doubts and not doubtful:
         raise UserError(
-            f"this model is no physical load: {' and '.join(fit.doubts)}; task.doubtful=true exports it all the same"
+            f"this model is no physical load: {' and '.join(fit.doubts)}; {TASK.doubtful}=true exports it all the same"
         )
     own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
     file_power = power or (own.file_power if own.in_mva else POWER)
@@ -100,7 +91,7 @@ def export(
     form.check_parts(identified)
     text = form.text(identified)
     notes = [
-        *filter(None, map(str, distinct(fit.result.identities))),
+        *filter(None, described(fit.result.identities)),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
         _powers(identified),
         *form.notes(identified),
@@ -142,7 +133,9 @@ class Export(Task, call=export, given=("fit",)):
         from tractexp.identification.result import load
 
         if self.parameters is None:
-            raise UserError("task.parameters is not given; it is the path of a result.json, which task=identify writes")
+            raise UserError(
+                f"{TASK.parameters} is not given; it is the path of a result.json, which task=identify writes"
+            )
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)
         path = exported.write(job.folder / f"load{exported.suffix}")

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from tractexp.api.arguments import Choice, public
 from tractexp.api.setup import Setup
 from tractexp.api.task import SEARCH, Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_range
+from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import build, plugin
 from tractexp.progress import Progress, tell
@@ -79,13 +79,6 @@ class Generalised(Written):
         """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
         return {curve["file"]: functools.partial(_draw, curve) for curve in self.curves}
 
-    def to_dict(self) -> dict[str, Any]:
-        return {"residuals": self.residuals, "identified": self.identified, "curves": self.curves}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(content["residuals"], content["identified"], content["curves"])
-
 
 @public
 def generalise(
@@ -120,8 +113,8 @@ def generalise(
     setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
     if not setup.validate:
         raise UserError(
-            "task=generalise needs dips that are not fitted: name them in data.validate, a milder one to"
-            " interpolate and a deeper one to extrapolate"
+            f"{setting('task=generalise')} needs dips that are not fitted: name them in {DATA.validate}, a milder one "
+            "to interpolate and a deeper one to extrapolate"
         )
     chosen = Choice.several("optimizer", optimizers)
     tell(progress, setup.lines())

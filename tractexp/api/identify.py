@@ -17,7 +17,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import Stopped, UserError
 from tractexp.identification.result import Result, by_event
-from tractexp.outcome import Written
+from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
 from tractexp.wording import epsilon, joined
@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
+FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
 MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 
@@ -156,18 +157,18 @@ class Identification(Written):
     def parameters(self) -> Estimates:
         """The estimates by name; a parameter with a value of its own in each event is there as T_m[1], T_m[2], too."""
         r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
-        values, ended, made = by_event(r.parameters, r.per_event), r.search, Estimates()
+        values, ended, estimates = by_event(r.parameters, r.per_event), r.search, Estimates()
         search = by_event(ended["parameters"], ended["per_event"]) if ended else values
         for name, value in values.items():
             of, interval = name.partition("[")[0], r.intervals.get(name)
             without = "mean of its events" if name in r.per_event else FIXED if r.verdicts else ""
             verdict = r.verdicts.get(name, without)
             bounds = tuple(r.bounds.get(of, (float("nan"),) * 2))
-            made[name] = Estimate(
+            estimates[name] = Estimate(
                 name, value, search[name], r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
                 r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
             )  # fmt: skip
-        return made
+        return estimates
 
     @functools.cached_property
     def on_given_base(self) -> Estimates:

@@ -3,18 +3,18 @@
 import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files, provenance
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
-from tractexp.api.read import Dips, dips_of, dips_together, event_from_dict, event_to_dict
+from tractexp.api.read import Dips, dips_of, dips_together
 from tractexp.api.response import Response, response_of
 from tractexp.api.setup import recorded
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import choices, defaults
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import tell
@@ -89,15 +89,6 @@ class NetworkFit(Written):
 
         return linear_network.report(self)
 
-    def to_dict(self) -> dict[str, Any]:
-        events = {"train": list(map(event_to_dict, self.train)), "validate": list(map(event_to_dict, self.validate))}
-        return events | {"domain": self.domain, "order": self.order, "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        train, validate = (Dips(map(event_from_dict, content[key])) for key in ("train", "validate"))
-        return cls(train, validate, content["domain"], content["order"], content["content"])
-
 
 @public
 def linear_network(
@@ -140,8 +131,8 @@ def _fitted(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
         return selection(boxes, train, held_out), boxes
     if len(boxes) <= of.order:
         raise UserError(
-            f"task.poles={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer poles,"
-            " or take a record that goes on longer"
+            f"{TASK.poles}={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer "
+            "poles, or take a record that goes on longer"
         )
     return boxes[-1], boxes
 

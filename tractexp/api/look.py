@@ -231,13 +231,13 @@ def series(shown: Sight) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
 
 
-def event_row(seen: LoadEvent) -> dict[str, Any]:
+def event_row(event: LoadEvent) -> dict[str, Any]:
     """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before."""
-    what = seen.what
+    what = event.what
     return {
         "kind": what.kind, "start": what.start, "end": what.end, "duration": what.end - what.start,
         "depth": what.depth, "jump": what.jump, "U2": what.U2, "P_before": what.before[0], "Q_before": what.before[1],
-        "P_after": what.after[0], "Q_after": what.after[1], "dip": seen.dip, "worth": seen.worth, "why": seen.why,
+        "P_after": what.after[0], "Q_after": what.after[1], "dip": event.dip, "worth": event.worth, "why": event.why,
     }  # fmt: skip
 
 
@@ -302,7 +302,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     return row | {
         "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
         "said": list(shown.said), "command": command(view, shown),
-        "events": [event_row(seen) for seen in shown.events],
+        "events": [event_row(event) for event in shown.events],
     }  # fmt: skip
 
 
@@ -323,7 +323,7 @@ def command(view: View, shown: Sight) -> str:
 
 def waves_serve(view: View, shown: Sight) -> bool:
     """Whether the samples of the dip that is fitted first tell more than its phasors, and can be fitted."""
-    first = next((seen.what for seen in shown.events if seen.worth and seen.dip is not None), None)
+    first = next((event.what for event in shown.events if event.worth and event.dip is not None), None)
     if view.recording is None or first is None:
         return False
     f = view.recording.frequency

@@ -4,12 +4,12 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files
 from tractexp.api.setup import Setup
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError
+from tractexp.errors import MODEL, TASK, UserError, setting
 from tractexp.outcome import Written
 from tractexp.progress import Progress, telling
 from tractexp.record.identity import title_of
@@ -60,14 +60,6 @@ class Recommended(Written):
 
         return next_event.report(self.event, title_of(e.record for e in self.setup.train))
 
-    def to_dict(self) -> dict[str, Any]:
-        rivals = [list(names) for names in self.rivals]
-        return {"setup": self.setup.to_dict(), "rivals": rivals, "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Setup.from_dict(content["setup"]), content["rivals"], content["content"])
-
 
 def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
@@ -86,17 +78,17 @@ def sets_of(rivals: Any) -> list[list[str]]:
     path = Path(rivals)
     if not files.there(path):
         raise UserError(
-            f"task.rivals={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
+            f"{TASK.rivals}={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
             " discrepancy.json of an investigation that ended tied"
         )
     investigation = files.read_json(path)
     if not isinstance(investigation, dict) or "verdict" not in investigation:
-        raise UserError(f"task.rivals={rivals}: this is not the discrepancy.json of an investigation")
+        raise UserError(f"{TASK.rivals}={rivals}: this is not the discrepancy.json of an investigation")
     if investigation.get("verdict") != "tied":
         raise UserError(
-            f"task.rivals={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that there is"
-            " nothing to tell apart; of a proposal the terms that are like it, and what to record for them, are in that"
-            " file itself, as next_event"
+            f"{TASK.rivals}={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that "
+            "there is nothing to tell apart; of a proposal the terms that are like it, and what to record for them, "
+            "are in that file itself, as next_event"
         )
     return investigation["name_sets"]
 
@@ -106,6 +98,6 @@ def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) ->
 
     m = setup.model
     if m.per_event:
-        raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
+        raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
     with telling(progress) as tell:
         return event_for(m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell)

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from tractexp.api.next_event import Recommended, recommended
 from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_range
+from tractexp.errors import MODEL, TASK, UserError, check_range, setting
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.record import Event
@@ -77,13 +77,6 @@ class Forecasts(Written):
         from tractexp.report import plan
 
         return plan.report(self.planned, self.content)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"setup": self.setup.to_dict(), "asked": dict(self.asked), "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Setup.from_dict(content["setup"]), content["asked"], content["content"])
 
 
 @public
@@ -158,10 +151,11 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     problem, recorded = setup.problem, setup.train
     column(problem.space.names, parameter)
     if problem.per_event:
-        raise UserError("task=plan plans for shared parameters; leave model.per_event empty")
+        raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
     for name in GRIDS:
         if given[name] is not None and name not in problem.domain.shaped_by:
-            raise UserError(f"task.{name}={given[name]:g} is of waveforms: add domain=waves, or leave it out")
+            where = f"{setting(f'task.{name}')}={given[name]:g}"
+            raise UserError(f"{where} is of waveforms: add domain=waves, or leave it out")
     deepest = max(problem.events, key=lambda e: e.depth)
     at, origin, noise = _guess(setup, deepest, values)
     shape = _shape(deepest, seen=noise, **given)
@@ -181,7 +175,7 @@ def chosen_events(setup: Setup, values: Any, most: int) -> "list[ChosenEvent]":
     from tractexp.identification.plan import alone, best_of
 
     if setup.problem_of(setup.train[:1]).per_event:
-        raise UserError("events are chosen for shared parameters; leave model.per_event empty")
+        raise UserError(f"events are chosen for shared parameters; leave {MODEL.per_event} empty")
     at, *_ = _guess(setup, max(setup.train, key=lambda e: e.depth), values)
     informations, refused = {}, ""
     for event in setup.train:
@@ -222,7 +216,7 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
     given = isinstance(values, Mapping)
     by_parameter = values if given else load(Path(values)).on_base_of(setup.train[0].record)
     if missing := [name for name in problem.space.names if name not in by_parameter]:
-        raise UserError(f"task.values={values}: that result has no {', '.join(missing)}; it is of another model")
+        raise UserError(f"{TASK.values}={values}: that result has no {', '.join(missing)}; it is of another model")
     origin = f"the values of {'an identification' if given else values}"
     return np.array([by_parameter[n] for n in problem.space.names]), origin, None
 

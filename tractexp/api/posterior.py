@@ -6,7 +6,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -71,13 +71,6 @@ class Sampled(Written):
         from tractexp.report import posterior
 
         return posterior.report(self.fit.details.uncertainty, self.drawn, self.fit.headline)
-
-    def to_dict(self) -> dict[str, Any]:
-        return {"fit": self.fit.to_dict(), "settings": dict(self.settings), "content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(Identification.from_dict(content["fit"]), content["settings"], content["content"])
 
     def write_results(self, folder: Path) -> list[Path]:
         packed = io.BytesIO()

@@ -3,9 +3,9 @@
 import functools
 import time
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files
 from tractexp.api.arguments import public
@@ -73,15 +73,6 @@ class Profiled(Written):
         from tractexp.report import profile
 
         return profile.report(self.curves, self.fit.headline)
-
-    def to_dict(self) -> dict[str, Any]:
-        plain = {"points": self.points, "content": dict(self.content), "curvature": dict(self.curvature)}
-        return {"fit": self.fit.to_dict(), "result": asdict(self.result), **plain}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        fit, result = Identification.from_dict(content["fit"]), Result.of(content["result"], "the saved result")
-        return cls(fit, content["points"], content["content"], result, content["curvature"])
 
     def write_results(self, folder: Path) -> list[Path]:
         path = files.write_json(folder / "profile.json", self.content)

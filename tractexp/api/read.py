@@ -12,7 +12,7 @@ from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
 from tractexp.composition import choices
 from tractexp.errors import UserError, among
-from tractexp.outcome import Tabulated
+from tractexp.outcome import FORMS, Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
 from tractexp.record.dips import around
 from tractexp.wording import counted
@@ -78,13 +78,13 @@ def read(
     place and the value, for what is no record, holds no dip or has settings that its reader does not know.
     """
     arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2}
-    given = {key: values for key, values in arrays.items() if values is not None}
-    if name is not None and not given:
+    columns = {key: values for key, values in arrays.items() if values is not None}
+    if name is not None and not columns:
         raise UserError(f"name={name} names arrays (t=, U=, P=, Q=), and none are given")
-    if not (sources or given):
+    if not (sources or columns):
         raise UserError("nothing to read: give a file, a frame, or the arrays t=, U=, P= and Q=")
     records = [record for source in sources for record in _records(source, settings)]
-    records += [table(given, name or "arrays", settings)] if given else []
+    records += [table(columns, name or "arrays", settings)] if columns else []
     names = [record.name for record in records]
     return Dips(detect(replace(r, name=r.where) if names.count(r.name) > 1 else r) for r in records)
 
@@ -177,11 +177,6 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     return {"name": cls.name, **cls.of(path), **settings}
 
 
-def event_to_dict(event: Event) -> dict[str, Any]:
-    """The record of an event as plain data, as a saved result holds it."""
-    return record_to_dict(event.record)
-
-
 def record_to_dict(record: Record) -> dict[str, Any]:
     """A record as plain data."""
     plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
@@ -190,20 +185,21 @@ def record_to_dict(record: Record) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
-def event_from_dict(content: Mapping[str, Any]) -> Event:
-    """The event of what `kept` told; its dip is found again."""
-    return detect(record_from_dict(content))
-
-
 def record_from_dict(content: Mapping[str, Any]) -> Record:
-    """The record of what `kept_record` told."""
+    """The record of its plain data."""
     arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
     base, notes = Base(**content["base"]), tuple(content["notes"])
-    given = Base(**content["given_base"]) if content.get("given_base") else None
+    original = Base(**content["given_base"]) if content.get("given_base") else None
     window = Window.of(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
     waves = Waves.of(content["waves"]) if content.get("waves") else None
     return Record(
         content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
-        original_base=given, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
+        original_base=original, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
     )  # fmt: skip
+
+
+FORMS[Dips] = (  # the dips are found again
+    lambda events: [record_to_dict(event.record) for event in events],
+    lambda content: Dips(detect(record_from_dict(one)) for one in content),
+)

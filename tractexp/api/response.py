@@ -114,9 +114,9 @@ def _currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
     """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of phasors."""
     if fit.waves is None or fit.currents is None:
         return {}
-    kept, event = slice(fit.waves.lead, None), fit.waves
-    columns = {"t": event.record.t[kept]}
+    part, event = slice(fit.waves.lead, None), fit.waves
+    columns = {"t": event.record.t[part]}
     for end, currents in (("", fit.currents), ("_measured", np.nan_to_num(event.currents))):
         names = [f"i_{n}{end}" for n in "abc"] if event.phases == 3 else [f"i{end}"]
-        columns |= dict(zip(names, ratio * event.of_phases(currents)[:, kept], strict=True))
+        columns |= dict(zip(names, ratio * event.of_phases(currents)[:, part], strict=True))
     return columns

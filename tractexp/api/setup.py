@@ -2,13 +2,14 @@
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import Choice
 from tractexp.api.compose import LoadModel, Portable, model_of
-from tractexp.api.read import Dips, dips_together, event_from_dict, event_to_dict
+from tractexp.api.read import Dips, dips_together
 from tractexp.errors import check_range
+from tractexp.outcome import Plain
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
 from tractexp.record.identity import Identity
@@ -19,31 +20,16 @@ if TYPE_CHECKING:
     from tractexp.identification.search import Limits, SearchResult
 
 LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
-PLAIN: Mapping[Any, Any] = {  # by the type of a field: to plain data, and back
-    Dips: (lambda events: list(map(event_to_dict, events)), lambda content: Dips(map(event_from_dict, content))),
-    LoadModel: (asdict, lambda content: LoadModel(**content)),
-    Choice: (asdict, lambda content: Choice(**content)),
-}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Given(Portable):
+class Given(Portable, Plain):
     """Events fitted and held out, the model with what is known of it, and the seed."""
 
     train: Dips
     validate: Dips
     model: LoadModel
     seed: int = 0
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data, the records with it."""
-        values = ((f, getattr(self, f.name)) for f in fields(self))
-        return {f.name: PLAIN[f.type][0](value) if f.type in PLAIN else value for f, value in values}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        types = {f.name: f.type for f in fields(cls)}
-        return cls(**{k: PLAIN[types[k]][1](value) if types.get(k) in PLAIN else value for k, value in content.items()})
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -14,7 +14,7 @@ from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import TASK, UserError, among, check_range, setting
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
 
@@ -139,11 +139,12 @@ def simulate(
     """
     dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
     dip.check()
-    given = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
+    powers = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
     if depth is None and (
-        needless := [*given, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
+        needless := [*powers, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
     ):
-        raise UserError(f"task.{needless[0]} describes a dip made by hand; give its depth, too, or leave it out")
+        where = setting(f"task.{needless[0]}")
+        raise UserError(f"{where} describes a dip made by hand; give its depth, too, or leave it out")
     fit = model if isinstance(model, Identification) else None
     load = fit.model if fit else model_of(model)
     at = chosen(load.model.names, fit.result.parameters if fit else {}, values or {})
@@ -152,7 +153,7 @@ def simulate(
         raise UserError("give either records to play, or the depth of a dip")
     own = fit.result.base if fit else None
     ratio = own.ratio if own else 1.0
-    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in given.items()}
+    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in powers.items()}
     played = [respond_to(load.model, at, e, own) for e in events] or [_played(load, at, dip, before, ratio)]
     return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
 
@@ -177,13 +178,13 @@ def chosen(names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str
     for name in given:
         if name not in names:
             raise UserError(
-                f"task.values.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
+                f"{TASK.values}.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
             )
     values = {**fitted, **given}
     if missing := [name for name in names if name not in values]:
         raise UserError(
-            f"no value for {', '.join(missing)}: give task.parameters=result.json of an identification,"
-            f" or task.values={{{', '.join(f'{name}: ...' for name in missing)}}}"
+            f"no value for {', '.join(missing)}: give {TASK.parameters}=result.json of an identification,"
+            f" or {TASK.values}={{{', '.join(f'{name}: ...' for name in missing)}}}"
         )
     return np.array([values[name] for name in names], dtype=float)
 

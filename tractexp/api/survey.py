@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any
 
 from tractexp import files, quoting
 from tractexp.api.arguments import public
@@ -12,7 +12,7 @@ from tractexp.api.look import Listed
 from tractexp.api.surveying import keys, looked
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_range
+from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
 from tractexp.overrides import typed
 from tractexp.plugin import discover, get, plugin
@@ -90,13 +90,6 @@ class Surveyed(Written):
 
         return survey.report(self.content)
 
-    def to_dict(self) -> dict[str, Any]:
-        return {"content": dict(self.content)}
-
-    @classmethod
-    def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        return cls(content["content"])
-
     def write_results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
         return [
@@ -138,7 +131,7 @@ def survey(
     place = Path(folder)
     paths = list(archive.files(place))
     if not paths:
-        raise UserError(f"data.path={folder} holds no file that can be read")
+        raise UserError(f"{DATA.path}={folder} holds no file that can be read")
     store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)
     entries = {name: store.read(key) for name, key in names.items()} if keep else {}
     rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
@@ -155,10 +148,10 @@ def survey(
     if informative is None:
         return Surveyed(content)
     worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:CANDIDATES]
-    asked = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
+    settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with staged(progress) as stage:
         stage(f"choosing among {len(worth)} events")
-        best = _best(place, [row["event"] for row in worth], informative, model, values, asked)
+        best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
     content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
     content["command"] = typed({"name": reader, "path": str(folder), "train": [c.name for c in best]})
@@ -186,7 +179,7 @@ def _best(
 
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
-    events = [detect(record) for record in archive.records(folder, list(names), "data.train")]
+    events = [detect(record) for record in archive.records(folder, list(names), DATA.train)]
     return chosen_events(Setup.of(events, model, (), None, settings), values, most)
 
 
@@ -208,9 +201,9 @@ class Survey(Task, call=survey, given=("folder", "keep")):
     def perform(self, job: Job, **instead: Any) -> Surveyed:
         node = job.config["data"]
         if not getattr(get("data", node["name"]), "folders", False):
-            raise UserError(f"data={job.choices['data']} is no folder; leave it out and give data.path=FOLDER")
+            raise UserError(f"data={job.choices['data']} is no folder; leave it out and give {DATA.path}=FOLDER")
         if not node["path"]:
-            raise UserError("data.path is missing: give the folder of the recordings, e.g. data.path=recordings")
+            raise UserError(f"{DATA.path} is missing: give the folder of the recordings, e.g. {DATA.path}=recordings")
         result = super().perform(job, folder=node["path"], keep=job.folder, **instead)
         if not result.informative:
             return result

@@ -38,9 +38,9 @@ def rows_of(folder: str, file: str) -> Rows:
     try:
         view = archive.looked(Path(folder, file))
         rows = [
-            row | _event(view, file, number, shown, seen)
+            row | _event(view, file, number, shown, event)
             for number, shown in enumerate(view.sights, 1)
-            for seen in shown.events
+            for event in shown.events
         ]
         return files.plain(rows or [row | _common(view) | {"kind": QUIET, "why": _quiet(view)}])
     except UserError as error:
@@ -77,10 +77,10 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) ->
     }  # fmt: skip
 
 
-def _pictures(shown: Sight, seen: LoadEvent) -> dict[str, list[float | None]]:
+def _pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
     """U and P about an event, as shares of the greatest in the picture, few points each."""
     columns = series(shown)
-    t, what = columns["t"], seen.what
+    t, what = columns["t"], event.what
     first, stop = np.searchsorted(t, [what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1]])
     return {f"{name}_picture": _few(columns[name][first:stop]) for name in ("U", "P")}
 

@@ -34,8 +34,8 @@ def library() -> Path:
 def code() -> str:
     """The library as pages carry it."""
     whole = library().read_bytes()
-    made = key("plotly", *(hashlib.sha256(content).hexdigest() for content in (whole, Path(__file__).read_bytes())))
-    return TEXTS.get(made, lambda: needed(whole.decode()).encode()).decode()
+    entry = key("plotly", *(hashlib.sha256(content).hexdigest() for content in (whole, Path(__file__).read_bytes())))
+    return TEXTS.get(entry, lambda: needed(whole.decode()).encode()).decode()
 
 
 def needed(whole: str) -> str:
@@ -56,8 +56,8 @@ def needed(whole: str) -> str:
     parts[-1] = parts[-1].replace(registered[0], f".register([{bars[0]}])")
     calls[len(parts) - 1] = {where[name] for name in CALLED.findall(parts[-1]) if name in where}
     head = whole[: begins[0]]
-    kept, todo = set[int](), {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)}
+    modules, todo = set[int](), {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)}
     while todo:
-        kept.add(k := todo.pop())
-        todo |= calls[k] - kept
-    return head + "".join(parts[k] for k in sorted(kept))
+        modules.add(k := todo.pop())
+        todo |= calls[k] - modules
+    return head + "".join(parts[k] for k in sorted(modules))

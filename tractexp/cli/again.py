@@ -38,14 +38,14 @@ def again(arguments: list[str]) -> list[str]:
     return result
 
 
-def repeated(told: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
+def repeated(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
     """Earlier settings that still count beside newer ones, and these."""
     from tractexp.plugin import get
 
     settings = list(settings)
     keys = {_key(text) for text in settings}
     groups = {key for key in keys if key == group_of(key)}
-    stay = [text for text in told if _key(text) not in keys and group_of(_key(text)) not in groups]
+    stay = [text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups]
     names = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
     task = get("task", names[-1] if names else "identify")
     stay = [text for text in stay if reads(task, _key(text).replace("/", "."))]
@@ -64,8 +64,8 @@ def _stored(folder: Path) -> tuple[Mapping[str, Any], list[str]]:
 
     try:
         files = [(folder / FOLDER / name).read_text(encoding="utf-8") for name in ("hydra.yaml", "overrides.yaml")]
-        whole, told = (yaml.safe_load(text) for text in files)
-        return whole["hydra"], [str(text) for text in told]
+        whole, arguments = (yaml.safe_load(text) for text in files)
+        return whole["hydra"], [str(text) for text in arguments]
     except (OSError, UnicodeDecodeError, yaml.YAMLError, LookupError, TypeError) as error:
         raise UserError(f"{folder} holds no run ({FOLDER} is missing or damaged); give the folder of one") from error
 

@@ -194,10 +194,10 @@ def runs(uri: str) -> Iterator[Finding]:
     client: Any = open_store(uri)
     with sentences(uri):
         closed = [*owner.closed, *owner.close_stale(client)]
-        left = owner.running(client)
+        running = owner.running(client)
     if closed:
         yield HEALED, f"{len(closed)} runs whose process had ended are closed as KILLED"
-    unknown = [run for run in left if owner.gone(run.data.tags.get(owner.TAG, "")) is None]
+    unknown = [run for run in running if owner.gone(run.data.tags.get(owner.TAG, "")) is None]
     for run in unknown:
         where = run.data.tags.get(owner.TAG, "").partition("/")[0] or "a process that is not known"
         yield (
@@ -205,4 +205,4 @@ def runs(uri: str) -> Iterator[Finding]:
             " from here; where it is not, run tractexp doctor there, or delete the run in MLflow",
         )  # fmt: skip
     if not unknown:
-        yield SOUND, f"{len(left)} runs are running" if left else "no run says it is running that is not"
+        yield SOUND, f"{len(running)} runs are running" if running else "no run says it is running that is not"

@@ -67,7 +67,7 @@ class AllEvents:
     @functools.cached_property
     def level(self) -> Noise:
         """The noise of all events."""
-        return self.noise.on(self.context.power, self.quiet.input_modes)
+        return self.noise.on(self.context.problem.power, self.quiet.input_modes)
 
     @functools.cached_property
     def plain(self) -> Refit:

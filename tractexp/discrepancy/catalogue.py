@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import UserError, among
+from tractexp.errors import TASK, UserError, among
 from tractexp.model.drive import PHASORS
 from tractexp.model.model import compose
 from tractexp.model.parts import COMPARED, Effect, Measurement, Motor, Static
@@ -102,7 +102,7 @@ def catalogue(
     registered = discover().get("effect", {})
     for name in only:
         if name not in registered:
-            raise UserError(f"task.effects names '{name}', which is no effect{among(name, registered)}")
+            raise UserError(f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}")
     here = {effect.name for effect in present}
     base = compose(motor, static, present, domain=domain)
     testable, untestable, members = [], {}, []

@@ -43,7 +43,7 @@ class Chance:
 
     def surprises(self, projection: ScoreTest, context: Context) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        by_test = projection.statistics(context)
+        by_test = projection.statistics(context.problem)
         return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in by_test.items()}
 
 
@@ -80,7 +80,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.of(t.context.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
-        by_test = surprises.statistics(drawn.channels(t.context), t.context)
+        by_test = surprises.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
     parts = each_apart(part, range(1, MORE + 1), t.context.effort.parts)
@@ -112,7 +112,7 @@ def _noise(t: Linearization, noise: Noise, rng: np.random.Generator, draws: int)
 
 def noise_known(context: Context, noise: Noise) -> bool:
     """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
-    samples = sum(part.stop - part.start for part in context.quiet)
+    samples = sum(part.stop - part.start for part in context.problem.quiet)
     return context.domain.noise_from_model or context.criteria.knows_noise(noise.worth(samples))
 
 
@@ -121,4 +121,4 @@ def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
     if noise.loudest_input_mode <= t.context.criteria.blurred:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
         p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
-    return Chance(p, projection.statistics(t.context))
+    return Chance(p, projection.statistics(t.context.problem))

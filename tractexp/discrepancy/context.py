@@ -20,8 +20,6 @@ from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
-from tractexp.noise.quiet import quiet_stretches
-from tractexp.noise.random_walk import Load
 from tractexp.record import Event
 
 
@@ -106,16 +104,6 @@ class Context:
         """Level and color of the noise of what is compared, as a run prints them."""
         labels = noise.describe(self.drive.spoken).split(", ")
         return ", ".join(part for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True) if there)
-
-    @functools.cached_property
-    def power(self) -> Load:
-        """What the load takes, over what it took before each event."""
-        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
-
-    @functools.cached_property
-    def quiet(self) -> list[slice]:
-        """The samples in which little happens."""
-        return quiet_stretches(self.events, self.drive)
 
     def residuals(self, unit: np.ndarray, names: Sequence[str], tested: bool = False) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.

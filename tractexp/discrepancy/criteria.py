@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import TASK, UserError, among, check_range
 from tractexp.noise import random_walk
 
 DERIVED, CHOSEN = "derived", "chosen"
@@ -159,7 +159,8 @@ class Criteria:
 
     def __post_init__(self) -> None:
         for item in dataclasses.fields(self):
-            check_range(f"criteria.{item.name}", getattr(self, item.name), *item.metadata["bounds"])
+            section = "task" if item.name == "false_alarms" else "task.criteria"
+            check_range(f"{section}.{item.name}", getattr(self, item.name), *item.metadata["bounds"])
 
     @classmethod
     def of(cls, chosen: Mapping[str, float]) -> "Criteria":
@@ -167,7 +168,7 @@ class Criteria:
         names = [item.name for item in dataclasses.fields(cls)]
         for name in chosen:
             if name not in names:
-                raise UserError(f"criteria.{name}: there is no such criterion{among(name, names, 'Criteria')}")
+                raise UserError(f"{TASK.criteria}.{name}: there is no such criterion{among(name, names, 'Criteria')}")
         return cls(**{name: float(value) for name, value in chosen.items()})
 
     @property

@@ -92,7 +92,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     def rival(fit: Refit) -> Rival:
         tests = examined(explained.base.quiet, fit, noise, seed, plain=True)
         lowered = weighed.bare.deviance - fit.deviance
-        return Rival(fit, lowered, fit.cost - chosen[0].cost, 0.0, rejected=False, tests=tests)
+        return Rival(fit, lowered, fit.cost - chosen[0].cost, rejected=False, tests=tests)
 
     retained = each_apart(rival, chosen, explained.base.context.effort.parts)
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
@@ -120,7 +120,7 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     def rival(one: PredictionError, rejected: bool) -> Rival:
         fit = one.fit
         tests = None if rejected else least_squares_tests(explained.base.quiet, fit, predicted.noise, seed)
-        return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, 0.0, rejected, tests)
+        return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, rejected, tests)
 
     retained, rejected = [rival(p, False) for p in explaining], [rival(p, True) for p in others]
     assessments = {p.names: _assessed(predicted, p) for p in explaining}

@@ -65,7 +65,7 @@ PUSH = 1e-3  # how hard
 def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
     at = context.coordinates
-    spans = sorted({w for e in range(len(context.events)) for w in windows(context, e)})
+    spans = sorted({w for e in range(len(context.events)) for w in windows(context.problem, e)})
     points, groups = [], []
     for g, push in enumerate(PERTURBATIONS):
         for a, b in spans:

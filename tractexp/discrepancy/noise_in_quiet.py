@@ -60,14 +60,14 @@ class QuietNoise:
         What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
         Of waveforms the model there tells how noise of the voltage is passed on.
         """
-        context, criteria = self.context, self.context.criteria
+        context, problem, criteria = self.context, self.context.problem, self.context.criteria
         walk = functools.partial(
-            walk_of_load, context.events, context.drive, context.power, left, columns, context.valid,
+            walk_of_load, context.events, context.drive, problem.power, left, columns, context.valid,
             seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
         )  # fmt: skip
         errors = [shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None]
         values, shapes = _values(context, unit), np.concatenate(errors) if errors else None
-        return context.domain.noise(residual, context.valid, context.quiet, context.problem, values, walk, shapes)
+        return context.domain.noise(residual, context.valid, problem.quiet, problem, values, walk, shapes)
 
 
 def white(context: Context) -> Noise:

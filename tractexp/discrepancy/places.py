@@ -22,9 +22,9 @@ class DisagreementInterval:
 def places(at: Disagreement) -> list[DisagreementInterval]:
     """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
     context = at.context
-    windows = residual_windows(context)
+    windows = residual_windows(context.problem)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
-    excess = energies(at.projection.channels(context), context)[0] - mean
+    excess = energies(at.projection.channels(context.problem), context.problem)[0] - mean
     loud = excess / spread > np.quantile(highest, 1 - at.criteria.false_alarms)
     total = np.maximum(excess, 0.0).sum()
     standing_out = [

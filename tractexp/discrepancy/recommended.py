@@ -15,7 +15,7 @@ from tractexp.identification.verdict import UNIDENTIFIED, size
 def adequacy(findings: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests = findings.tests
-    ratio, where = loudest_stretch(tests.projection.channels(findings.context)[0], findings.context)
+    ratio, where = loudest_stretch(tests.projection.channels(findings.context.problem)[0], findings.context.problem)
     p = 1.0 if findings.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
     held_out = findings.validate and findings.validate.after.error

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
-from tractexp.record.window import average, averaged_power, sharpened
+from tractexp.record.window import averaged_power, sharpened
 from tractexp.recording.estimator import estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)
@@ -54,11 +54,6 @@ class RecorderWindow(Measurement):
     def sharpened(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""
         return sharpened(event, self.weights(event.record.step), self.window)
-
-
-def window_mean(y: np.ndarray, samples: float) -> np.ndarray:
-    """Mean of y (..., N) over a window around each sample, y linear between samples and constant beyond its ends."""
-    return average(y, _weights(samples))
 
 
 def _weights(samples: float) -> np.ndarray:

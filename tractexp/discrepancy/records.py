@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.recorder_window import RecorderWindow
 from tractexp.domain import domain_of
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
@@ -50,7 +50,9 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
     held = [e.record.where for e in validate]
     for event in train:
         if event.record.where in held:
-            raise UserError(f"{event.record.where} is both in data.train and in data.validate; hold out another event")
+            raise UserError(
+                f"{event.record.where} is both in {DATA.train} and in {DATA.validate}; hold out another event"
+            )
     for event in (*train, *validate):
         for channel in ("f", "U2"):
             has, first = getattr(event.record, channel) is not None, train[0]

@@ -14,7 +14,8 @@ from scipy.special import chdtrc
 
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.identification import surprises
-from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout
+from tractexp.identification.problem import Problem
+from tractexp.identification.surprises import PER_EVENT, SMALLEST_P
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,19 +120,19 @@ class ScoreTest:
         """The smallest p (b,) of all candidates."""
         return np.maximum(self.drops[1].min(axis=0, initial=1.0), SMALLEST_P)
 
-    def channels(self, layout: Layout) -> np.ndarray:
+    def channels(self, problem: Problem) -> np.ndarray:
         """The residuals (b, C, N), without the rows of the prior."""
-        drive = layout.drive
+        drive = problem.drive
         return self.r[:, : drive.measured.size].reshape(len(self.r), drive.channels, -1)
 
-    def statistics(self, layout: Layout) -> dict[str, np.ndarray]:
+    def statistics(self, problem: Problem) -> dict[str, np.ndarray]:
         """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest of many (b, k)."""
         by_test = {
             "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
-            **surprises.statistics(self.channels(layout), layout),
+            **surprises.statistics(self.channels(problem), problem),
         }
-        if len(layout.events) > 1:
+        if len(problem.events) > 1:
             by_test[PER_EVENT] = surprises.of_each_event(self.r, self.split, least=1e-12)
         return by_test
 

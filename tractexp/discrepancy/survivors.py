@@ -27,7 +27,6 @@ class Rival:
     fit: Refit
     lowered: float  # by how much its deviance is below that of the base model
     behind: float  # of Akaike's criterion
-    distance: float  # lambda, squared standard deviations
     rejected: bool
     tests: Disagreement | None = None  # at its fit, where they were made
 
@@ -80,5 +79,5 @@ def rivals(explained: Explanations) -> list[Rival]:
     for fit, distance in zip(fits, distances.tolist(), strict=True):
         behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
         rejected = fit is not best and context.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
-        ranked.append(Rival(fit, base.deviance - fit.deviance, behind, distance, rejected))
+        ranked.append(Rival(fit, base.deviance - fit.deviance, behind, rejected))
     return ranked

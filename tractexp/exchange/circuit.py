@@ -87,10 +87,10 @@ class TCircuit:
     def parameters(self) -> dict[str, float]:
         """What an identification finds of such a motor: the inverse of `single` and `double`."""
         X, X_prime, X_second = self.X, self.X_prime, self.X_second
-        found = {"T_prime": self.T0_prime * X_prime / X, "X_prime": X_prime, "C": (X - X_prime) / X}
+        values = {"T_prime": self.T0_prime * X_prime / X, "X_prime": X_prime, "C": (X - X_prime) / X}
         if self.X_2 is not None:
-            found |= {"T_second": self.T0_second * X_second / X_prime, "X_second": X_second}
-        return found
+            values |= {"T_second": self.T0_second * X_second / X_prime, "X_second": X_second}
+        return values
 
     def impedance(self, slip: float) -> complex:
         """Seen from the terminals at a slip."""

@@ -7,7 +7,7 @@
 take and return.
 """
 
-from tractexp.errors import Unfit, UserError, check_choice, check_distinct, check_range
+from tractexp.errors import DATA, TASK, Unfit, UserError, check_choice, check_distinct, check_range
 from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative, Optimizer
 from tractexp.kernel.layout import EVENT, INPUTS
@@ -23,10 +23,12 @@ from tractexp.recording.connection import SINGLE
 from tractexp.recording.reader import WaveformReader
 
 __all__ = [
+    "DATA",
     "EVENT",
     "INPUTS",
     "REFUSED",
     "SINGLE",
+    "TASK",
     "Averager",
     "Base",
     "Box",

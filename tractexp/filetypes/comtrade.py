@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.errors import UserError, nearest
+from tractexp.errors import DATA, UserError, nearest
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_header import Analog, Digital, Header, parse
 from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
@@ -235,7 +235,7 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
     ending = path.suffix.lower()
     if ending not in (".cfg", ".dat"):
         raise UserError(
-            f"data.path={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside it, or a .cff"
+            f"{DATA.path}={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside it, or a .cff"
         )
     _existing(path)
     if ending == ".dat":

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from tractexp.errors import UserError, among, nearest
+from tractexp.errors import DATA, UserError, among, nearest, setting
 from tractexp.filetypes.cells import is_number, is_time
 from tractexp.filetypes.columns import Role, fits, is_unit, role
 from tractexp.filetypes.table import TableFile
@@ -70,7 +70,7 @@ def mapped(
             listed = ", ".join(one.label for one in options[key])
             raise UserError(
                 f"{table.source}: {key} could be any of the columns {listed}; say which, e.g. "
-                f"data.columns={{{key}: '{options[key][0].name}'}}"
+                f"{DATA.columns}={{{key}: '{options[key][0].name}'}}"
             )
         chosen[key] = options[key][0]
     chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
@@ -83,19 +83,22 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
     """Raise `UserError` for a key or a unit that there is not."""
     for name, mapping in {"columns": columns, "units": units}.items():
         if not isinstance(mapping, Mapping):
-            raise UserError(f"data.{name}={mapping!s:.60} must be a mapping, such as data.{name}={{U: ...}}")
+            key = setting(f"data.{name}")
+            raise UserError(f"{key}={mapping!s:.60} must be a mapping, such as {key}={{U: ...}}")
     for key in columns:
         _key(key)
     for quantity, unit in units.items():
         if quantity not in QUANTITIES:
-            raise UserError(f"data.units names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}")
+            raise UserError(f"{DATA.units} names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}")
         if not is_unit(amount(str(unit))[1]):
             raise UserError(
-                f"data.units: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW, Mvar, Hz, s, ms, "
+                f"{DATA.units}: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW, Mvar, Hz, s, ms, "
                 "deg, rad, pu"
             )
         if not fits(quantity, str(unit), exact=True):
-            raise UserError(f"data.units: {quantity}={unit} is no unit of {quantity}; one is {', '.join(OF[quantity])}")
+            raise UserError(
+                f"{DATA.units}: {quantity}={unit} is no unit of {quantity}; one is {', '.join(OF[quantity])}"
+            )
 
 
 def _key(name: str) -> str:
@@ -104,7 +107,7 @@ def _key(name: str) -> str:
     plain = str(name).lower()
     plain = "u" + plain[1:] if plain.startswith("v") else plain
     if plain not in spellings:
-        raise UserError(f"data.columns names '{name}'{among(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia, ib, ic")
+        raise UserError(f"{DATA.columns} names '{name}'{among(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia, ib, ic")
     return spellings[plain]
 
 
@@ -114,7 +117,7 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     units = table.heading.units
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
         if not 0 <= int(choice) < len(names):
-            raise UserError(f"data.columns: {key}={choice}: {table.source} has {len(names)} columns, counted from 0")
+            raise UserError(f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted from 0")
         return int(choice)
     wanted = _squeezed(str(choice))
     matches = [k for k, name in enumerate(names) if _squeezed(name) == wanted]
@@ -123,13 +126,13 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
         roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
         fitting = [n for n, r in zip(names, roles, strict=True) if r is None or r.quantity == Role(key).quantity]
         raise UserError(
-            f"data.columns: {key}={choice}: {table.source} has no such column{nearest(str(choice), fitting) or '.'} "
+            f"{DATA.columns}: {key}={choice}: {table.source} has no such column{nearest(str(choice), fitting) or '.'} "
             f"Columns: {', '.join(names)}"
         )
     if len(matches) > 1:
         raise UserError(
-            f"data.columns: {key}={choice}: {table.source} has that column {len(matches)} times; give its number, one "
-            f"of {', '.join(map(str, matches))}"
+            f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times; give its number, "
+            f"one of {', '.join(map(str, matches))}"
         )
     return matches[0]
 
@@ -278,13 +281,13 @@ def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, 
     if not names:
         return (
             f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by number, from 0: "
-            "data.columns={t: 0, U: 1, P: 2, Q: 3}"
+            f"{DATA.columns}={{t: 0, U: 1, P: 2, Q: 3}}"
         )
     listed = f"the header line names {', '.join(names)}"
     if groups and "t" in options:
         return (
-            f"{table.source}: what data.columns names makes no table of powers, phasors or waveforms with the others; "
-            f"{listed}; name all that are needed: data.columns={{t: ..., U: ..., P: ..., Q: ...}}"
+            f"{table.source}: what {DATA.columns} names makes no table of powers, phasors or waveforms with the "
+            f"others; {listed}; name all that are needed: {DATA.columns}={{t: ..., U: ..., P: ..., Q: ...}}"
         )
     missing = [key for key in ("t",) if key not in options]
     if not groups:
@@ -293,7 +296,7 @@ def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, 
     meant = {key: name for key in missing if (name := _meant(table, options, key))}
     said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
     which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
-    return f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}: data.columns={{{said}}}"
+    return f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}: {DATA.columns}={{{said}}}"
 
 
 def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
@@ -327,8 +330,8 @@ def _check_unit(table: TableFile, one: MappedColumn) -> None:
     if one.role.unit and is_unit(one.role.unit) and not fits(quantity, one.role.unit):
         raise UserError(
             f"{table.source}: column {one.label} is read as {one.role.key}, of which {one.role.unit} is no unit; say "
-            f"another column, data.columns={{{one.role.key}: ...}}, or the unit, "
-            f"data.units={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
+            f"another column, {DATA.columns}={{{one.role.key}: ...}}, or the unit, "
+            f"{DATA.units}={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
         )
 
 

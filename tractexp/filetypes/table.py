@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.errors import UserError, among, check_choice, nearest
+from tractexp.errors import DATA, UserError, among, check_choice, nearest
 from tractexp.files import located
 from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
 from tractexp.filetypes.columns import split_unit
@@ -39,7 +39,7 @@ class TableForm:
     def check(self) -> None:
         check_choice("data.decimal", self.decimal, ("", ".", ","))
         if self.header is not None and self.header < 1:
-            raise UserError(f"data.header={self.header} is no line; lines are counted from 1")
+            raise UserError(f"{DATA.header}={self.header} is no line; lines are counted from 1")
 
 
 @dataclass(frozen=True, eq=False)
@@ -232,7 +232,7 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
         return str(sheet)
     if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
         return names[int(sheet) - 1]
-    raise UserError(f"data.sheet={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
+    raise UserError(f"{DATA.sheet}={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
 
 
 def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.files import located
 from tractexp.filetypes.columns import PER_UNIT, factor
 from tractexp.filetypes.instrument import instrument_of
@@ -147,7 +147,7 @@ def _check_power_units(table: TableFile, mapping: Mapped) -> None:
         units = ", ".join(f"{letter}: {unit}" for letter, unit in (("P", "MW"), ("Q", "Mvar")))
         raise UserError(
             f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one; say them, e.g. "
-            f"data.units={{{units}}}"
+            f"{DATA.units}={{{units}}}"
         )
 
 
@@ -265,7 +265,7 @@ def _in_units(
     if len(stated) > 1 or None in stated:
         odd = next((one for key, one in sizes.items() if _absolute(mapping, key) is None), next(iter(sizes.values())))
         what = "is per unit and others are not" if odd.role.unit else f"has no unit, and its voltage is {level:.4g}"
-        raise UserError(f"{table.source}: {odd.label} {what}: say the units, e.g. data.units={{U: kV, I: A}}")
+        raise UserError(f"{table.source}: {odd.label} {what}: say the units, e.g. {DATA.units}={{U: kV, I: A}}")
     return {**values}, bool(stated.pop())
 
 
@@ -285,7 +285,7 @@ def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
             return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(
         f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit degrees and rad: "
-        "say data.units={angle: deg} or data.units={angle: rad}"
+        f"say {DATA.units}={{angle: deg}} or {DATA.units}={{angle: rad}}"
     )
 
 

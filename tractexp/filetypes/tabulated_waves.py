@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped
@@ -89,7 +89,7 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
         i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
         raise UserError(
             f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give "
-            "the unit of time (data.units={t: ms}), or more digits"
+            f"the unit of time ({DATA.units}={{t: ms}}), or more digits"
             if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
         )  # fmt: skip
     usual = float(np.median(steps))

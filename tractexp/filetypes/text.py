@@ -2,7 +2,7 @@
 
 import re
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 
 ENCODINGS = ("utf-8", "gbk", "cp1251", "latin-1")
 MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-16"}
@@ -19,10 +19,10 @@ def decode(content: bytes, where: str, encoding: str | None = None) -> tuple[str
         return content.decode(codec), codec
     except LookupError as error:
         names = ", ".join(ENCODINGS)
-        raise UserError(f"data.encoding={encoding}: there is no such text encoding; try {names}") from error
+        raise UserError(f"{DATA.encoding}={encoding}: there is no such text encoding; try {names}") from error
     except (UnicodeError, ValueError) as error:
         if encoding:
-            raise UserError(f"{where}: not {encoding} text; leave data.encoding out to have it detected") from error
+            raise UserError(f"{where}: not {encoding} text; leave {DATA.encoding} out to have it detected") from error
         return content.decode("latin-1"), "latin-1"
 
 

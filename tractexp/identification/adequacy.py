@@ -19,7 +19,8 @@ from tractexp.identification import surprises
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
-from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, Layout, tail
+from tractexp.identification.problem import Problem
+from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, tail
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
@@ -84,7 +85,7 @@ def surprise(
 
     `least` is the least sum of squares, over those of `squares`, Eq. (8).
     """
-    if likelihood.noise.mix is None or not observed.quiet:
+    if likelihood.noise.mix is None or not observed.problem.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
     inside = (unit > WALL) & (unit < 1 - WALL)
@@ -98,7 +99,7 @@ def surprise(
     rest = np.concatenate([rows[None], white])
     rest -= (rest @ Q) @ Q.T
     channels = rest.reshape(len(rest), observed.drive.channels, -1)
-    by_test = surprises.statistics(channels, observed)
+    by_test = surprises.statistics(channels, observed.problem)
     if observed.drive.events > 1:
         split = _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q)
         by_test[PER_EVENT] = surprises.of_each_event(rest, split, least=1e-9)
@@ -106,7 +107,7 @@ def surprise(
         by_test[APART] = given_up(squares, unit, least, J, white, drawn)
     left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(left, key=left.__getitem__)
-    ratio, where = loudest_stretch(channels[0], observed)
+    ratio, where = loudest_stretch(channels[0], observed.problem)
     return Surprise(min(1.0, max(len(left) * left[loudest], SMALLEST_P)), loudest, ratio, where)
 
 
@@ -140,7 +141,7 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
 
 def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:
     """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet samples."""
-    worth = max(likelihood.noise.worth(sum(p.stop - p.start for p in observed.quiet)), 4.0)
+    worth = max(likelihood.noise.worth(sum(p.stop - p.start for p in observed.problem.quiet)), 4.0)
     return np.sqrt(rng.chisquare(2 * worth, DRAWS) / (2 * worth))
 
 
@@ -161,14 +162,14 @@ def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.n
     return split - (split @ Q) @ Q.T
 
 
-def loudest_stretch(channels: np.ndarray, layout: Layout) -> tuple[float, str]:
+def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    windows = surprises.residual_windows(layout)
-    row = layout.drive.spoken.index
+    windows = surprises.residual_windows(problem)
+    row = problem.drive.spoken.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))
     window = windows[k]
-    name = layout.events[window.event].record.name
+    name = problem.events[window.event].record.name
     return level[k], f"{window.channel} of {name} from {window.start:.3f} to {window.end:.3f} s"
 
 

@@ -10,7 +10,7 @@ from tractexp.identification.information import SHARE
 from tractexp.identification.plan import DipShape, Forecast, over_depth
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import BOUND, EDGE, UNIDENTIFIED, WEAK, WITHIN, shown, size
+from tractexp.identification.verdict import BOUND, EDGE, HELD, UNIDENTIFIED, WEAK, WITHIN, shown, size
 from tractexp.provenance import again
 from tractexp.record.change import runs
 
@@ -39,7 +39,8 @@ def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()
         if len(tied) > 1:
             sentences.append(f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them apart")
         else:
-            sentences.append(f"fix {tied[0]} by model.fixed: the record does not change with it")
+            why = HELD if tied[0] in uncertainty.information.held else "the record does not change with it"
+            sentences.append(f"fix {tied[0]} by model.fixed: {why}")
     sentences += _deeper(uncertainty)
     return (
         [*better, *sentences]
@@ -94,9 +95,10 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
     width = lambda x: shown(uncertainty.values[j], x, low, high)  # noqa: E731
     reached = f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, " if bounds else ""
     if (half <= goal).any():
-        depths = _spans(np.array([f.shape.depth for f in forecasts]), half <= goal)
+        enough = half <= goal
+        which = "any further dip" if enough.all() else f"a further dip of {_spans(forecasts, enough)}"
         still = f"{reached}and if it does so then, ask whether model.bounds.{name} is right" if reached else ""
-        return f"for {name}: a further dip of {depths} {together} would give {width(goal)} or better{still}"
+        return f"for {name}: {which} {together} would give {width(goal)} or better{still}"
     best = int(half.argmin())
     leaves = f"would give {width(half[best])}" if half[best] < (high - low) / 2 else "would leave it open too"
     bound = f"{reached}so ask whether model.bounds.{name} is right" if reached else ""
@@ -123,7 +125,8 @@ def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     return min(asked), bounds
 
 
-def _spans(depths: np.ndarray, enough: np.ndarray) -> str:
-    """The depths (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
+def _spans(forecasts: Sequence[Forecast], enough: np.ndarray) -> str:
+    """The depths of the forecasts (n,) that are `enough`, as text: '5 to 15 % or 27.5 to 95 %'."""
+    depths = np.array([f.shape.depth for f in forecasts])
     spans = [(100 * depths[part][0], 100 * depths[part][-1]) for part in runs(enough)]
     return " or ".join(f"{a:.3g} to {b:.3g} %" if b > a else f"{a:.3g} %" for a, b in spans)

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.blocks import blocks_of, exceeds
 from tractexp.identification.descent import Descent, descend
@@ -134,7 +134,7 @@ def polished(problem: Problem) -> EstimationResult:
     if best is None:
         raise UserError(
             f"no parameter set tried can be simulated before {problem.events[0].record.name}; give values by"
-            " task.values=<result.json>, or narrow model.bounds"
+            f" {TASK.values}=<result.json>, or narrow {MODEL.bounds}"
         )
     return best
 
@@ -194,9 +194,9 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
 
 def _in_own_units(ends: DescentEnds) -> DescentEnds:
     """The same in mean squares of what the best leaves: there a descent's tolerance means the same for any record."""
-    left = max(ends.lowest / ends.likelihood.samples, 1e-12)
-    descent = replace(ends.descent, deviance=ends.descent.deviance / left)
-    return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(left)), descent=descent)
+    variance = max(ends.lowest / ends.likelihood.samples, 1e-12)
+    descent = replace(ends.descent, deviance=ends.descent.deviance / variance)
+    return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(variance)), descent=descent)
 
 
 def _without_offsets(ends: DescentEnds) -> DescentEnds:
@@ -217,17 +217,17 @@ def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
     """Least squares where more than noise is left, and the maximum of the likelihood of the noise elsewhere."""
     observed = ends.observed
     likelihood, units = _under_noise(ends, robust=robust)
-    seen = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
-    if not seen.adequate:
-        return _of_squares(ends, likelihood, seen)
+    surprising = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
+    if not surprising.adequate:
+        return _of_squares(ends, likelihood, surprising)
     whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     result = descend(likelihood.rows, units, apart=likelihood.apart)
     best = int(result.deviance.argmin())
     if not ends.no_worse(result.unit[best]):
-        return _of_squares(ends, likelihood, seen)
+        return _of_squares(ends, likelihood, surprising)
     others = result.unit[np.arange(len(units)) != best]
-    return EstimationResult(with_local_minima(conclude(likelihood, result.unit[best]), others), seen, ends.starts)
+    return EstimationResult(with_local_minima(conclude(likelihood, result.unit[best]), others), surprising, ends.starts)
 
 
 def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
@@ -312,9 +312,9 @@ def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     for e in range(drive.events):
         for c in range(drive.channels):
             part = drive.part(e)
-            seen = residuals[c, part][valid[c, part]]
-            if len(seen):
-                valid[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(seen)), 1e-12)
+            sample = residuals[c, part][valid[c, part]]
+            if len(sample):
+                valid[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(sample)), 1e-12)
     return replace(likelihood, valid=valid)
 
 

@@ -22,14 +22,15 @@ class Information:
     width: np.ndarray
     J: np.ndarray
     structural: float = STRUCTURAL
+    held: tuple[str, ...] = ()  # those that cannot move to either side: a requirement of the model holds them
 
     @classmethod
     def of(
         cls, names: Sequence[str], values: np.ndarray, width: np.ndarray, jacobian: np.ndarray, nuisances: np.ndarray
     ) -> "Information":
         """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside them."""
-        seen = nuisances[:, np.any(nuisances != 0, axis=0)]
-        basis, _ = np.linalg.qr(seen)
+        active = nuisances[:, np.any(nuisances != 0, axis=0)]
+        basis, _ = np.linalg.qr(active)
         return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
 
     _directions: np.ndarray = field(init=False, repr=False)  # rows, in ranges
@@ -46,6 +47,11 @@ class Information:
         object.__setattr__(self, "_singular", singular)
         object.__setattr__(self, "_seen", seen & (singular > 0))
         object.__setattr__(self, "_blind", size == 0)
+
+    @property
+    def blind(self) -> tuple[str, ...]:
+        """Parameters that change nothing by themselves."""
+        return tuple(name for name, blind in zip(self.names, self._blind, strict=True) if blind)
 
     @property
     def covariance(self) -> np.ndarray:

@@ -100,25 +100,25 @@ def selection(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Seque
 def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
     """The best network of no pole, one, and so on, up to `most` or to what the samples allow."""
     fit = Projection.of(ports)
-    found = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
-    while len(found) <= most and _samples(ports) >= SAMPLES * unknowns(len(found), ports[0]):
-        poles = fit.optimum(np.append(found[-1].poles, fit.start(found[-1].poles)))
-        found.append(LinearNetwork(poles, fit.linear_part(poles).coefficients))
-    return found
+    fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
+    while len(fits) <= most and _samples(ports) >= SAMPLES * unknowns(len(fits), ports[0]):
+        poles = fit.optimum(np.append(fits[-1].poles, fit.start(fits[-1].poles)))
+        fits.append(LinearNetwork(poles, fit.linear_part(poles).coefficients))
+    return fits
 
 
-def information(found: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
+def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
     """The Bayesian information criterion of each (b,); samples count as what the last one leaves is correlated in time.
 
     Source: Schwarz 1978; Bayley and Hammersley 1946 (the effective number of samples).
     """
-    left = np.array([one.squares(ports) for one in found])
-    rests = [found[-1].residual(port) for port in ports]
+    squares = np.array([one.squares(ports) for one in networks])
+    rests = [networks[-1].residual(port) for port in ports]
     in_turn = abs(sum(complex(np.nansum(rest[1:] * rest[:-1].conj())) for rest in rests))
-    correlation = in_turn / max(float(left[-1]), 1e-300)
+    correlation = in_turn / max(float(squares[-1]), 1e-300)
     worth = _samples(ports) * (1 - correlation) / (1 + correlation)
-    size = np.array([unknowns(len(one.poles), ports[0]) for one in found])
-    return worth * np.log(np.maximum(left, 1e-300)) + size * np.log(max(worth, 1.0))
+    size = np.array([unknowns(len(one.poles), ports[0]) for one in networks])
+    return worth * np.log(np.maximum(squares, 1e-300)) + size * np.log(max(worth, 1.0))
 
 
 def unknowns(poles: int, port: Port) -> int:

@@ -14,8 +14,8 @@ from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
-from tractexp.noise.quiet import louder, quiet_stretches
-from tractexp.noise.random_walk import LESS, WITHIN, Load, walk_of_load, without_slow
+from tractexp.noise.quiet import louder
+from tractexp.noise.random_walk import LESS, WITHIN, walk_of_load, without_slow
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
@@ -47,16 +47,6 @@ class Observed:
     def drive(self) -> Drive:
         return self.problem.drive
 
-    @functools.cached_property
-    def quiet(self) -> list[slice]:
-        """The samples in which little happens."""
-        return quiet_stretches(self.events, self.drive)
-
-    @functools.cached_property
-    def power(self) -> Load:
-        """What the load takes, over what it took before each event."""
-        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
-
     def noise(
         self, residuals: np.ndarray, valid: np.ndarray, columns: np.ndarray, values: np.ndarray,
         input_errors: np.ndarray | None, whole: bool,
@@ -69,7 +59,7 @@ class Observed:
         rest = np.maximum(1 - (basis**2).sum(axis=1), LEAST_REST).reshape(residuals.shape)  # the fit took the others
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, valid)
         walk = functools.partial(
-            walk_of_load, self.events, self.drive, self.power, residuals, columns, valid,
+            walk_of_load, self.events, self.drive, self.problem.power, residuals, columns, valid,
             seen=SEEN, within=WITHIN, less=LESS,
         )  # fmt: skip
         try:
@@ -90,13 +80,13 @@ class Observed:
             calm, late = ([without_slow(residuals[c, p][valid[c, p]]) for p in parts] for parts in (before, after))
             if louder(late, calm):
                 return before
-        return self.quiet
+        return self.problem.quiet
 
     @functools.cached_property
     def _stretches(self) -> list[tuple[slice, bool]]:
         """The quiet stretches, and whether each lies before its dip."""
         starts = [int(self.drive.first[e]) + event.start for e, event in enumerate(self.events)]
-        return [(part, part.stop in starts) for part in self.quiet]
+        return [(part, part.stop in starts) for part in self.problem.quiet]
 
     def input_errors(self, values: np.ndarray) -> np.ndarray | None:
         """What errors of the record do to what is compared at free values (d,): (k, C, N) [pu], None where it has none.

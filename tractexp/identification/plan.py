@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import PHASORS, Domain, domain_of
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import TASK, UserError, among, check_range
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood, before_the_event
 from tractexp.identification.problem import Problem
@@ -184,7 +184,7 @@ def column(names: Sequence[str], parameter: str) -> int:
     """The column of a parameter, `H` standing for `M`; raises `UserError` for one that is not free."""
     name = "M" if parameter == INERTIA and "M" in names else parameter
     if name not in names:
-        raise UserError(f"task.parameter={parameter} is not a free parameter{among(parameter, [*names, INERTIA])}")
+        raise UserError(f"{TASK.parameter}={parameter} is not a free parameter{among(parameter, [*names, INERTIA])}")
     return list(names).index(name)
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import TASK, UserError, setting
 from tractexp.identification.uncertainty import LEVEL, Uncertainty
 from tractexp.progress import Counting, uncounted
 
@@ -45,10 +45,12 @@ def sample(
     try:
         import emcee
     except ImportError:
-        raise UserError("task=posterior needs emcee; install it by: pip install 'tractexp[posterior]'") from None
+        raise UserError(
+            f"{setting('task=posterior')} needs emcee; install it by: pip install 'tractexp[posterior]'"
+        ) from None
     likelihood, d = uncertainty.likelihood, len(uncertainty.unit)
     if walkers < 2 * d:
-        raise UserError(f"task.walkers={walkers} is too few: {d} coordinates need at least {2 * d}")
+        raise UserError(f"{TASK.walkers}={walkers} is too few: {d} coordinates need at least {2 * d}")
 
     def log_probability(unit: np.ndarray) -> np.ndarray:
         outside = ((unit < 0) | (unit > 1)).any(axis=1)

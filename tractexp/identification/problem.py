@@ -9,12 +9,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import Domain, domain_of
-from tractexp.errors import UserError, among, check_range
+from tractexp.errors import MODEL, UserError, among, check_range, setting
 from tractexp.identification.loss import Loss
 from tractexp.identification.search import REFUSED
 from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect
+from tractexp.noise.quiet import quiet_stretches
+from tractexp.noise.random_walk import Load
 from tractexp.parameter import Box, Parameter, even
 from tractexp.record import Event
 from tractexp.record.own_base import SMALLEST
@@ -28,18 +30,19 @@ def narrowed(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[floa
     for name, pair in bounds.items():
         _check_name(name, by_name, "model.bounds")
         if len(pair) != 2:
-            raise UserError(f"model.bounds.{name}={list(pair)} must be two numbers, [lower, upper]")
+            raise UserError(f"{MODEL.bounds}.{name}={list(pair)} must be two numbers, [lower, upper]")
         low, high = map(float, pair)
         old = by_name[name]
         inside = min(max(old.default, low), high) if low < high else old.default
         by_name[name] = replace(old, default=inside, bounds=(low, high))
-        by_name[name].check(f"model.bounds.{name}")
+        by_name[name].check(f"{MODEL.bounds}.{name}")
     return tuple(by_name.values())
 
 
 def _check_name(name: str, by_name: Mapping[str, object], where: str) -> None:
     if name not in by_name:
-        raise UserError(f"{where}.{name}: this model has no parameter '{name}'{among(name, by_name, 'Parameters')}")
+        lack = f"this model has no parameter '{name}'{among(name, by_name, 'Parameters')}"
+        raise UserError(f"{setting(where)}.{name}: {lack}")
 
 
 def _check_channels(model: Model, events: Sequence[Event]) -> None:
@@ -48,7 +51,7 @@ def _check_channels(model: Model, events: Sequence[Event]) -> None:
         if channel in event.channels or channel in COMPARED:
             continue
         if isinstance(part, Effect):
-            what, mend = f"effect '{part.name}'", "leave the effect out of model.effects"
+            what, mend = f"effect '{part.name}'", f"leave the effect out of {MODEL.effects}"
         else:
             what, mend = f"{part.group} '{part.name}'", f"choose another {part.group}"
         raise UserError(
@@ -127,11 +130,13 @@ class Problem:
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
             _check_name(name, {p.name: p for p in self.parameters}, "model.fixed")
-            check_range(f"model.fixed.{name}", self.fixed[name])
+            check_range(f"{MODEL.fixed}.{name}", self.fixed[name])
         for name in per_event:
             _check_name(name, {p.name: p for p in self.parameters}, "model.per_event")
             if name in self.fixed:
-                raise UserError(f"model.per_event names {name}, which model.fixed fixes; it can be only one of them")
+                raise UserError(
+                    f"{MODEL.per_event} names {name}, which {MODEL.fixed} fixes; it can be only one of them"
+                )
         own = set(per_event) if len(self.events) > 1 else set()
         free = [
             replace(p, name=f"{p.name}[{e}]") if e else p
@@ -140,7 +145,7 @@ class Problem:
             for e in (range(1, len(self.events) + 1) if p.name in own else (0,))
         ]
         if not free:
-            why = "model.fixed fixes every parameter" if self.fixed else f"a {model.title} has no parameters"
+            why = f"{MODEL.fixed} fixes every parameter" if self.fixed else f"a {model.title} has no parameters"
             raise UserError(f"{why}; leave at least one free to identify")
         self.space, self.defaults = Box.of(tuple(free)), np.array([p.default for p in free])
         self.lower, self.upper = self.space.lower, self.space.upper
@@ -179,6 +184,16 @@ class Problem:
     def steady(self) -> list[slice]:
         """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not compared."""
         return self.domain.steady(self.events, self.drive)
+
+    @property
+    def quiet(self) -> list[slice]:
+        """The samples of the drive in which little happens."""
+        return quiet_stretches(self.events, self.drive)
+
+    @property
+    def power(self) -> Load:
+        """What the load takes, over what it took before each event."""
+        return Load.of(self.drive.measured, self.drive.before, self.drive.first)
 
     def _driven(self) -> Drive:
         """The events end to end, squared errors weighed as the loss says."""
@@ -255,7 +270,7 @@ class Problem:
     def _step(self, substeps: int | None) -> Step:
         if substeps is not None:
             if not 1 <= substeps <= MOST_SUBSTEPS:
-                raise UserError(f"model.substeps={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}")
+                raise UserError(f"{MODEL.substeps}={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}")
             given = np.full(len(self.events), substeps)
             return Step(given, np.full(len(self.events), np.nan))
         probes = self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
@@ -270,7 +285,8 @@ class Problem:
             worst = int(np.argmax(error))
             raise UserError(
                 f"{self.events[worst].record.name}: {MOST_SUBSTEPS} Runge-Kutta steps per sample of"
-                f" {1e3 * self.events[worst].record.step:g} ms leave an error of {error[worst]:.1e} pu somewhere in the"
-                f" bounds; raise the lower bound of the model's time constants (model.bounds), or set model.substeps"
+                f" {1e3 * self.events[worst].record.step:g} ms leave an error of {error[worst]:.1e} pu somewhere in"
+                f" the bounds; raise the lower bound of the model's time constants ({MODEL.bounds}),"
+                f" or set {MODEL.substeps}"
             )
         return Step(chosen, error)

@@ -13,7 +13,7 @@ import numpy as np
 from tractexp import files, provenance
 from tractexp.domain import DOMAINS, Playback, domain_of
 from tractexp.domain.playback import relative_error
-from tractexp.errors import UserError
+from tractexp.errors import MODEL, UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.model_error import ModelError, in_percent, model_error
@@ -318,7 +318,7 @@ def refuse_nothing_found(problem: Problem, end: SearchResult) -> None:
         why = problem.model.refusal(problem.full(end.values)[0], problem.drive) or "all diverged"
         raise UserError(
             f"none of the {end.simulations} parameter sets tried could be simulated: {why};"
-            f" widen model.bounds or free model.fixed{_meant(problem)}"
+            f" widen {MODEL.bounds} or free {MODEL.fixed}{_meant(problem)}"
         )
 
 

@@ -108,10 +108,10 @@ class _Counter:
         if np.isnan(x).any():
             raise UserError("the optimizer proposed a point that is not a number; this is a fault of its plugin")
         if limits.simulations is not None:
-            left = limits.simulations - self.simulations
-            if left <= 0:
+            remaining = limits.simulations - self.simulations
+            if remaining <= 0:
                 raise _Stop(f"stopped at the budget of {limits.simulations} simulations")
-            x = x[:left]
+            x = x[:remaining]
         return x
 
     def _note(self, x: np.ndarray, raw: np.ndarray, f: np.ndarray, asked: int) -> None:

@@ -6,17 +6,14 @@ the tails reach further than their number. Where noise has heavy tails, so has t
 extreme value distribution.
 """
 
-import functools
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.model.drive import Drive
+from tractexp.identification.problem import Problem
 from tractexp.noise.span import spanned
-from tractexp.record import Event
 
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
@@ -30,20 +27,9 @@ FEWEST = 8  # samples of a stretch with an oscillation
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 
-class Layout(Protocol):
-    """Events as they lie in a drive, and the samples in which little happens."""
-
-    @property
-    def events(self) -> Sequence[Event]: ...
-    @property
-    def drive(self) -> Drive: ...
-    @functools.cached_property
-    def quiet(self) -> Sequence[slice]: ...
-
-
-def windows(layout: Layout, event: int) -> list[tuple[float, float]]:
+def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
     """The windows [s since the first sample] of one event: before, both halves of the dip, then ever longer ones."""
-    e = layout.events[event]
+    e = problem.events[event]
     start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
     last = e.record.t[-1] - e.record.t[0]
     edges = [0.0, start, (start + end) / 2, *(end + w for w in WINDOWS if end + w < last), last]
@@ -72,13 +58,13 @@ class ResidualWindow:
     end: float
 
 
-def statistics(channels: np.ndarray, layout: Layout) -> dict[str, np.ndarray]:
+def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
     """Statistics of whitened, projected residuals (b, 2, N) by what each looks for, of which the largest counts."""
-    after = aligned(channels, layout)
+    after = aligned(channels, problem)
     return {
-        LOUDEST: energies(channels, layout),
-        "a step or a pulse": np.concatenate([steps(channels, layout), pulses(after, layout)], axis=1),
-        "an oscillation": np.concatenate([tones(channels, layout), bursts(after, layout)], axis=1),
+        LOUDEST: energies(channels, problem),
+        "a step or a pulse": np.concatenate([steps(channels, problem), pulses(after, problem)], axis=1),
+        "an oscillation": np.concatenate([tones(channels, problem), bursts(after, problem)], axis=1),
     }
 
 
@@ -139,67 +125,67 @@ def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
     return Scale(draws.mean(axis=0), draws.std(axis=0) + 1e-12), largest
 
 
-def residual_windows(layout: Layout) -> list[ResidualWindow]:
+def residual_windows(problem: Problem) -> list[ResidualWindow]:
     """Every window of every event, for each channel that is compared."""
     cells = []
-    for e, event in enumerate(layout.events):
-        first, step, origin = int(layout.drive.first[e]), event.record.step, event.record.t[0]
-        for a, b in windows(layout, e):
+    for e, event in enumerate(problem.events):
+        first, step, origin = int(problem.drive.first[e]), event.record.step, event.record.t[0]
+        for a, b in windows(problem, e):
             i, j = round(a / step), min(round(b / step), event.record.samples)
             if j - i < 2:
                 continue
             part = slice(first + i, first + j)
             cells += [
-                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step) for c in layout.drive.spoken
+                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step) for c in problem.drive.spoken
             ]
     return cells
 
 
-def energies(channels: np.ndarray, layout: Layout) -> np.ndarray:
+def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
     square = channels**2
-    quiet = np.mean(np.concatenate([square[:, :, part] for part in layout.quiet], axis=2), axis=2, keepdims=True)
+    quiet = np.mean(np.concatenate([square[:, :, part] for part in problem.quiet], axis=2), axis=2, keepdims=True)
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
-    row = layout.drive.spoken.index
-    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(layout)], axis=1)
+    row = problem.drive.spoken.index
+    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1)
 
 
-def aligned(channels: np.ndarray, layout: Layout) -> np.ndarray:
+def aligned(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
 
     Timers and controls answer every dip alike, however little each event shows of it.
     """
-    drive = layout.drive
-    after = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(layout.events)]
+    drive = problem.drive
+    after = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(problem.events)]
     common = min(p.shape[2] for p in after)
     return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))
 
 
-def steps(channels: np.ndarray, layout: Layout) -> np.ndarray:
+def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """Square of the sum from each instant to the end of an event, in P and in Q, (b, instants)."""
     columns = []
-    for e in range(len(layout.events)):
-        sums = np.cumsum(channels[:, :, layout.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
+    for e in range(len(problem.events)):
+        sums = np.cumsum(channels[:, :, problem.drive.part(e)][:, :, ::-1], axis=2)[:, :, ::STRIDE]
         columns.append(sums**2)
     return np.concatenate(columns, axis=2).reshape(len(channels), -1)
 
 
-def pulses(after: np.ndarray, layout: Layout) -> np.ndarray:
+def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
     """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
     columns = [np.empty((len(after), 0))]
     for length in PULSES:
-        n = max(round(length / layout.events[0].record.step), 1)
+        n = max(round(length / problem.events[0].record.step), 1)
         if n < sums.shape[2]:
             columns.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
     return np.concatenate(columns, axis=1)
 
 
-def tones(channels: np.ndarray, layout: Layout) -> np.ndarray:
+def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
     power = np.zeros((len(channels), 3, BINS // 2 + 1))
-    for e, event in enumerate(layout.events):
-        own = channels[:, :, layout.drive.part(e)]
+    for e, event in enumerate(problem.events):
+        own = channels[:, :, problem.drive.part(e)]
         for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
             stretch = own[:, :, part]
             if stretch.shape[2] >= FEWEST:
@@ -207,11 +193,11 @@ def tones(channels: np.ndarray, layout: Layout) -> np.ndarray:
     return power.reshape(len(channels), -1)
 
 
-def bursts(after: np.ndarray, layout: Layout) -> np.ndarray:
+def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
     """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
     columns = [np.empty((len(after), 0))]
     for length in BURSTS:
-        n = round(length / layout.events[0].record.step)
+        n = round(length / problem.events[0].record.step)
         if FEWEST <= n <= after.shape[2]:
             stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
             power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n

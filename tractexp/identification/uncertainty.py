@@ -6,13 +6,14 @@ Where nothing but noise is left, by the curvature of the likelihood at its maxim
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from tractexp import files
 from tractexp.identification.blocks import LEVEL
+from tractexp.identification.descent import CENTRAL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.residual_tests import ResidualTest, jarque_bera, ljung_box
@@ -165,11 +166,25 @@ def conclude(
     likelihood, deviance, information, factors, limits = (
         _curvature(likelihood, unit) if likelihood.initial_power else _scatter(likelihood, unit)
     )
+    information = replace(information, held=_held(likelihood, unit, information.blind))
     verdicts = judge(information, problem.lower, problem.upper, factors * information.standard_errors, factors)
     return Uncertainty(
         likelihood, unit, deviance, information, problem.lower, problem.upper, factors, limits, verdicts,
         noise or likelihood, list(notes),
     )  # fmt: skip
+
+
+def _held(likelihood: Likelihood, unit: np.ndarray, names: Sequence[str]) -> tuple[str, ...]:
+    """Those of the parameters that no step from coordinates (D,) to either side leaves a steady state."""
+    all_names = likelihood.problem.space.names
+
+    def possible(name: str) -> bool:
+        sides = np.tile(unit, (2, 1))
+        sides[:, all_names.index(name)] += CENTRAL, -CENTRAL
+        sides = np.array([side for side in sides if np.array_equal(side, side.clip(0.0, 1.0))])
+        return bool(np.isfinite(likelihood.residuals(sides)).all(axis=(1, 2)).any())
+
+    return tuple(name for name in names if not possible(name))
 
 
 Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]  # with deviance, factors (d,) and limits (d,)

@@ -13,6 +13,7 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "not identifiable from this record",
     "at its bound",
 )
+HELD = "a requirement of the model holds it there: beside it there is no steady state"
 PROFILED = "by its profile"  # of an interval in words
 WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
@@ -115,6 +116,8 @@ def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
     names, pivot = information.names, j  # told from the parameter in question
     direction = direction / direction[pivot]
     members = np.flatnonzero(np.abs(direction) > SHARE)
+    if information.names[j] in information.held:
+        return HELD
     if len(members) == 1:
         return "the record does not change with it at all"
     moves = ", ".join(f"{names[k]} {direction[k]:+.3g} %" for k in members)

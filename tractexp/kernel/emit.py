@@ -146,8 +146,8 @@ class _Emitter:
 
     def _samples(self, i: str, ahead: int = 0) -> "_Samples":
         """The inputs from sample i on, of those in the record."""
-        left = self.f.integer("sub", "%samples", self.f.integer("add", i, ahead))
-        return _Samples(self, self.f.integer("add", i, ahead) if ahead else i, left)
+        remaining = self.f.integer("sub", "%samples", self.f.integer("add", i, ahead))
+        return _Samples(self, self.f.integer("add", i, ahead) if ahead else i, remaining)
 
     def _point_pass(self) -> None:
         """Inputs and signals of the derivative at both ends and in the middle of each step."""
@@ -394,8 +394,8 @@ class _Emitter:
         f, count = self.f, len(starts)
         for k, value in enumerate(starts):
             self.lanes.store(value, f.at(self.solved, k * self.width))
-        left = f.integer("sub", "%n", first)
-        with f.loop(0, f.smaller(left, self.width), always=True) as lane:
+        remaining = f.integer("sub", "%n", first)
+        with f.loop(0, f.smaller(remaining, self.width), always=True) as lane:
             for k in range(count):
                 value = f.fresh(f"load double, ptr {f.at(f.at(self.solved, lane), k * self.width)}, align 8")
                 row = f.integer("mul", f.integer("add", f.integer("mul", e, count), k), "%n")

@@ -86,15 +86,15 @@ def _static(eq: Equations, static: Static) -> None:
     own = eq.declare(static.parameters)
     u = sympy.Symbol(sites.static_voltage.name, real=True)
     f = sympy.Symbol("static_frequency", real=True)
-    given = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
-    law = static.law(u, **given)
+    symbols = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
+    law = static.law(u, **symbols)
     for requirement in static.require(**asked(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})):
         eq.require(*requirement)
     if law is None:
         return
     _check_law(static, law, {u: 1, f: 1, **{own[p.name]: p.default for p in static.parameters}})
     eq.place(sites.static_voltage, eq.U / eq.U0)
-    if "f" in given:
+    if "f" in symbols:
         eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
     P, Q = law
     powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)

@@ -8,9 +8,9 @@ import sympy
 from tractexp.kernel.graph import Basic, Symbol
 
 
-def replaced(expression: sympy.Expr, known: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
+def replaced(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
     """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
-    new: dict[Basic, Basic] = {**known}
+    new: dict[Basic, Basic] = {**substitutes}
 
     def visit(part: Basic) -> Basic:
         if part not in new:
@@ -80,5 +80,6 @@ def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sym
         return a / (a**2 + b**2), -b / (a**2 + b**2)
     if isinstance(part, sympy.Pow) and part.exp.is_Integer and part.exp > 1:
         return _product([args[0]] * int(part.exp))
-    assert isinstance(part, sympy.Expr)
+    if not isinstance(part, sympy.Expr):  # the condition True of a piece
+        return part, zero  # pyright: ignore[reportReturnType]
     return part.as_real_imag()  # pyright: ignore[reportReturnType] # SymPy's own types allow for None

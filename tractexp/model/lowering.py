@@ -58,6 +58,8 @@ class _Hoister:
         return self._made[e]
 
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
+        if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition
+            return e.func(*map(self, arguments(e)))
         if self.is_constant(e):
             return self.constant(e)
         if self.is_signal(e):
@@ -149,12 +151,12 @@ def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbo
 
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
-    known = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
+    defined = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
     for phase in (lowered.start, lowered.rest, lowered.constant, lowered.derivative, lowered.renewal, lowered.output):
         if phase is None:
             continue
         own = {*lowered.constants, *(s for s, _ in (*phase.steps, *phase.signals))}
-        if stray := symbols(phase) - known - own:
+        if stray := symbols(phase) - defined - own:
             raise UserError(
                 f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the model declares"
             )

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, check_choice
+from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel, width
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
@@ -107,9 +107,9 @@ class Model:
         """The same load as a known recorder shows it: without parameters, before the faults of the measurement."""
         if recorder is None:
             return self
-        made = copy.copy(self)
-        made.recorder, made.measurements = recorder, (recorder, *self.measurements)
-        return made
+        model = copy.copy(self)
+        model.recorder, model.measurements = recorder, (recorder, *self.measurements)
+        return model
 
     @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -236,7 +236,7 @@ class Model:
         sample, as the paper does, whatever error that leaves.
         """
         most = MOST_SUBSTEPS if self.integration == CLASSICAL else 1
-        chosen, left = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
+        chosen, error = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
         parts = [drive.part(e) for e in range(drive.events)]
         if until is not None:
             t = drive.inputs[INPUTS.index("t")]  # from each event's first sample on
@@ -249,10 +249,10 @@ class Model:
                 good = coarse.miss[e] == 0
                 gaps = np.abs(coarse.outputs[:, good, part] - fine.outputs[:, good, part])
                 worst = np.sort(np.nan_to_num(gaps.max(axis=(0, 2), initial=0.0), nan=np.inf))
-                left[e] = worst[: max(1, int(np.ceil(share * len(worst))))].max(initial=0.0)
-            short = ~(left <= tolerance) & (chosen < most)
+                error[e] = worst[: max(1, int(np.ceil(share * len(worst))))].max(initial=0.0)
+            short = ~(error <= tolerance) & (chosen < most)
             if not short.any():
-                return chosen, left
+                return chosen, error
             chosen, coarse = np.where(short, 2 * chosen, chosen), fine
             if not short.all():
                 coarse = self.simulate(drive, values, chosen)
@@ -263,12 +263,12 @@ class Model:
         if miss[event, 0] == 0:
             return None  # the kernel found one; the sentence takes the symbols, which take a second to load
         eq = self.equations
-        known = dict(zip(self.names, map(float, values), strict=True))
-        known |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
+        numbers = dict(zip(self.names, map(float, values), strict=True))
+        numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
 
         def number(expression: Any) -> float:
             whole = eq.expand(expression)
-            return complex(whole.subs({s: known[s.name] for s in whole.free_symbols})).real
+            return complex(whole.subs({s: numbers[s.name] for s in whole.free_symbols})).real
 
         missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
         return "; ".join(missed) or "no steady state was found before the event; its equations have no solution there"
@@ -279,11 +279,11 @@ class Model:
         Valid where `refusal` has nothing to say; quantities that are phasors are left out.
         """
         stated = json.loads(text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest")))
-        given = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
-        known = dict(zip((*self.names, "P0", "Q0", *EVENT), given, strict=True))
+        numbers = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
+        substitutes = dict(zip((*self.names, "P0", "Q0", *EVENT), numbers, strict=True))
         starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[0, :, 0].tolist()
-        known |= dict(zip(stated["starts"], starts, strict=True))
-        return evaluated(stated["quantities"], known)
+        substitutes |= dict(zip(stated["starts"], starts, strict=True))
+        return evaluated(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
         from tractexp.model.before import starts, stated
@@ -349,5 +349,5 @@ def compose(
     check_choice("domain", domain, DOMAINS)
     names = [effect.name for effect in effects]
     if twice := next((n for n in names if names.count(n) > 1), None):
-        raise UserError(f"model.effects names '{twice}' twice; name each effect once")
+        raise UserError(f"{MODEL.effects} names '{twice}' twice; name each effect once")
     return Model(motor, static, effects, integration, domain)

@@ -59,9 +59,9 @@ def count(text: str) -> Cost:
     totals: dict[str, Counter[str]] = {name: Counter() for name in ("points", "signals", "outputs", "step")}
     inside: list[str] = []
     for line in text.splitlines():
-        if found := PASSAGE.match(line):
-            if found[1] == "begin":
-                inside.append(found[2])
+        if passage := PASSAGE.match(line):
+            if passage[1] == "begin":
+                inside.append(passage[2])
             else:
                 inside.pop()
         elif inside:

@@ -5,6 +5,7 @@ is registered, and the bases' `*_, **parameters` leave them open to a type check
 docs/plugins.md.
 """
 
+import inspect
 from abc import abstractmethod
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -112,6 +113,8 @@ class Static(Part):
     def check_class(cls, where: str) -> None:
         super().check_class(where)
         check_signature(cls, "law", "u", where, offered=("f",))
+        if "f" in inspect.signature(cls.law).parameters and "f" not in cls.reads:
+            raise UserError(f"{where}: law() asks for the frequency, f, which not every record has; say reads = ('f',)")
         check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
         check_signature(cls, "damping", None, where, all_taken=False)
 

@@ -21,11 +21,11 @@ def lines(eq: "Equations") -> list[str]:
             halves, (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")), strict=True
         )
     tex = lambda e: sympy.latex(e, symbol_names=names, imaginary_unit="j", mul_symbol=r" \, ")  # noqa: E731
-    made = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in eq.states.values()]
-    made += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in eq.memories.values()]
-    made += [f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()]
-    made += [f"{site.latex} = {tex(drawn)}" for site, drawn in eq._drawn.items()]
-    return made + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]
+    equations = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in eq.states.values()]
+    equations += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in eq.memories.values()]
+    equations += [f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()]
+    equations += [f"{site.latex} = {tex(drawn)}" for site, drawn in eq._drawn.items()]
+    return equations + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]
 
 
 def changed(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:

@@ -35,9 +35,9 @@ def check_signature(
             raise UserError(f"{where}: {method}() gets its parameters by name, so it cannot take *{argument.name}")
     rest = any(a.kind is a.VAR_KEYWORD for a in arguments)
     taken = {a.name for a in arguments}
-    if all_taken and not rest and (left := [name for name in own if name not in taken]):
+    if all_taken and not rest and (unused := [name for name in own if name not in taken]):
         raise UserError(
-            f"{where}: {method}() does not take the parameter '{left[0]}'; add it to its arguments, or drop it"
+            f"{where}: {method}() does not take the parameter '{unused[0]}'; add it to its arguments, or drop it"
         )
 
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.provenance import digest
 from tractexp.record.direction import OUTWARD, direction
 from tractexp.record.event import Event, detect, steady
@@ -81,13 +81,13 @@ def check_load(where: str, U: float, S: float = 0.0) -> None:
     if not low <= U <= high:
         raise UserError(
             f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most {high:g} kV; if the "
-            "numbers are in V, say so: data.units={U: V}"
+            f"numbers are in V, say so: {DATA.units}={{U: V}}"
         )
     if np.sqrt(3) * U * GREATEST_CURRENT < S:
         raise UserError(
-            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, and "
-            "no load draws as much; say the units of voltage and of current or power, such as data.units={U: kV, I: A} "
-            "or data.units={U: kV, P: kW, Q: kvar}"
+            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, "
+            f"and no load draws as much; say the units of voltage and of current or power, such as "
+            f"{DATA.units}={{U: kV, I: A}} or {DATA.units}={{U: kV, P: kW, Q: kvar}}"
         )
 
 
@@ -134,11 +134,11 @@ def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, val
 def check_numbers(train: Sequence[int] | None, validate: Sequence[int] | None) -> None:
     """Raise `UserError` for no dip to fit, and for one that is named twice."""
     if train is not None and not train:
-        raise UserError("data.train is empty: name at least one dip by its number, e.g. data.train=[1]")
+        raise UserError(f"{DATA.train} is empty: name at least one dip by its number, e.g. {DATA.train}=[1]")
     numbers = [*(train or []), *(validate or [])]
     for number in numbers:
         if numbers.count(number) > 1:
-            raise UserError(f"data.train and data.validate name dip {number} twice; a dip may serve only once")
+            raise UserError(f"{DATA.train} and {DATA.validate} name dip {number} twice; a dip may serve only once")
 
 
 def _picked(where: str, number: int, results: Mapping[int, Record | UserError]) -> Record:

@@ -77,14 +77,24 @@ class Identity:
         """The same for all dips of one recording."""
         return Identity(dict(self.source) | {"file": DIP.sub("", self.source.get("file", ""))}, self.base)
 
-    def __str__(self) -> str:
+    @property
+    def parts(self) -> list[str]:
+        """What is known of it, in words."""
         said = [f"{key} {text}" * (key != "file") or text for key, text in self.source.items() if text]
         for base, name in ((self.base, "per unit of"), (self.given_base or {}, "in the file of")):
             sizes = [
                 f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)
             ]
             said += [f"{name} {' and '.join(sizes)}"] * bool(sizes)
-        return "; ".join(said if self.voltage or self.power or not said else [*said, UNKNOWN])
+        return said
+
+    @property
+    def unknown(self) -> list[str]:
+        """That nobody said what one per unit is, in words; [] where somebody did."""
+        return [UNKNOWN] if self.parts and not (self.voltage or self.power) else []
+
+    def __str__(self) -> str:
+        return "; ".join([*self.parts, *self.unknown])
 
 
 def distinct(identities: Iterable[Identity]) -> list[Identity]:
@@ -94,6 +104,16 @@ def distinct(identities: Iterable[Identity]) -> list[Identity]:
         if one.recording not in recordings:
             recordings.append(one.recording)
     return recordings
+
+
+def described(identities: Iterable[Identity]) -> list[str]:
+    """The recordings in words, each once; what is unknown of several is said once, with those it concerns."""
+    recordings = distinct(identities)
+    unknown = [one for one in recordings if one.unknown]
+    if len(unknown) < 2:
+        return [*map(str, recordings)]
+    concerned = "each" if unknown == recordings else ", ".join(one.parts[0] for one in unknown)
+    return [*("; ".join(one.parts) for one in recordings), f"{UNKNOWN} of {concerned}"]
 
 
 def label(identities: Iterable[Identity]) -> str:

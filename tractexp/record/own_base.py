@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.provenance import digest
 from tractexp.record.event import Event, detect
 from tractexp.record.record import DECLARATION, LOAD, Base, Record
@@ -97,7 +97,7 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
             raise UserError(
                 f"{other.where} does not say how many MVA one per unit is, and {which.where} is per unit of"
                 f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of both"
-                " (data.base_power in MVA, with data.units={P: pu, Q: pu}), or of none"
+                f" ({DATA.base_power} in MVA, with {DATA.units}={{P: pu, Q: pu}}), or of none"
             )
     return [own.put(event) for event in events]
 

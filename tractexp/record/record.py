@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
@@ -244,13 +244,13 @@ class Record:
         if span < 1 / self.base.frequency:
             raise UserError(
                 f"{self.where}: the record lasts {span:.3g} s, less than one cycle of {self.base.frequency:g} Hz; t "
-                "must be in seconds (data.units={t: ms} says else)"
+                f"must be in seconds ({DATA.units}={{t: ms}} says else)"
             )
         if self.step > LONGEST_STEP:
             raise UserError(
                 f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to "
                 f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in "
-                "seconds (where a table has ms: data.units={t: ms})"
+                f"seconds (where a table has ms: {DATA.units}={{t: ms}})"
             )
 
     def _check_per_unit(self) -> None:
@@ -259,13 +259,14 @@ class Record:
         if not low <= U <= high:
             raise UserError(
                 f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is expected); if it is "
-                "in V or kV, say so, data.units={U: V}, or give the base as data.base_voltage (kV, line to line)"
+                f"in V or kV, say so, {DATA.units}={{U: V}}, or give the base as {DATA.base_voltage} (kV, line to line)"
             )
         S = float(np.nanmax(np.abs([self.P, self.Q])))
         if S > PLAUSIBLE_POWER:
             raise UserError(
                 f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
-                "if it is in kW or MW, say so, data.units={P: kW, Q: kvar}, or give the base as data.base_power (MVA)"
+                f"if it is in kW or MW, say so, {DATA.units}={{P: kW, Q: kvar}}, or give the "
+                f"base as {DATA.base_power} (MVA)"
             )
         if self.f is None:
             return
@@ -276,5 +277,6 @@ class Record:
             raise UserError(
                 f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
                 f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say its unit, "
-                "data.units={f: mHz}, the nominal frequency, data.frequency=60, or leave f out, data.columns={f: null}"
+                f"{DATA.units}={{f: mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f out, "
+                f"{DATA.columns}={{f: null}}"
             )

@@ -6,7 +6,7 @@ import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
 
-from tractexp.errors import UserError, nearest
+from tractexp.errors import DATA, UserError, nearest
 from tractexp.files import read
 from tractexp.record import Record, endings, reader_of
 from tractexp.record.foreign import is_record
@@ -29,7 +29,7 @@ def files(folder: Path) -> Iterator[Path]:
     """
     if not folder.is_dir():
         kind = "a file; give the folder it lies in" if folder.exists() else "no folder that is there"
-        raise UserError(f"data.path={folder} is {kind}")
+        raise UserError(f"{DATA.path}={folder} is {kind}")
     readable = endings()
     for place, below, names in os.walk(folder):
         if RUN in below and Path(place) != folder:  # a converted file may still be opened by its own path

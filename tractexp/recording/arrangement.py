@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError, setting
 from tractexp.plugin import chosen
 from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
@@ -91,9 +91,10 @@ def _residuals(recording: Recording, feeder: Feeder) -> None:
     for key, numbers in (("voltages", feeder.voltages), ("currents", feeder.currents)):
         if odd := [i for i in numbers if len(numbers) > 1 and residual(recording.channels[i])]:
             rest = [i for i in numbers if i not in odd]
+            where = setting(f"data.{key}")
             raise UserError(
-                f"data.{key}={[*numbers]}: {_called(recording, odd[0])} is the residual of all phases, and no phase; "
-                f"give the phases, or with two line voltages or two current transformers those alone: data.{key}={rest}"
+                f"{where}={[*numbers]}: {_called(recording, odd[0])} is the residual of all phases, and no phase; "
+                f"give the phases, or with two line voltages or two current transformers those alone: {where}={rest}"
             )
 
 
@@ -128,8 +129,8 @@ def _lines(recording: Recording, feeder: Feeder) -> None:
         return
     names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
     raise UserError(
-        f"data.voltages={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
-        f"data.connection={connection.name} takes line-to-line voltages; give three channels to ground, or lines"
+        f"{DATA.voltages}={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
+        f"{DATA.connection}={connection.name} takes line-to-line voltages; give three channels to ground, or lines"
     )
 
 
@@ -201,15 +202,15 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     if UNEVEN * V1 < V2 <= V1:
         names = ", ".join(_called(recording, i) for i in feeder.voltages)
         raise UserError(
-            f"data.voltages={[*feeder.voltages]}: in the calm, the negative sequence is {100 * V2 / V1:.0f} % of the "
+            f"{DATA.voltages}={[*feeder.voltages]}: in the calm, the negative sequence is {100 * V2 / V1:.0f} % of the "
             f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the file holds"
         )
     if V2 <= V1:
         return
     if _to_ground(feeder) and (k := _turned(live.V[:, live.calm])) is not None:
-        raise UserError(f"data.voltages={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
+        raise UserError(f"{DATA.voltages}={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
     raise UserError(
-        f"data.voltages={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
+        f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
         f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one; give {_swapped(feeder)}"
     )
 
@@ -235,8 +236,8 @@ def _turned(X: np.ndarray) -> int | None:
 
 
 def _said(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
-    currents_text = f"data.currents=[{', '.join(map(str, currents))}]"
-    return currents_text if voltages is None else f"data.voltages=[{', '.join(map(str, voltages))}] {currents_text}"
+    currents_text = f"{DATA.currents}=[{', '.join(map(str, currents))}]"
+    return currents_text if voltages is None else f"{DATA.voltages}=[{', '.join(map(str, voltages))}] {currents_text}"
 
 
 def _called(recording: Recording, number: int) -> str:
@@ -258,8 +259,8 @@ def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> 
         S, T = _power(live, (0, 1, 2)), _power(live, tuple(feeder.currents.index(i) for i in labelled))
         both = f", which gives {_mw(T)} where the present order has {_mw(S)}"
     raise UserError(
-        f"data.currents are the phases {_letters(c)} where data.voltages are {_letters(v)}, says {recording.source}; "
-        f"give both in the same order: {_said(None, labelled)}{both}"
+        f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)}, says "
+        f"{recording.source}; give both in the same order: {_said(None, labelled)}{both}"
     )
 
 
@@ -305,7 +306,7 @@ def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
 def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: complex, ratio: float) -> None:
     """Refuse currents of the opposite sequence where another order, or one turned round, is balanced."""
     if (k := _turned(live.I[:, live.calm])) is not None:
-        raise UserError(f"data.currents={[*feeder.currents]}: {_called(recording, feeder.currents[k])} {TURNED}")
+        raise UserError(f"{DATA.currents}={[*feeder.currents]}: {_called(recording, feeder.currents[k])} {TURNED}")
     tried = []
     for p in permutations(range(3)):
         first, second = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I[[*p]]))
@@ -320,7 +321,7 @@ def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: compl
 def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], why: str) -> None:
     proposal = tuple(feeder.currents[k] for k in permutation)
     raise UserError(
-        f"data.currents={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(live, permutation))}"
+        f"{DATA.currents}={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(live, permutation))}"
     )
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, UserError
 from tractexp.plugin import chosen
 from tractexp.record.phasor import Phasors, measure
 from tractexp.recording.estimator import estimator_of
@@ -65,8 +65,8 @@ class FeederWaves:
             if np.ptp(skew[used]) > 1e-9:
                 names = ", ".join(self.recording.channels[i].name for i in np.array(self.numbers)[used])
                 raise UserError(
-                    f"data.skew=true: the channels {names} are sampled at different times, and the connection "
-                    "needs them at once; leave data.skew out"
+                    f"{DATA.skew}=true: the channels {names} are sampled at different times, and the connection "
+                    f"needs them at once; leave {DATA.skew} out"
                 )
             delays.append(skew[used][0])
         return np.array(delays)
@@ -95,7 +95,7 @@ def phasors_of(
     for h in harmonics:
         if h < 2 or h * 1.1 * recording.frequency >= segment.rate / 2:
             most = int(segment.rate / 2 / 1.1 / recording.frequency)
-            raise UserError(f"data.harmonics={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}")
+            raise UserError(f"{DATA.harmonics}={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}")
     waves = FeederWaves.of(recording, feeder, segment)
     try:
         return measure(

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from tractexp import plugin, quoting
-from tractexp.errors import UserError, check_range
+from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered
@@ -63,7 +63,7 @@ class WaveformReader(Reader):
 
     def check(self) -> None:
         if not self.path:
-            raise UserError(f"data.path is missing: give the file, e.g. data.path=station{self.endings[0]}")
+            raise UserError(f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}")
         check_units(self.units, self.quantities)
         check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)
@@ -92,7 +92,7 @@ class WaveformReader(Reader):
             return file_dips
         U, S = level(first)
         if S < 1e-6:
-            raise UserError(f"{self.path}: data.currents carry no power before the first dip ({1e6 * S:.2g} VA)")
+            raise UserError(f"{self.path}: {DATA.currents} carry no power before the first dip ({1e6 * S:.2g} VA)")
         check_load(self.path, U, S)
         return [replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD))) for dip in file_dips]
 
@@ -122,20 +122,20 @@ class WaveformReader(Reader):
         name = self.connection or self._usual(recording)
         connection, numbers = plugin.chosen("connection", name), {}
         for key, wanted in (("voltages", connection.voltages), ("currents", connection.currents)):
-            channels = getattr(self, key)
+            channels, where = getattr(self, key), setting(f"data.{key}")
             if len(channels) != wanted:
                 raise UserError(
-                    f"data.{key}={[*channels]} must name {COUNT[wanted]} channels (data.connection={connection.name}); "
+                    f"{where}={[*channels]} must name {COUNT[wanted]} channels ({DATA.connection}={connection.name}); "
                     f"{recording.source} has "
                     + ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
                 )
             numbers[key] = tuple(recording.number(each, f"data.{key}") for each in channels)
             if len(set(numbers[key])) < wanted:
-                raise UserError(f"data.{key}={[*channels]} names a channel twice; {wanted} different ones are needed")
+                raise UserError(f"{where}={[*channels]} names a channel twice; {wanted} different ones are needed")
             for i in numbers[key]:
                 if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
                     raise UserError(
-                        f"data.{key}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
+                        f"{where}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
                         f"{recording.channels[i].unit}; choose {key}"
                     )
         feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
@@ -164,17 +164,18 @@ class WaveformReader(Reader):
             every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
             noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
             raise UserError(
-                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; data.voltages and "
-                f"data.currents name one; its channels: {every}"
+                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; {DATA.voltages} and "
+                f"{DATA.currents} name one; its channels: {every}"
             )
         loads = "; ".join(
-            f"{f.name}: {quoting.shell(*(assigned(f'data.{key}', value) for key, value in f.settings.items()))}"
+            f"{f.name}: "
+            + quoting.shell(*(assigned(setting(f"data.{key}"), value) for key, value in f.settings.items()))
             for f in proposed
         )
         asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
         raise UserError(
-            f"data.voltages and data.currents are missing, and {recording.source} shows {len(proposed)} loads; {asked}"
-            f"choose one: {loads}"
+            f"{DATA.voltages} and {DATA.currents} are missing, and {recording.source} shows {len(proposed)} loads; "
+            f"{asked}choose one: {loads}"
         )
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, nearest
+from tractexp.errors import UserError, nearest, setting
 
 # {unit as files write it, in lower case: (quantity, factor to the unit used inside: kV, kA)}
 UNITS: Mapping[str, tuple[str, float]] = {
@@ -169,16 +169,16 @@ class Recording:
         names = [channel.name.strip() for channel in self.channels]
         if isinstance(each, int) and not isinstance(each, bool):
             if not 0 <= each < len(names):
-                raise UserError(
-                    f"{where}: there is no channel {each} in {self.source}, which has {len(names)}, counted from 0"
-                )
+                extent = f"which has {len(names)}, counted from 0"
+                raise UserError(f"{setting(where)}: there is no channel {each} in {self.source}, {extent}")
             return each
         if str(each) not in names:
             other = {"data.voltages": "current", "data.currents": "voltage"}.get(where)
             fitting = [name for name, c in zip(names, self.channels, strict=True) if c.quantity != other]
-            raise UserError(f"{where}: {self.source} has no analog channel '{each}'{nearest(str(each), fitting)}")
+            lack = f"{self.source} has no analog channel '{each}'{nearest(str(each), fitting)}"
+            raise UserError(f"{setting(where)}: {lack}")
         if names.count(str(each)) > 1:
-            raise UserError(f"{where}: {self.source} has several channels '{each}'; give the number, from 0")
+            raise UserError(f"{setting(where)}: {self.source} has several channels '{each}'; give the number, from 0")
         return names.index(str(each))
 
     def matrix(self, numbers: Sequence[int], segment: Segment) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, among
+from tractexp.errors import DATA, UserError, among
 from tractexp.recording.label import kind
 from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
 
@@ -30,15 +30,15 @@ def amount(text: str) -> tuple[float, str]:
 def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAIN)) -> None:
     """Raise `UserError` for a setting that names no quantity of a recording, or a unit that does not fit it."""
     if not isinstance(units, Mapping):
-        raise UserError(f"data.units={units!s:.60} must be a mapping, such as data.units={{U: kV, I: A}}")
+        raise UserError(f"{DATA.units}={units!s:.60} must be a mapping, such as {DATA.units}={{U: kV, I: A}}")
     for letter, text in units.items():
         if letter not in quantities:
-            raise UserError(f"data.units names '{letter}'{among(letter, quantities, 'Quantities')}")
+            raise UserError(f"{DATA.units} names '{letter}'{among(letter, quantities, 'Quantities')}")
         if letter in PLAIN and (unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0):
             _, small, large = PLAIN[letter]
             raise UserError(
-                f"data.units: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small} or {large}, or, where "
-                f"the file has units of its own, so many of them: '89.8 {large}'"
+                f"{DATA.units}: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small} or {large}, or, "
+                f"where the file has units of its own, so many of them: '89.8 {large}'"
             )
 
 
@@ -112,8 +112,8 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     plainly = ", ".join(f"{letter}: {PLAIN[letter][2]}" for letter in odd)
     stands = ", ".join(f"{letter}: '1.5 {PLAIN[letter][2]}'" for letter in odd)
     raise UserError(
-        f"{recording.source}: {said}: say the unit, data.units={{{plainly}}} or V, A, or what one of the file's units, "
-        f"or one per unit, stands for, data.units={{{stands}}}"
+        f"{recording.source}: {said}: say the unit, {DATA.units}={{{plainly}}} or V, A, or what one of the file's "
+        f"units, or one per unit, stands for, {DATA.units}={{{stands}}}"
     )
 
 

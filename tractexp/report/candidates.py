@@ -32,9 +32,9 @@ def candidates(page: Report, findings: Findings) -> None:
     rows = evidence(findings)
     labels = _labels(rows)
     page.heading("Candidates by their evidence")
-    seen = [row for row in rows if np.isfinite(row.drop)]
-    if seen:
-        page.chart(_bars(findings, seen, labels), _bars_caption(findings, seen))
+    finite = [row for row in rows if np.isfinite(row.drop)]
+    if finite:
+        page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
     for sentence in (why_not_the_most_helpful(findings), beside(findings)):
         page.text(*[sentence] * bool(sentence))
     entries = [
@@ -90,16 +90,16 @@ def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
 def _sets(page: Report, findings: Findings) -> None:
     """How the refitted sets of the chosen size compare."""
     rows = [
-        [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}", f"{r.distance:.1f}",
+        [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
          "" if r.tests is None else by_draws(r.tests.p_left)]
         for r in findings.survivors.rivals[:MOST_SETS]
     ]  # fmt: skip
     with page.folded("How the refitted sets compare"):
         page.table(
-            ["set", "deviance", "behind", "distance of the curves", "verdict", "chance leaves as much"], rows,
+            ["set", "deviance", "behind", "verdict", "chance leaves as much"], rows,
             "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
-            " well; it is adequate when chance may leave as much as it does.", words=(4, 5),
+            " well; it is adequate when chance may leave as much as it does.", words=(3, 4),
         )  # fmt: skip
 
 

@@ -33,8 +33,8 @@ def places(page: Report, findings: Findings) -> None:
 
 def noise(page: Report, findings: Findings) -> None:
     context, fit = findings.context, findings.last
-    judged = fit.noise.loudest_input_mode <= context.criteria.blurred
-    about = context.domain.about_noise(findings.catalogue.of_measurement, judged)
+    quiet = fit.noise.loudest_input_mode <= context.criteria.blurred
+    about = context.domain.about_noise(findings.catalogue.of_measurement, quiet)
     page.heading("Noise").text(f"{context.describe(fit.noise)}. {about}")
     if (window := context.records.window) is not None:
         model = " The extended configuration does not do so." if findings.names else ""

@@ -14,7 +14,7 @@ from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.identification.model_error import in_percent
-from tractexp.record.identity import Identity, distinct, title
+from tractexp.record.identity import Identity, described, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places
 from tractexp.report.extended import equations, interval, laws, parameters, value
@@ -82,7 +82,7 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
     """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
     events = len(findings.context.events)
     fitted = f"{events} event{'s' * (events > 1)} fitted, {len(findings.withheld)} held out"
-    lead = "; ".join([*map(str, distinct(identities)), f"{findings.context.model.title}, {fitted}"])
+    lead = "; ".join([*described(identities), f"{findings.context.model.title}, {fitted}"])
     page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
     spoken = [joined([findings.catalogue.spoken(name) for name in names]) for names in findings.verdict.sets]
     head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()

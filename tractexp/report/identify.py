@@ -18,7 +18,7 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, PROFILED, TRADES
 from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
-from tractexp.record.identity import Identity, distinct, title
+from tractexp.record.identity import Identity, described, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
 from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
@@ -107,7 +107,7 @@ def report(fit: "Identification") -> Report:
     result, details = fit.result, fit.details
     uncertainty, together = details.uncertainty, details.agreement
     names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
-    lead = "; ".join([*map(str, distinct(of)), f"{result.optimizer}, seed {result.seed}."])
+    lead = "; ".join([*described(of), f"{result.optimizer}, seed {result.seed}."])
     page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
         as_sentence(fit.headline),
@@ -244,17 +244,17 @@ def errors(fit: "Identification") -> Table:
 
 def samples(fit: "Identification") -> list[str]:
     """How many samples were fitted, in a sentence; [] of an early result."""
-    known = fit.result.uncertainty
-    if "samples" not in known:
+    statistics = fit.result.uncertainty
+    if "samples" not in statistics:
         return []
-    said = f"{known['samples']} samples compared, {known['parameters']} parameters searched"
-    return [f"fitted: {said}, {known['freedom']} degrees of freedom"]
+    said = f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
+    return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
 
 
 def correlations(fit: "Identification") -> list[str]:
     """The correlations that a terminal has room for, the strongest first; [] where none is strong."""
-    known = fit.result.uncertainty
-    names, matrix = known.get("names", []), known.get("correlation", [])
+    statistics = fit.result.uncertainty
+    names, matrix = statistics.get("names", []), statistics.get("correlation", [])
     pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
     strong = [f"{a} and {b} {r:+.3f}" for r, a, b in sorted(pairs, key=lambda p: -abs(p[0])) if abs(r) >= TRADES]
     return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []

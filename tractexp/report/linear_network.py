@@ -68,5 +68,5 @@ def report(fit: "NetworkFit") -> Report:
     page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
     page.heading("Poles").add(poles(fit))
     page.heading("How this page was made")
-    made = [["tractexp", fit.content["tractexp_version"]], *[["command", command()]] * bool(command())]
-    return page.table(["", ""], made, words=(1,))
+    origin = [["tractexp", fit.content["tractexp_version"]], *[["command", command()]] * bool(command())]
+    return page.table(["", ""], origin, words=(1,))

@@ -88,9 +88,9 @@ def _marked(chart: Chart, shown: Sight) -> Chart:
     spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
     room = LABEL * float(spans[-1][-1] - spans[0][0])
     last = -np.inf
-    for seen in shown.events:
-        what = seen.what
-        text = "" if what.start < last + room else what.kind if seen.dip is None else f"{what.kind} {seen.dip}"
+    for event in shown.events:
+        what = event.what
+        text = "" if what.start < last + room else what.kind if event.dip is None else f"{what.kind} {event.dip}"
         last = what.start if text else last
         chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text=text)
     return chart
@@ -112,7 +112,7 @@ def _of_record(shown: Sight) -> Chart:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
     first = float(record.t[0])
-    return _marked(chart, shown).cursor(next((seen.what.start for seen in shown.events), first))
+    return _marked(chart, shown).cursor(next((event.what.start for event in shown.events), first))
 
 
 def _every(view: View) -> tuple[int, int]:
@@ -158,7 +158,7 @@ def _of_waves(
     chart.limits(None, first, last)
     if recording.trigger is not None and first <= recording.trigger <= last:
         chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
-    happened = (seen.what.start for seen in shown.events if first <= seen.what.start <= last)
+    happened = (event.what.start for event in shown.events if first <= event.what.start <= last)
     return _marked(chart, shown).cursor(next(happened, first) + CYCLE / recording.frequency)
 
 
@@ -269,8 +269,8 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
 
 def _details(page: Report, view: View, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
-    for seen in shown.events[:DETAILED]:
-        what = seen.what
+    for event in shown.events[:DETAILED]:
+        what = event.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
         with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
             page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")

@@ -65,9 +65,9 @@ def currents(event: WaveEvent, overlay: Overlay) -> Chart:
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
-    seen = [(name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)]
+    curves = [(name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)]
     return event_chart(
-        seen[0][1][0], [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in seen]
+        curves[0][1][0], [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in curves]
     )
 
 

@@ -88,8 +88,8 @@ SIEVE = (
 def _heads() -> str:
     heads = []
     for key, label, kind, _ in COLUMNS:
-        left = ' class="words"' if kind in ("name", "words", "why") else ""
-        heads.append(f"<th{left}{'' if kind == 'picture' else f' data-key={key}'}>{quoting.html(label)}</th>")
+        css = ' class="words"' if kind in ("name", "words", "why") else ""
+        heads.append(f"<th{css}{'' if kind == 'picture' else f' data-key={key}'}>{quoting.html(label)}</th>")
     return "".join(heads)
 
 

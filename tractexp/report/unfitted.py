@@ -41,15 +41,15 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         ratio = 1 - event["depth"]
         if event["kind"] not in LASTING or ratio <= 0 or abs(event["depth"]) < SMALLEST:
             continue
-        found = {
+        exponents = {
             name: log(event[f"{power}_after"] / event[f"{power}_before"]) / log(ratio)
             for name, power in (("p_v", "P"), ("q_v", "Q"))
             if _alike(event[f"{power}_before"], event[f"{power}_after"])
         }
-        if "p_v" not in found:
+        if "p_v" not in exponents:
             continue
-        values = " and ".join(f"{name} {value:.2g}" for name, value in found.items())
-        fixed = " ".join(f"model.fixed.{name}={value:.2g}" for name, value in found.items())
+        values = " and ".join(f"{name} {value:.2g}" for name, value in exponents.items())
+        fixed = " ".join(f"model.fixed.{name}={value:.2g}" for name, value in exponents.items())
         yield (
             f"the {event['kind']} of {abs(event['depth']):.1%} at {event['start']:.3f} s tells the static exponents of"
             f" {feeder['name']}: {values}, each wrong by {ITSELF / abs(log(ratio)):.1g} for every percent that the load"

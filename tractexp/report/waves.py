@@ -136,15 +136,15 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
     Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning included.
     """
     compared = np.array(event.compared)[:, None]
-    left = event.of_phases((np.nan_to_num(event.currents) - currents) * compared)
+    residual = event.of_phases((np.nan_to_num(event.currents) - currents) * compared)
     cycle = event.rate / event.f0
-    after = min(AFTER * event.rate, left.shape[1] - event.start)
+    after = min(AFTER * event.rate, residual.shape[1] - event.start)
     size = abs(event.P0 + 1j * event.Q0) / event.U0  # of the fundamental's peak [pu]
     parts = []
     for samples, last in ((after, None), (event.start - event.lead, event.start)):
         n = round(max(1, int(samples / cycle + 0.25)) * cycle)
         first = event.start if last is None else max(event.start - n, event.lead)
-        part = left[:, first : min(first + n, left.shape[1])]
+        part = residual[:, first : min(first + n, residual.shape[1])]
         amplitudes = np.abs(np.fft.rfft(part)) / part.shape[1] * 2 / size
         amplitudes[:, 0] /= 2
         parts.append(

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, among
+from tractexp.errors import TASK, UserError, among
 from tractexp.tracking.owner import search
 from tractexp.tracking.store import open_store, sentences
 
@@ -65,7 +65,7 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
             raise
         reason = str(error).strip().partition("\n")[0]
         raise UserError(
-            f"task.filter={filter} is not a filter that MLflow understands ({reason}); one is "
+            f"{TASK.filter}={filter} is not a filter that MLflow understands ({reason}); one is "
             "\"tags.data = 'tibet_50pct' and tags.optimizer = 'issa'\""
         ) from error
 

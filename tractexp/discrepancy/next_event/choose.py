@@ -244,7 +244,7 @@ def _fitted_to(context: Context, noise: Noise, sides: Sequence[Side], truth: Sid
     whole = context.on(Records.of((*context.records.recorded, as_recorded(context, event, power))))
     wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
     input_modes = None if noise.input_modes is None else QuietNoise.at(whole, wide[0]).input_modes
-    both = noise.on(whole.power, input_modes)
+    both = noise.on(whole.problem.power, input_modes)
     fits_by_name = {
         f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])
     }

@@ -13,7 +13,7 @@ from tractexp.discrepancy.fitting import Start, refit
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.domain import domain_of
-from tractexp.errors import UserError
+from tractexp.errors import TASK, UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import joined
@@ -34,8 +34,8 @@ def event_for(
     sets = list(dict.fromkeys(tuple(sorted(names)) for names in rivals))
     if len(sets) < 2:
         raise UserError(
-            f"task.rivals={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
-            " another one, such as 'task.rivals=[stator_resistance,feeder_impedance]'"
+            f"{TASK.rivals}={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
+            f" another one, such as '{TASK.rivals}=[stator_resistance,feeder_impedance]'"
         )
     events = domain_of(model).events(events)
     check_events(events, ())
@@ -61,11 +61,11 @@ def _check(missing: Catalogue, named: Sequence[str]) -> None:
     """Raise `UserError` for a name that is no effect of the load, or one that the events do not show."""
     for name in named:
         if name in missing.untestable:
-            raise UserError(f"task.rivals names '{name}', which cannot be tested here: {missing.untestable[name]}")
+            raise UserError(f"{TASK.rivals} names '{name}', which cannot be tested here: {missing.untestable[name]}")
         if name not in missing.of_load:
             raise UserError(
-                f"task.rivals names '{name}', which is in the model already, a fault of the measurement, or of another"
-                " law or place; give effects that the model lacks, by the catalogue's names"
+                f"{TASK.rivals} names '{name}', which is in the model already, a fault of the measurement, or of "
+                "another law or place; give effects that the model lacks, by the catalogue's names"
             )
 
 

@@ -10,7 +10,7 @@ from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.task import Job, Task, listed
 from tractexp.blocks import Report, Table
-from tractexp.errors import UserError, check_choice, check_range
+from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import say
@@ -156,11 +156,11 @@ def check(
 ) -> None:  # fmt: skip
     """Raise `UserError` for settings out of range."""
     if sweep is not None and filter is not None:
-        raise UserError("task.sweep and task.filter are both given; the runs come from one or the other")
+        raise UserError(f"{TASK.sweep} and {TASK.filter} are both given; the runs come from one or the other")
     if floor is not None and not 0 < floor < float("inf"):
-        raise UserError(f"task.floor={floor:g} must be an objective above 0, in pu²")
+        raise UserError(f"{TASK.floor}={floor:g} must be an objective above 0, in pu²")
     if not targets:
-        raise UserError("task.targets is empty; it lists multiples of the floor, such as [10,2,1.01]")
+        raise UserError(f"{TASK.targets} is empty; it lists multiples of the floor, such as [10,2,1.01]")
     for target in targets:
         check_range("task.targets", target, 1.0)
     check_range("task.ties", ties, 0.0, 1.0)
@@ -197,8 +197,8 @@ def _compared(
         return source, compared(gathering.gather(runs, source), progress, judging)
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
-            f"task.floor={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
-            " out, or choose one by task.data"
+            f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
+            f" out, or choose one by {TASK.data}"
         )
     return source, several(groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress)
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import UserError, setting
 from tractexp.identification.optimizer import Optimizer
 from tractexp.identification.search import Limits, search
 from tractexp.studies.comparison.statistics import expected_running_time
@@ -32,7 +32,8 @@ def package() -> Any:
         import ioh
     except ImportError as error:
         raise UserError(
-            "task=benchmark needs the package 'ioh', which is not installed: pip install 'tractexp[benchmark]'"
+            f"{setting('task=benchmark')} needs the package 'ioh', which is not installed: "
+            "pip install 'tractexp[benchmark]'"
         ) from error
     return ioh
 

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event
 from tractexp.studies.comparison.runs import SearchRun
 
-TASK = "identify"  # the task whose runs are compared
+FITTING = "identify"  # the task whose runs are compared
 FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
 UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")  # what MLflow says of a run that neither finished nor failed
 ENDED = ("objective", "epsilon_p", "epsilon_q")
@@ -25,7 +25,7 @@ def newest_sweep(folder: Path) -> Path:
     if not sweeps:
         raise UserError(
             f"there is no sweep under {folder} to compare; make one, such as "
-            "tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by task.sweep=FOLDER"
+            f"tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by {TASK.sweep}=FOLDER"
         )
     return max(sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name))
 
@@ -33,13 +33,13 @@ def newest_sweep(folder: Path) -> Path:
 def from_sweep(folder: Path) -> list[SearchRun]:
     """The runs of a sweep's job folders. Raises `UserError` where there is none."""
     if not folder.is_dir():
-        raise UserError(f"task.sweep={folder} is not a folder; a sweep writes one under outputs/sweeps")
+        raise UserError(f"{TASK.sweep}={folder} is not a folder; a sweep writes one under outputs/sweeps")
     jobs = _jobs(folder)
     if not jobs:
         raise UserError(f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)")
     runs = [run for run in map(_job, jobs) if run is not None]
     if not runs:
-        raise UserError(f"the sweep {folder} has no job of task={TASK}, the only one whose runs can be compared")
+        raise UserError(f"the sweep {folder} has no job of task={FITTING}, the only one whose runs can be compared")
     return runs
 
 
@@ -51,7 +51,7 @@ def _jobs(folder: Path) -> list[Path]:
 
 def _job(folder: Path) -> SearchRun | None:
     config = _yaml(folder / ".hydra" / "config.yaml")
-    if config["task"]["name"] != TASK:
+    if config["task"]["name"] != FITTING:
         return None
     status = _status(folder)
     unfinished = _unfinished(folder, status)
@@ -165,11 +165,11 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
     and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
     """
-    runs = [_logged(one) for one in logged if one.tags.get("task") == TASK and "optimizer" in one.tags]
+    runs = [_logged(one) for one in logged if one.tags.get("task") == FITTING and "optimizer" in one.tags]
     if not runs:
         raise UserError(
-            f"{source} matches no run of task={TASK}; the tags to filter by are task, model, optimizer, data and seed, "
-            "as in task.filter=\"tags.data = 'tibet_50pct'\""
+            f"{source} matches no run of task={FITTING}; the tags to filter by are task, model, optimizer, data and "
+            f"seed, as in {TASK.filter}=\"tags.data = 'tibet_50pct'\""
         )
     return runs
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError, among
+from tractexp.errors import TASK, UserError, among
 
 # The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled under one name.
 PROBLEM = ("data", "model", "objective")  # one comparison has one of each
@@ -94,7 +94,7 @@ def on(runs: Sequence[SearchRun], source: str, data: str) -> list[SearchRun]:
     chosen = [run for run in runs if run.data == data]
     if not chosen:
         choices = {run.data for run in runs}
-        raise UserError(f"task.data={data}: {source} has no run on these data{among(data, choices, 'Data')}")
+        raise UserError(f"{TASK.data}={data}: {source} has no run on these data{among(data, choices, 'Data')}")
     return chosen
 
 
@@ -195,7 +195,7 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
     if len(chosen) > 1:
         raise UserError(
             f"{source} holds runs on different data ({', '.join(chosen)}), whose objectives cannot be compared; "
-            f"choose one, such as task.data={chosen[0]}"
+            f"choose one, such as {TASK.data}={chosen[0]}"
         )
     for part in PROBLEM:
         contents = [{k: repr(v) for k, v in run.config.items() if k.partition(".")[0] == part} for run in runs]
@@ -204,5 +204,5 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
             if len(values) > 1:
                 raise UserError(
                     f"{source} holds runs that differ in {key} ({', '.join(values)}), so their objectives cannot be "
-                    "compared; compare one problem at a time, from sweeps of their own or by task.filter"
+                    f"compared; compare one problem at a time, from sweeps of their own or by {TASK.filter}"
                 )

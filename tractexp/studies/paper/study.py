@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import DATA, TASK, UserError
 from tractexp.identification.generalization import by_depth, mean_residual
 from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, respond
@@ -275,7 +275,7 @@ class Study:
             which = "no deeper" if kind == "interpolation" else "deeper"
             raise UserError(
                 f"there is no held-out event for the {kind}: a dip {which} than the fitted one is needed;"
-                " name one in data.validate, or leave the table out with task.parts"
+                f" name one in {DATA.validate}, or leave the table out with {TASK.parts}"
             )
         return chosen
 
