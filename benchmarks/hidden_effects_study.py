@@ -20,7 +20,7 @@ import os
 import subprocess
 import time
 from collections.abc import Container, Iterable, Iterator
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 for library in ("OPENBLAS", "OMP", "MKL"):
@@ -51,7 +51,9 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "left_out": (LEFT_OUT, LARGE, PHYSICAL),
 }
 Trials = Iterator[cases.Planned]
-SUITES = ("nulls", "nuisances", *HIDDEN, "pairs")
+TOGETHER = {"pairs": 2, "triples": 3}
+ERROR = 0.01  # of the response: how inexact the loads are in which nothing is hidden
+SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", *TOGETHER)
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
@@ -69,8 +71,14 @@ def rows_of(name: str, salt: int | None, multiples: Container[float], **settings
         yield from ((f"null, {noise}", cases.nulls(noise, salt, **settings)) for noise in cases.NOISES)
     elif name == "nuisances":
         yield "null with nuisances", cases.nuisances(salt, **settings)
-    elif name == "pairs":
-        yield from ((f"pairs {m:g} x", cases.pairs(m, salt, **settings)) for m in PAIRED if m in multiples)
+    elif name == "inexact":
+        yield f"null, error {ERROR:.0%}", cases.inexact(ERROR, salt, **settings)
+    elif name == "field":
+        for multiple, effect in itertools.product((m for m in PAIRED if m in multiples), PHYSICAL):
+            yield f"field {multiple:g} x", cases.in_the_field(effect, multiple, salt, **settings)
+    elif name in TOGETHER:
+        for m in (m for m in PAIRED if m in multiples):
+            yield f"{name} {m:g} x", cases.several(TOGETHER[name], m, salt, **settings)
     else:
         group, sizes, effects = HIDDEN[name]
         for multiple, effect in itertools.product((m for m in sizes if m in multiples), effects):
@@ -100,6 +108,9 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
         return row | {"failed": f"{type(error).__name__}: {error}", "seconds": time.perf_counter() - started}
     hidden = [name for name, _ in trial.case.hidden]
     row |= {"truth": sorted((KNOWN | FAMILY).get(n, n) for n in hidden), "multiples": list(trial.multiples)}
+    recorder = trial.case.recorder
+    row |= {"imperfect": bool(trial.case.imperfections), "noise": asdict(trial.case.noise), "rate": recorder.rate,
+            "window": recorder.pmu or recorder.phasor_window}  # fmt: skip
     only = []
     if group.startswith(LEFT_OUT):
         row["truth"], only = [], [n for n in discover()["effect"] if n not in hidden]
@@ -117,7 +128,7 @@ def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
 
 def _counted(found) -> dict:
     """What the product said, and what it said it with."""
-    first, at = found.first, found.catalogue
+    at = found.catalogue
     return {
         "verdict": found.verdict.word,
         "complete": found.verdict.complete,
@@ -138,11 +149,21 @@ def _counted(found) -> dict:
         "left": [s.p_left for s in found.explanations.steps],
         "left_by": found.last.left,
         "samples": found.context.samples,
-        "drops": {s.name: s.drop for s in first.scores},
-        "parameters": {s.name: len(at[s.name].effect.parameters) for s in first.scores},
+        "refits": _refits(found),
         "untestable": sorted(at.untestable),
         "simulations": found.context.effort.simulations,
     }
+
+
+def _refits(found) -> list[tuple[list[str], float, int]]:
+    """Every set that the investigation fitted, under one noise: its names, by how much it lowers the deviance, and its
+    parameters. What other criteria choose among."""
+    from tractexp.discrepancy.fitting import refit
+
+    fits = refit(found.context, found.first.noise, [(f.names, f.unit) for f in found.explanations.refits.values()])
+    bare = next(f.deviance for f in fits if not f.names)
+    textbook = found.catalogue.textbook
+    return [(sorted(set(textbook(f.names))), bare - f.deviance, f.parameters) for f in fits if f.names]
 
 
 def _proposed(proposed) -> dict | None:

@@ -43,10 +43,12 @@ from hidden_effects.controls import (
     VoltageLink,
 )
 from hidden_effects.devices import Converter, Inrush, Link, Statcom
+from hidden_effects.imperfections import IMPERFECTIONS
 from hidden_effects.laws import FAMILY, LAWS, MEMBERS_LAW
-from hidden_effects.limits import detection_limit, joint_limit
+from hidden_effects.limits import detection_limit, joint_limit, misfit, size_of_error
 from hidden_effects.motor import Motor
 from hidden_effects.noise import autoregressive
+from hidden_effects.recorder import weighed
 from hidden_effects.site import Response
 from hidden_effects.supply import Moment, Relay, Supply
 from independent import Dip, Load, Machine, Static, simulate
@@ -350,6 +352,17 @@ def test_a_window_is_the_mean_over_it():
         assert record["P"][k] == pytest.approx(
             np.trapezoid((V * current.conj()).real, t) / 0.04, abs=1e-5
         )  # a grid of 1 ms
+
+
+@pytest.mark.parametrize("frequency", [0.0, 3.0, 12.5, 25.0, 40.0])
+def test_a_measurement_unit_passes_what_its_class_passes(frequency):
+    """The triangle's gain is the square of a box's; the M class stops what is above half the reporting rate."""
+    fine, t = np.arange(-0.2, 1.2, 0.001), np.linspace(0.0, 1.0, 41)
+    turning = lambda at: np.exp(2j * np.pi * frequency * at)  # noqa: E731
+    gains = {pmu: weighed(fine, turning(fine), t, pmu) / turning(t) for pmu in ("P", "M")}
+    np.testing.assert_allclose(gains["P"], np.sinc(0.02 * frequency) ** 2, atol=2e-3)
+    expected = {0.0: (1.0, 1e-6), 3.0: (1.0, 0.05)}.get(frequency, (0.0, 0.1) if frequency >= 25 else (0.7, 0.3))
+    np.testing.assert_allclose(gains["M"], expected[0], atol=expected[1])
 
 
 def test_a_linear_load_does_not_show_that_both_channels_are_averaged_alike():
@@ -775,6 +788,33 @@ def test_the_suites_hide_what_they_say():
         faults = dict((name, size * NUISANCES[name].reference) for name, size in trial.case.nuisances)
         assert 0 <= faults["time_skew"] <= 0.003
         assert trial.case.effect is None
+
+
+def test_an_imperfect_load_misses_what_is_asked_once_the_base_model_is_fitted():
+    exact = Case(events=2)
+    case = cases.imperfect(exact, 3, 0.01)
+    assert {name for name, _ in case.imperfections} == IMPERFECTIONS.keys()
+    assert misfit(case, 3) == pytest.approx(0.01, rel=0.02)
+    assert misfit(exact, 3) == 0.0
+    half = replace(case, imperfections=tuple((name, size / 2) for name, size in case.imperfections))
+    assert misfit(half, 3) == pytest.approx(0.005, rel=0.2)
+    assert cases.imperfect(exact, 3, 0.0) is exact
+    named = replace(case, effect="shunt_capacitor")
+    assert size_of_error(replace(named, imperfections=half.imperfections), 3) == pytest.approx(
+        size_of_error(named, 3) / 2, rel=0.2
+    )
+    assert truth(named, 3)["imperfections"][0]["name"] == next(iter(IMPERFECTIONS))
+
+
+def test_data_sets_of_the_field_differ_in_recorder_noise_and_error():
+    made = made_of(cases.in_the_field("shunt_capacitor", 4.0, events=1), 3)
+    assert {t.case.effect for t in made} == {("shunt_capacitor",)}
+    assert all(0 < t.multiples[0] <= 4.0 + 1e-9 for t in made)  # fewer where more makes no sense
+    assert len({t.case.recorder for t in made}) > 1
+    imperfect = [t.case for t in made if t.case.imperfections]
+    assert 0 < len(imperfect) < len(made)
+    (three,) = made_of(cases.several(3, 2.0, events=1), 1)
+    assert len(three.case.effect) == 3
 
 
 def test_names_are_those_of_the_contract():

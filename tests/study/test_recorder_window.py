@@ -44,9 +44,12 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
     assert error @ error < (0.2 if cycles == 1 else 1e-3) * (shows @ shows)
 
 
-def test_windows_are_whole_cycles_that_the_sampling_resolves():
+def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampling_resolves():
     (event,) = events(count=1)
-    assert [w.window for w in windows_of([event])] == pytest.approx([0.02 * k for k in (1, 2, 3, 4, 5, 6)])
+    windows = windows_of([event])
+    assert [w.window for w in windows if not w.shape] == pytest.approx([0.02 * k for k in (1, 2, 3, 4, 5, 6)])
+    assert {w.shape.name: w.window for w in windows if w.shape} == pytest.approx({"p_class": 0.04, "m_class": 0.1775})
+    assert "40 ms by the weights of p_class" in next(w for w in windows if w.shape).describe()
     slow = replace(event, record=replace(event.record, t=event.record.t * 10))
     assert min(w.window for w in windows_of([slow])) >= 2 * slow.record.step
 
@@ -57,13 +60,13 @@ def test_a_window_that_the_records_say_is_the_only_one_tried():
     (window,) = windows_of([said, said])
     assert window.window == pytest.approx(0.04)
     assert "p_class" in window.describe()
-    assert len(windows_of([said, event])) == 6  # where they contradict each other it is searched for
+    assert len(windows_of([said, event])) == 8  # where they contradict each other it is searched for
 
 
 def test_what_a_triangle_did_is_undone():
     (event,) = events(count=1)
     known = chosen("estimator", "p_class").window(50.0)
-    recorder = RecorderWindow(known.length, known)
+    recorder = RecorderWindow(known.length, known, said=True)
     weights = recorder.weights(event.record.step)
     U = np.convolve(np.pad(event.record.U, len(weights) // 2, "edge"), weights, "valid")
     back = recorder.sharpened(replace(event, record=replace(event.record, U=U))).record.U

@@ -9,28 +9,39 @@ from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
 from tractexp.record.window import average, averaged_power, sharpened
+from tractexp.recording.estimator import estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)
 
 
 @dataclass(frozen=True, eq=False)
 class RecorderWindow(Measurement):
-    """A recorder that forms phasors over a window [s]: a plain mean, or what the records say it was."""
+    """A recorder that forms phasors over a window [s]: a plain mean, or the weights of an estimator.
+
+    `said`: the records say that it is this one.
+    """
 
     window: float
-    recorded: Window | None = None
+    shape: Window | None = None
+    said: bool = False
 
     def __repr__(self) -> str:
-        return f"RecorderWindow({self.window}{f', {self.recorded.name}' if self.recorded else ''})"
+        return f"RecorderWindow({self.window}{f', {self.shape.name}' if self.shape else ''})"
+
+    @property
+    def averages(self) -> bool:
+        """Whether no sample counts less than nothing."""
+        return self.shape is None or bool((self.shape.weights >= 0).all())
 
     def describe(self) -> str:
         """The window, as a run tells it."""
-        said = f", as the record says ({self.recorded.name})" if self.recorded else ""
-        return f"the recorder averages phasors over {1000 * self.window:.0f} ms{said}"
+        weights = f" by the weights of {self.shape.name}" if self.shape and not self.said else ""
+        said = f", as the record says ({self.shape.name})" if self.shape and self.said else ""
+        return f"the recorder averages phasors over {1000 * self.window:.0f} ms{weights}{said}"
 
     def weights(self, step: float) -> np.ndarray:
         """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
-        return _weights(self.window / step) if self.recorded is None else self.recorded.on(step)
+        return _weights(self.window / step) if self.shape is None else self.shape.on(step)
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         shown = np.empty_like(power)
@@ -61,13 +72,19 @@ def _weights(samples: float) -> np.ndarray:
 
 
 def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
-    """The windows that recorders of these events may have: the one they say, else whole cycles, shortest first.
+    """The windows that recorders of these events may have: the one they say, else whole cycles and those of the
+    estimators, shortest first.
 
     None is longer than what came before the dip, or too short for the sampling to show.
     """
-    cycle, step = 1 / events[0].record.base.frequency, events[0].record.step
+    frequency, step = events[0].record.base.frequency, events[0].record.step
     before = min(e.start * e.record.step for e in events)
     said = {e.record.window.name if e.record.window else "": e.record.window for e in events}
     (recorded, *others) = said.values()
-    lengths = [recorded.length] if recorded and not others else [k * cycle for k in CYCLES]
-    return [RecorderWindow(w, None if others else recorded) for w in lengths if 2 * step <= w < before]
+    if recorded and not others:
+        windows = [RecorderWindow(recorded.length, recorded, said=True)]
+    else:
+        shapes = [one.window(frequency) for one in estimators(frequency)]
+        uneven = [RecorderWindow(w.length, w) for w in shapes if np.ptp(w.weights) > 1e-9]
+        windows = [*(RecorderWindow(k / frequency) for k in CYCLES), *uneven]
+    return [w for w in sorted(windows, key=lambda w: w.window) if 2 * step <= w.window < before]

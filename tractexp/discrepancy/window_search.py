@@ -43,13 +43,13 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         return base, first
     tried: list[WindowFit] = []
     for window in windows_of(context.events):
+        if tried and tried[0].gained <= 0 and window.averages:
+            continue  # an average over several cycles is one of averages over one
         behind = context.on(Records.of(context.records.recorded, window))
         local_minima = (first.fit.unit, *base.local_minima)  # the load's: no window moves them far
         begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
         tried.append(WindowFit(behind, fit, first.fit.deviance - fit.deviance))
-        if tried[0].gained <= 0:
-            return base, first  # an average over several cycles is one of averages over one
     believed = _believed(tried, first) if tried else None
     if believed is None:
         return base, first
@@ -68,7 +68,7 @@ def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | No
     best = max(tried, key=lambda one: one.gained)
     most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
     window = best.behind.records.window
-    if window is not None and window.recorded:  # that the recorder has a window it says is no guess
+    if window is not None and window.said:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None
     return best if most < FAR * best.gained and best.gained > criteria.least_window(most) else None
 

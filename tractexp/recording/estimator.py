@@ -5,6 +5,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from tractexp.errors import UserError
 from tractexp.plugin import Plugin, chosen, discover
 from tractexp.record.phasor import Averager, weighted
 from tractexp.record.window import Window
@@ -49,3 +50,16 @@ def estimator_of(setting: Any = None) -> Estimator:
     """The estimator of a setting: a name, a mapping of name and settings, or None for the usual one."""
     usual = (name for name, cls in sorted(discover()[Estimator.group].items()) if getattr(cls, "usual", False))
     return chosen(Estimator.group, next(usual) if setting is None else setting)
+
+
+def estimators(nominal: float) -> list[Estimator]:
+    """All that are registered and support a nominal frequency [Hz], by their default settings."""
+    supporting: list[Estimator] = []
+    for name in sorted(discover()[Estimator.group]):
+        one = estimator_of(name)
+        try:
+            one.half(nominal)
+        except UserError:
+            continue
+        supporting.append(one)
+    return supporting

@@ -5,6 +5,7 @@ Nothing of `tractexp` or of its plugins is imported. See README.md for what each
 
 from hidden_effects.effects import CATALOG, MEASUREMENT, NUISANCES, PHYSICAL
 from hidden_effects.generator import EFFECTS, Case, Scene, make, scene, truth, write
+from hidden_effects.imperfections import IMPERFECTIONS
 from hidden_effects.noise import Noise
 from hidden_effects.outside import OUTSIDE
 from hidden_effects.recorder import Recorder
@@ -12,6 +13,7 @@ from hidden_effects.recorder import Recorder
 __all__ = [
     "CATALOG",
     "EFFECTS",
+    "IMPERFECTIONS",
     "MEASUREMENT",
     "NUISANCES",
     "OUTSIDE",

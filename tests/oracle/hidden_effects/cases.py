@@ -11,11 +11,13 @@ import numpy as np
 
 from hidden_effects.effects import NUISANCES, PHYSICAL
 from hidden_effects.generator import EFFECTS, Case, scene
-from hidden_effects.limits import detection_limit, joint_limit
+from hidden_effects.imperfections import IMPERFECTIONS
+from hidden_effects.limits import detection_limit, joint_limit, misfit, size_of_error
 from hidden_effects.noise import Noise
 from hidden_effects.recorder import Recorder
 
 MULTIPLES = (0.5, 1.0, 2.0, 4.0, 8.0)  # of the detection limit
+RATES = (50.0, 100.0, 200.0, 500.0, 1000.0)  # Hz, of records in the field
 RECORDERS = {"500 Hz, 2 s": Recorder(500.0, 1000), "100 Hz, 3 s": Recorder(100.0, 300)}
 NOISES = {
     "white 0.05 %": Noise(0.0005),
@@ -80,25 +82,79 @@ def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
         yield Planned("nuisances", seed, partial(Trial, "nuisances", Case(nuisances=faults, **settings), seed))
 
 
+def imperfect(case: Case, seed: int, error: float) -> Case:
+    """The case with a load of which the base model, once fitted, misses about `error` of the response in S.
+
+    All kinds of imperfection are there at once, in drawn proportions.
+    """
+    if not error:
+        return case
+    case = replace(case, swing=case.needs("swing"), negative=case.needs("negative"))
+    parts = np.random.default_rng([seed, 5]).dirichlet(np.ones(len(IMPERFECTIONS)))
+    size = 1.0
+    for _ in range(3):  # nearly linear
+        sizes = zip(IMPERFECTIONS.items(), (size * parts).tolist(), strict=True)
+        case = replace(case, imperfections=tuple((n, min(s, own.largest / own.reference)) for (n, own), s in sizes))
+        try:
+            size *= min(error / misfit(case, seed), 4.0)
+        except (ValueError, ArithmeticError):  # no steady state
+            size *= 0.5
+    return case
+
+
+def inexact(error: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """Nothing hidden in a load that no model is exact for, under each of `NOISES` in turn."""
+
+    def made(noise: str, seed: int) -> Trial:
+        return Trial(f"error {error:.0%}", imperfect(Case(noise=NOISES[noise], **settings), seed, error), seed)
+
+    for noise, seed in zip(cycle(NOISES), seeds("inexact", salt), strict=False):
+        yield Planned(f"error {error:.0%}", seed, partial(made, noise, seed))
+
+
+def in_the_field(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """One effect under a drawn recorder and noise, in a load of which no model is exact to 0.5 % in every second set.
+
+    Its size is a multiple of its detection limit, and of the size at which it leaves as much as the load's own error.
+    """
+
+    def made(seed: int) -> Trial:
+        rng = np.random.default_rng([seed, 6])
+        rate, window = float(rng.choice(RATES)), str(rng.choice(["", "cycle", "P", "M"]))
+        recorder = Recorder(
+            rate, int(2 * rate) if rate > 50 else 150, phasor_window=0.02 * (window == "cycle"),
+            pmu=window if window in ("P", "M") else "",
+        )  # fmt: skip
+        noise = NOISES[str(rng.choice(list(NOISES)))]
+        own = settings | {"noise": noise, "recorder": recorder}
+        case = imperfect(Case(effect=name, **own), seed, float(rng.choice([0.0, 0.005])))
+        return at_limit((name,), multiple, seed, imperfections=case.imperfections, **own)
+
+    return (Planned(name, seed, partial(made, seed)) for seed in seeds(f"field {name}", salt))
+
+
 def single(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
     """One effect, of the catalogue or not, at a multiple of its detection limit on each data set."""
     return (Planned(name, seed, partial(at_limit, (name,), multiple, seed, **settings)) for seed in seeds(name, salt))
 
 
-def pairs(multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """Two physical effects at once, at a multiple of their joint limit; every pair comes before one comes again."""
-    every = list(combinations(PHYSICAL, 2))
+def several(together: int, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """So many physical effects at once, at a multiple of their joint limit; every set comes before one comes again."""
+    every = list(combinations(PHYSICAL, together))
     order = np.random.default_rng(0 if salt is None else salt).permutation(len(every))
-    for k, seed in zip(cycle(order), seeds("pairs", salt), strict=False):
+    for k, seed in zip(cycle(order), seeds("pairs" if together == 2 else f"{together} at once", salt), strict=False):
         yield Planned(" + ".join(every[k]), seed, partial(at_limit, every[k], multiple, seed, **settings))
 
 
 def at_limit(names: tuple[str, ...], multiple: float, seed: int, **settings: Any) -> Trial:
-    """A data set with effects at a multiple of their (joint) detection limit, less where that makes no sense."""
+    """A data set with effects at a multiple of their (joint) detection limit, or, in a load with imperfections, of the
+    size at which each leaves as much as those; less where that makes no sense."""
     needed = {what: any(EFFECTS[name].needs == what for name in names) for what in ("swing", "negative")}
     case = Case(**needed | settings)
     hidden = replace(case, effect=names if len(names) > 1 else names[0])
+    alone = [replace(hidden, effect=name) for name in names]
     limits = np.array(joint_limit(hidden, seed) if len(names) > 1 else [detection_limit(hidden, seed)])
+    limits = np.maximum(limits, [size_of_error(one, seed) for one in alone])  # 0 where the load is exact
     most = np.array([EFFECTS[name].largest / EFFECTS[name].reference for name in names])
     sizes = np.minimum(multiple * limits, most)
     while True:

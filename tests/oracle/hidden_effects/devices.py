@@ -46,6 +46,7 @@ class Static(Device):
     grows_from: float | None = None  # s; None: from the start of the record
     recovery: float = 0.0
     pace: float = 1.0  # s, time constant of the recovery
+    mixing: float = 0.0  # 1/s, by which both exponents grow with time: other customers take their turn
 
     def sized(self, S: complex, V: complex) -> "Static":
         """The static load that draws S at V; ValueError where that would be a source of active power."""
@@ -59,7 +60,8 @@ class Static(Device):
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         since = now.t if self.grows_from is None else max(now.t - self.grows_from, 0.0)
         u, S = abs(V) / self.V0, self.S + self.growth * since
-        P, Q = S.real * u**self.p_v, S.imag * u**self.q_v
+        mixed = self.mixing * now.t
+        P, Q = S.real * u ** (self.p_v + mixed), S.imag * u ** (self.q_v + mixed)
         if now.f != 1.0:
             P, Q = P * now.f**self.k_p, Q * now.f**self.k_q
         if not self.recovery:

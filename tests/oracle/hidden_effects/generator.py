@@ -12,6 +12,7 @@ import numpy as np
 from hidden_effects import devices
 from hidden_effects.effects import CATALOG, NUISANCES
 from hidden_effects.hidden import Hidden
+from hidden_effects.imperfections import IMPERFECTIONS
 from hidden_effects.laws import LAWS
 from hidden_effects.motor import Motor
 from hidden_effects.noise import Noise
@@ -20,13 +21,14 @@ from hidden_effects.recorder import Recorder
 from hidden_effects.site import Response, Site
 from independent import Dip, Load, Machine, Static
 
-EFFECTS: dict[str, type[Hidden]] = CATALOG | OUTSIDE | LAWS | NUISANCES
+EFFECTS: dict[str, type[Hidden]] = CATALOG | OUTSIDE | LAWS | NUISANCES | IMPERFECTIONS
 SLOWEST = 0.75  # pu: a base case whose motors get slower than this is drawn anew
 
 
 @dataclass(frozen=True)
 class Case:
-    """What to make. `size` counts references of each effect (`hidden_effects.sizes()`); `nuisances` likewise.
+    """What to make. `size` counts references of each effect (`hidden_effects.sizes()`); `nuisances` likewise, and
+    `imperfections`: the load's own departures from any model, which are there beside whatever is hidden.
 
     `events`: dips, or how many to draw; a drawn dip swings in frequency or is unbalanced where `swing` or `negative`
     say so, or where an effect needs it. `load`: None draws one. `spread`: how far the static load differs from event
@@ -38,6 +40,7 @@ class Case:
     events: int | tuple[Dip, ...] = 1
     noise: Noise = field(default_factory=Noise)
     nuisances: tuple[tuple[str, float], ...] = ()
+    imperfections: tuple[tuple[str, float], ...] = ()
     load: Load | None = None
     recorder: Recorder = field(default_factory=Recorder)
     spread: float = 0.05
@@ -49,7 +52,7 @@ class Case:
         """(name, size) of each effect; ValueError for an unknown name or sizes that do not match."""
         names = () if self.effect is None else (self.effect,) if isinstance(self.effect, str) else self.effect
         sizes = self.size if isinstance(self.size, tuple) else (self.size,) * len(names)
-        for name in (*names, *(name for name, _ in self.nuisances)):
+        for name in (*names, *(name for name, _ in (*self.nuisances, *self.imperfections))):
             if name not in EFFECTS:
                 raise ValueError(f"there is no effect '{name}'; there are {', '.join(EFFECTS)}")
         if len(sizes) != len(names):
@@ -70,6 +73,7 @@ class Scene:
     static: tuple[complex, ...]  # pu, what the static load draws before each event
     effects: tuple[tuple[str, Hidden], ...]
     nuisances: tuple[tuple[str, Hidden], ...]
+    imperfections: tuple[tuple[str, Hidden], ...]
     recorder: Recorder
 
     def power(self, event: int) -> complex:
@@ -81,7 +85,7 @@ class Scene:
         load, dip = self.load, self.dips[event]
         motor = Motor(load.machine, load.rating, load.torque)
         site = Site(dip, self.power(event), (motor,), devices.Static(load.static.p_v, load.static.q_v), self.recorder)
-        for _, effect in (*self.effects, *self.nuisances):
+        for _, effect in (*self.imperfections, *self.effects, *self.nuisances):
             site = effect.apply(site)
         return site
 
@@ -114,7 +118,8 @@ def scene(case: Case, seed: int) -> Scene:
         rngs = {name: np.random.default_rng([seed, crc32(name.encode())]) for name, _ in named}
         return tuple((name, EFFECTS[name].of(size, rngs[name], dips)) for name, size in named)
 
-    return Scene(load, dips, static, instances(case.hidden), instances(case.nuisances), case.recorder)
+    hidden, faults, own = (instances(named) for named in (case.hidden, case.nuisances, case.imperfections))
+    return Scene(load, dips, static, hidden, faults, own, case.recorder)
 
 
 @lru_cache(maxsize=256)
@@ -129,7 +134,7 @@ def _drawn(
         dips = draw_dips(rng, events, recorder, swing, negative) if isinstance(events, int) else events
         if given:
             return chosen, dips
-        base = Scene(chosen, dips, (complex(chosen.static.P, chosen.static.Q),) * len(dips), (), (), recorder)
+        base = Scene(chosen, dips, (complex(chosen.static.P, chosen.static.Q),) * len(dips), (), (), (), recorder)
         if all(response.lowest_speed > SLOWEST for response in base.responses()):
             return chosen, dips
     raise ValueError(f"seed {seed}: no load was drawn whose motors survive these dips; give shallower or shorter ones")
@@ -199,6 +204,7 @@ def truth(case: Case, seed: int) -> dict[str, Any]:
         "seed": seed,
         "effects": [{"name": name, **effect.truth()} for name, effect in made.effects],
         "nuisances": [{"name": name, **effect.truth()} for name, effect in made.nuisances],
+        "imperfections": [{"name": name, **effect.truth()} for name, effect in made.imperfections],
         "load": made.load.truth(),
         "events": [
             {"P_s0": S.real, "Q_s0": S.imag, **asdict(dip)} for S, dip in zip(made.static, made.dips, strict=True)

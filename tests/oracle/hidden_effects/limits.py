@@ -62,20 +62,61 @@ def projected(case: Case, seed: int) -> np.ndarray:
     ValueError unless the case hides exactly one effect.
     """
     ((name, _),) = case.hidden
-    base = replace(
-        case, effect=None, size=1.0, nuisances=(), swing=case.needs("swing"), negative=case.needs("negative")
-    )
-    hidden = replace(case, size=STEP, nuisances=())
-    signature = (_rows(scene(hidden, seed), case.noise) - _rows(scene(base, seed), case.noise)) / STEP
-    tangent = _tangent(base, seed, tuple(other for other in MEASUREMENT if other != name))
-    padded = np.concatenate([signature, np.zeros(tangent.shape[1])])
+    base = _exact(case)
+    hidden = replace(base, effect=case.effect, size=STEP)
+    signature = (_rows(scene(hidden, seed)) - _rows(scene(base, seed))) / STEP
+    return _beyond(signature, case, seed, tuple(other for other in MEASUREMENT if other != name))
+
+
+def misfit(case: Case, seed: int) -> float:
+    """What the case's imperfections leave of the response in S when the base model is fitted to them, linearly."""
+    made = scene(_exact(case), seed)
+    rows, each = _rows(made), made.recorder.samples
+    response = rows - np.repeat(rows[::each], each)
+    return float(np.linalg.norm(_own(replace(case, noise=Noise(1.0)), seed)) / np.linalg.norm(response))
+
+
+def size_of_error(case: Case, seed: int) -> float:
+    """Size at which the case's one effect leaves as much of the base model as the imperfections do; 0 without any."""
+    if not case.imperfections:
+        return 0.0
+    return float(np.linalg.norm(_own(case, seed)) / np.linalg.norm(projected(case, seed)))
+
+
+def _exact(case: Case) -> Case:
+    """The case with nothing hidden, in a load without imperfections."""
+    bare = replace(case, effect=None, size=1.0, nuisances=(), imperfections=(), noise=Noise())
+    return replace(bare, swing=case.needs("swing"), negative=case.needs("negative"))
+
+
+def _own(case: Case, seed: int) -> np.ndarray:
+    """The whitened signature (rows,) of the imperfections, what the base model and the nuisances could imitate taken
+    out."""
+    exact = _exact(case)
+    made, imperfect = scene(exact, seed), scene(replace(exact, imperfections=case.imperfections), seed)
+    return _beyond(_rows(imperfect, _scale(made)) - _rows(made), case, seed, tuple(MEASUREMENT))
+
+
+def _beyond(signature: np.ndarray, case: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
+    """A signature (rows,), whitened, without what the base model and faults of the measurement can imitate, a weak
+    prior on those below."""
+    tangent = _whitened(_tangent(_exact(case), seed, measurement), case)
+    padded = np.concatenate([_whitened(signature, case), np.zeros(tangent.shape[1])])
     anchored = np.vstack([tangent, np.eye(tangent.shape[1]) / WEAK])
     return padded - anchored @ np.linalg.lstsq(anchored, padded, rcond=None)[0]
 
 
+def _whitened(rows: np.ndarray, case: Case) -> np.ndarray:
+    """Rows (rows, ...), of unit variance where they are the noise of the case; each record and channel by itself."""
+    phi, each = case.noise.phi, case.recorder.samples
+    y = (rows / case.noise.level).reshape(-1, each, *rows.shape[1:])
+    rest = (y[:, 1:] - phi * y[:, :-1]) / np.sqrt(1 - phi**2)
+    return np.concatenate([y[:, :1], rest], axis=1).reshape(rows.shape)
+
+
 @lru_cache(maxsize=64)
 def _tangent(base: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
-    """Whitened derivatives (rows, columns) by parameters of the load, levels of the events, and nuisances."""
+    """Derivatives (rows, columns) by parameters of the load, levels of the events, and faults of the measurement."""
     made = scene(base, seed)
     loads = [replace(made, load=load) for load in _deviations(made.load)]
     powers = [
@@ -84,8 +125,8 @@ def _tangent(base: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
         for part in (S.real, 1j * S.imag)
     ]
     nuisances = [scene(replace(base, nuisances=((name, STEP),)), seed) for name in measurement]
-    at_rest, scale = _rows(made, base.noise), _scale(made)
-    columns = [_rows(other, base.noise, scale) - at_rest for other in (*loads, *powers, *nuisances)]
+    at_rest, scale = _rows(made), _scale(made)
+    columns = [_rows(other, scale) - at_rest for other in (*loads, *powers, *nuisances)]
     return np.stack(columns, axis=1) / STEP
 
 
@@ -94,14 +135,10 @@ def _scale(made: Scene) -> list[float]:
     return [abs(made.power(k).real) for k in range(len(made.dips))]
 
 
-def _rows(made: Scene, noise: Noise, scale: list[float] | None = None) -> np.ndarray:
-    """P and Q of all events end to end (rows,), whitened by the noise; `scale` where that of `made` is not meant."""
-    rows, phi = [], noise.phi
-    for record, P0 in zip(made.records(), scale or _scale(made), strict=True):
-        for channel in ("P", "Q"):
-            y = record[channel] / (noise.level * P0)
-            rows += [y[:1], (y[1:] - phi * y[:-1]) / np.sqrt(1 - phi**2)]
-    return np.concatenate(rows)
+def _rows(made: Scene, scale: list[float] | None = None) -> np.ndarray:
+    """P and Q of all events over P0, end to end (rows,); `scale` where the P0 of `made` is not meant."""
+    records = zip(made.records(), scale or _scale(made), strict=True)
+    return np.concatenate([record[channel] / P0 for record, P0 in records for channel in ("P", "Q")])
 
 
 def _deviations(load: Load) -> list[Load]:

@@ -9,6 +9,10 @@ from independent.source import OMEGA, Dip
 
 FINE = 0.001  # s, grid on which windows are averaged
 
+CYCLE = 0.02  # s
+PMU_REACH = {"P": CYCLE, "M": 71 / 800}  # s on either side of a time stamp
+PASSED = 7.75  # Hz, the reference frequency of the M class at 50 phasors a second
+
 Bus = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # times (n,) -> voltage and current phasors (n,)
 
 
@@ -21,6 +25,7 @@ class Recorder:
     skew: float = 0.0  # s, power comes later than voltage
     window: float = 0.0  # s, over which a transducer averages power, centered
     phasor_window: float = 0.0  # s, over which voltage and current phasors are both formed, centered
+    pmu: str = ""  # "P" or "M": phasors are formed by the reference filter of that class of measurement unit instead
     gain_drift: float = 0.0  # 1/s, of the voltage channel
     knee: float = 0.0  # share of current beyond its value before that a saturating current transformer loses
 
@@ -51,13 +56,17 @@ class Recorder:
 
     def power_at(self, t: np.ndarray, bus: Bus, dip: Dip) -> tuple[np.ndarray, np.ndarray]:
         """Voltage magnitude and complex power at times t, from the phasors the recorder forms."""
-        if not self.phasor_window:
+        if not self.phasor_window and not self.pmu:
             V, current = self.instrument(*bus(t))
         else:
-            fine = spread(t, self.phasor_window)
+            fine = spread(t, 2 * PMU_REACH[self.pmu] if self.pmu else self.phasor_window)
             turn = np.exp(1j * (dip.phase(fine) - OMEGA * fine))  # a DFT turns with nominal frequency
-            V, current = (averaged(fine, turn * y, t, self.phasor_window) for y in self.instrument(*bus(fine)))
+            V, current = (self.formed(fine, turn * y, t) for y in self.instrument(*bus(fine)))
         return np.abs(V), V * np.conj(current)
+
+    def formed(self, fine: np.ndarray, y: np.ndarray, t: np.ndarray) -> np.ndarray:
+        """Phasors at times t of instantaneous ones y, given on a fine grid, by the window or the class."""
+        return weighed(fine, y, t, self.pmu) if self.pmu else averaged(fine, y, t, self.phasor_window)
 
     def instrument(self, V: np.ndarray, current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Secondary phasors: the current transformer loses a share of what exceeds the current before, and leads."""
@@ -81,3 +90,23 @@ def averaged(fine: np.ndarray, y: np.ndarray, t: np.ndarray, window: float) -> n
     integrals = [PchipInterpolator(fine, part).antiderivative() for part in parts]
     means = [(F(t + window / 2) - F(t - window / 2)) / window for F in integrals]
     return means[0] + 1j * means[1] if len(means) == 2 else means[0]
+
+
+def weighed(fine: np.ndarray, y: np.ndarray, t: np.ndarray, pmu: str) -> np.ndarray:
+    """What a measurement unit's reference filter makes of y, given on a fine grid, at each of the times t.
+
+    Source: IEC/IEEE 60255-118-1, annex D: a triangle over two cycles (P); a sinc under a Hamming window (M, at 50 Hz
+    and 50 phasors a second). Both are applied to the envelope, as functions of time, not at a device's own samples.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    reach = PMU_REACH[pmu]
+    tau = np.linspace(-reach, reach, 101)
+    weights = 1 - np.abs(tau) / reach
+    if pmu == "M":
+        weights = np.sinc(4 * PASSED * tau) * (0.54 + 0.46 * np.cos(np.pi * tau / reach))
+    weights[[0, -1]] /= 2
+    weights /= weights.sum()
+    real, imag = PchipInterpolator(fine, y.real), PchipInterpolator(fine, y.imag)
+    near = t[:, None] + tau
+    return (real(near) + 1j * imag(near)) @ weights
