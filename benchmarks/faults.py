@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import tractexp  # before NumPy: it keeps BLAS to one thread
@@ -189,8 +189,8 @@ def same(folder: Path, reference: dict, file: str = "run/result.json") -> str:
 # Parts
 
 
-def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
-    """A search whose files cannot be written, or whose process dies at one of them."""
+def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRITTEN)) -> Iterator[Fault]:
+    """A search whose files cannot be written, or whose process dies `at` one of them."""
     reference = work / "reference"
     reference.mkdir()
     code, said = forked(job(reference))
@@ -211,7 +211,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
 
         return act
 
-    for n in range(1, 1 + WRITTEN):
+    for n in at:
         folder = fresh(f"killed{n}")
         code, said = forked(failing(n, killed, folder))
         kept = sorted(p.name for p in (folder / "run").iterdir() if not p.name.startswith("."))
@@ -223,7 +223,7 @@ def jobs(work: Path, chance: random.Random) -> Iterator[Fault]:
             f"left whole: {', '.join(kept) or 'nothing'}; repeated, the same result",
             wrong, had, same(folder, found), trace(more), "" if code < 0 and again == 0 else f"EXIT {code}, {again}",
         )  # fmt: skip
-    for n in range(1, 1 + WRITTEN):
+    for n in at:
         folder = fresh(f"full{n}")
         code, said = forked(failing(n, full, folder))
         kept = sorted(p.name for p in (folder / "run").glob("*")) if (folder / "run").is_dir() else []

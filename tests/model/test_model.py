@@ -410,18 +410,37 @@ def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
         tractexp.sites("third_order")
 
 
-def test_whether_an_effect_fits_is_remembered_without_deriving_anything(tmp_path):
+def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_without_deriving_anything(tmp_path):
     program = (
-        "import sys; from tractexp.plugin import discover, get; from tractexp.model.model import compose;"
+        "import sys, numpy as np; from tractexp.plugin import discover, get; from tractexp.model.model import compose;"
+        "from tractexp.model.drive import Drive, Excitation;"
         "m = compose(get('model/motor', 'voltage')(), get('model/static', 'exponential')());"
         "names = ('stator_resistance', 'speed_dependent_torque', 'time_skew');"
-        "print([m.acceptance(get('effect', n)()).refusal for n in names], 'sympy' in sys.modules)"
+        "print([m.acceptance(get('effect', n)()).refusal for n in names]);"
+        "one = np.ones(2); drive = Drive.of([Excitation(1e-3, one, one, one, 1.0, 1.0, 0.5)]);"
+        "print(m.at_rest(np.array([p.default for p in m.parameters]), drive));"
+        "print('sympy' in sys.modules, 'scipy.signal' in sys.modules)"
     )
     there = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
-    run = lambda: subprocess.check_output([sys.executable, "-c", program], env=there, text=True).strip()  # noqa: E731
-    told = "[None, 'its equations have no speed that moves', None]"
-    assert run() == f"{told} True"
-    assert run() == f"{told} False"
+    run = lambda: subprocess.check_output([sys.executable, "-c", program], env=there, text=True).splitlines()  # noqa: E731
+    *derived, loaded = run()
+    assert derived[0] == "[None, 'its equations have no speed that moves', None]"
+    assert "'P_motor': " in derived[1]
+    assert loaded == "True False"
+    assert run() == [*derived, "False False"]
+
+
+@pytest.mark.parametrize("motor", ["electromechanical", "stator_flux"])
+def test_what_stands_before_an_event_is_what_the_equations_say(motor):
+    of = compose(get("model/motor", motor)(), get("model/static", "zip")(), [get("effect", "feeder_impedance")()])
+    flat, values = np.full(2, 0.97), np.array([p.default for p in of.parameters])
+    before = of.at_rest(values, Drive.of([Excitation(1e-3, flat, flat, flat, 0.97, 1.0, 0.5)]))
+    for symbol in of.equations.definitions:
+        value, imaginary = of.equations.parts(of.equations.before(symbol))
+        assert (symbol.name in before) == (imaginary == 0)
+        if imaginary == 0:
+            number = value.subs({s: before[s.name] for s in value.free_symbols})
+            assert before[symbol.name] == pytest.approx(float(number), rel=1e-13, abs=1e-15)
 
 
 def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(tmp_path, monkeypatch):

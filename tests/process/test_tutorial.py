@@ -5,7 +5,7 @@ import shlex
 from pathlib import Path
 
 import pytest
-from command_line import start_command
+from command_line import run_command
 
 PAGE = Path(__file__).parents[2] / "docs" / "start.md"
 BLOCK = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
@@ -22,7 +22,7 @@ def followed(tmp_path_factory):
         for line in block.splitlines():
             program, *arguments = shlex.split(line)
             if program == "tractexp":
-                done = start_command(*arguments, cwd=folder)
+                done = run_command(*arguments, cwd=folder)
                 assert done.returncode == 0, f"{line}\n{done.stderr}"
                 told.append((False, done.stdout))
             else:  # what a new environment takes is tried by .ci/run

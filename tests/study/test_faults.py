@@ -3,6 +3,7 @@
 import json
 import os
 import random
+from itertools import islice
 
 import pytest
 
@@ -22,18 +23,18 @@ def test_the_stored_run_lost_nothing():
 
 @pytest.fixture(scope="module")
 def some(tmp_path_factory):
-    """The first faults of a search and of its logging, at other moments than those that are stored."""
+    """Faults of a search at its result and after it, and the first of its logging, other ones than are stored."""
     faults.ready()
-    made = {}
-    for part, count in (("jobs", 10), ("logging", 3)):
-        injected = faults.PARTS[part](tmp_path_factory.mktemp(part), random.Random(7))
-        made[part] = [fault for fault, _ in zip(injected, range(count), strict=False)]
-    return made
+    work, chance = tmp_path_factory.mktemp("faults"), random.Random(7)
+    of_search = faults.jobs(faults.made(work / "jobs"), chance, (faults.RESULT, faults.RESULT + 1))
+    of_logging = faults.logging(faults.made(work / "logging"), chance)
+    return {"jobs": [*islice(of_search, 4)], "logging": [*islice(of_logging, 2)]}
 
 
 def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
     assert {part: [f for f in found if f["lost"]] for part, found in some.items()} == {"jobs": [], "logging": []}
-    assert [len(found) for found in some.values()] == [10, 3]
+    assert ["kill -9" in fault["fault"] for fault in some["jobs"]] == [True, True, False, False]
+    assert len(some["logging"]) == 2
 
 
 def test_a_loss_would_be_seen(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 import tractexp
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.incomplete import PredictedDeviance
+from tractexp.discrepancy.incomplete import PredictedDeviance, bears_out
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import standard_errors
@@ -20,6 +20,7 @@ from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 BLOCKS = 20
+SAMPLES, STEP = 400, 2e-3  # of a generated dip
 
 
 class Catalogue:
@@ -89,6 +90,16 @@ def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not()
     assert not other.clear_of(one)
 
 
+@pytest.mark.parametrize(("after", "chi2", "stands"), [(0.587, 44.0, False), (0.53, 44.0, True), (0.587, 1.5, True)])
+def test_what_most_of_a_loud_deviance_says_the_error_in_S_must_say_too(after, chi2, stands):
+    """A real transformer: 89 % of the deviance was gone, and 59 of 81 % of the response were missed still."""
+    before = SimpleNamespace(error=SimpleNamespace(value=0.81), chi2_per_sample=chi2)
+    judged = SimpleNamespace(
+        before=before, after=SimpleNamespace(error=SimpleNamespace(value=after)), telling=True, helps=True
+    )
+    assert bears_out(judged, Criteria()) is stands
+
+
 # a motor whose law nobody has
 
 
@@ -100,13 +111,14 @@ def dips(depths=(0.5, 0.35, 0.6)):
     values = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0,
               "tripped_share": 0.25, "trip_level": 0.75, "trip_delay": 0.05, "reconnect_delay": 0.3}  # fmt: skip
     row = np.array([values.get(p.name, p.default if p.null is None else p.null) for p in motor.parameters])
+    flat = np.ones(SAMPLES)
     for k, depth in enumerate(depths):
-        t = np.arange(800) * 1e-3
+        t = np.arange(SAMPLES) * STEP
         shape = np.clip((t - 0.1) / 0.02, 0, 1) - np.clip((t - 0.25) / 0.02, 0, 1)
-        drive = Drive.of([Excitation(1e-3, 1 - depth * shape, np.ones(800), np.full(800, 0.6), 1.0, 1.0, 0.6)])
+        drive = Drive.of([Excitation(STEP, 1 - depth * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6)])
         response = motor.simulate(drive, row, 8).outputs[:, 0]
         unknown = 0.01 * np.sin(2 * np.pi * 3.1 * (t - 0.1)) * (t > 0.1) * depth * np.exp(-(t - 0.1) / 0.5)
-        P, Q = response + unknown + 2e-4 * rng.standard_normal((2, 800))
+        P, Q = response + unknown + 2e-4 * rng.standard_normal((2, SAMPLES))
         made.append(detect(Record(f"dip{k + 1}", t=t, U=drive.inputs[0], P=P, Q=Q, source=f"made {k + 1}").check()))
     return made
 

@@ -12,7 +12,6 @@ import pytest
 
 import tractexp
 from tractexp.compat import hydra_config_store, hydra_plugins
-from tractexp.compat.joblib_dask import Dask
 from tractexp.compat.scipy_differential_evolution import generations
 
 HERE = Path(tractexp.__file__).parent
@@ -148,6 +147,8 @@ def test_mlflow_lets_in_every_page_of_this_computer_but_for_the_door():
 
 
 def test_joblib_never_hears_of_a_dask_worker_that_was_killed_but_through_the_door():
+    from tractexp.compat.joblib_dask import Dask  # which imports all of Dask
+
     class KilledWorker(Exception):
         status = "error"  # a future of Dask's as well as its error
 

@@ -98,13 +98,13 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     assert near.rival.tests is not None
     unit, own = near.rival.fit.unit, own_parameters(investigation.context, near.names)
     by_name = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
-    on = {"train": near.curves, "validate": near.carried} if investigation.context.domain.nearest_gap else {}
+    on = {"train": near.curves, "validate": near.carried}
     gaps = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
         "explained": files.plain(near.fitted),
         "explained_held_out": files.plain(near.held_out),
-        **({"gap": gaps} if gaps else {}),
+        "gap": gaps,
         "others": [{"effects": list(names), "explained": files.plain(share)} for names, share in near.others],
         "parameters": {name: _estimate(by_name[name]) for name in own},
     }

@@ -172,9 +172,7 @@ def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     rest = f", and {other} rejected" * (len(sets) == 1 and others > 0)
     verb = "explains" if len(sets) == 1 and len(sets[0]) == 1 else "explain"
     tie = ", and these events cannot tell them apart" * (len(sets) > 1)
-    return (
-        f"{spoken} {verb} {shares} of what exceeds the noise on the held-out events{rest}{tie}; more than noise is left"
-    )
+    return f"{spoken} {verb} {shares} of what exceeds the noise on the held-out events{rest}{tie}; {CHOSEN_BY}"
 
 
 def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:

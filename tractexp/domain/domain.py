@@ -53,7 +53,6 @@ class Domain(ABC):
     # investigation
     calibrated: ClassVar[bool]  # whether families, a search in all events and proposals have calibrated criteria
     recordable: ClassVar[bool]  # whether a dip that nobody recorded can be made a record and fitted beside others
-    nearest_gap: ClassVar[bool]  # whether the gap is told of the set that comes nearest where nothing explains
     # planning
     edge: ClassVar[float]  # s, fall and rise of a planned dip
     further: ClassVar[Mapping[str, str]]  # channels that a jump of the phase and an unbalance have to be recorded with

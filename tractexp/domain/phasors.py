@@ -33,7 +33,6 @@ class PhasorDomain(Domain):
     finest, probed, aftermath, stiff = 5e-6, 1.0, 10.0, False  # noise of records starts near 1e-4
     quiet_order, noise_from_model = 4, False
     windowed = calibrated = recordable = True
-    nearest_gap = False
     edge = 0.02
     further = {"jump": "the frequency f", "unbalance": "U2"}
     shaped_by, planned_noise = (), "noise, of P before the dip"

@@ -38,7 +38,6 @@ class WaveDomain(Domain):
     finest, probed, aftermath, stiff = 5e-5, 0.75, float("inf"), True  # noise of sampled currents starts near 1e-3
     quiet_order, noise_from_model = 0, True  # harmonics are no colored noise
     windowed = calibrated = recordable = False
-    nearest_gap = True
     edge = 0.001
     further = {}
     shaped_by, planned_noise = ("jump", "unbalance"), "noise of the currents, of P before the dip"

@@ -13,6 +13,7 @@ from tractexp.errors import UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel, width
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
+from tractexp.model.arithmetic import evaluated
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
@@ -277,20 +278,17 @@ class Model:
 
         Valid where `refusal` has nothing to say; quantities that are phasors are left out.
         """
-        from tractexp.model.equations import phasor_parts, start_symbol
-
-        eq = self.equations
+        stated = json.loads(text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest")))
         given = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         known = dict(zip((*self.names, "P0", "Q0", *EVENT), given, strict=True))
         starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[0, :, 0].tolist()
-        symbols = [start_symbol(s) for s in (*eq.states, *eq.memories)]
-        names = [p.name for s in symbols for p in ((s,) if s.is_real else phasor_parts(s))]
-        known |= dict(zip(names, starts, strict=True))
-        for symbol in eq.definitions:
-            value, imaginary = eq.parts(eq.before(symbol))
-            if imaginary == 0:
-                known[symbol.name] = float(value.subs({s: known[s.name] for s in value.free_symbols}))
-        return known
+        known |= dict(zip(stated["starts"], starts, strict=True))
+        return evaluated(stated["quantities"], known)
+
+    def _at_rest(self) -> str:
+        from tractexp.model.before import starts, stated
+
+        return json.dumps({"starts": starts(self.equations), "quantities": stated(self.equations)})
 
     def latex(self) -> list[str]:
         """The model's equations, one a line."""

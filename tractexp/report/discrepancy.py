@@ -119,10 +119,10 @@ def _graded(findings: Findings) -> str:
 
 
 def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
-    """The gap; of waveforms that nothing explains, that of the nearest candidates beside it."""
+    """The gap; where nothing explains it, that of the nearest candidates beside it."""
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
     table, near = gap(content), findings.verdict.nearest
-    page.add(replace(table, rows=_with_nearest(near)) if findings.context.domain.nearest_gap and near else table)
+    page.add(replace(table, rows=_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
         rows = [[joined(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
         page.text("What each name contributes:")

@@ -19,6 +19,14 @@ if TYPE_CHECKING:
 RESULT = "result.json"
 
 
+def import_pyfunc() -> None:
+    """Import what a model is logged with."""
+    with light_import():
+        import mlflow.models
+        import mlflow.pyfunc
+        import mlflow.types  # noqa: F401
+
+
 def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> str:
     """Log the model of the file `result` under a run, with an open `MlflowClient`, and return the model id.
 
@@ -39,10 +47,10 @@ def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> st
 
 def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
     """Write the folder MLflow calls a model: its description, the data, and the environment it needs."""
-    with light_import():
-        import mlflow.pyfunc
-        from mlflow.models import Model, ModelSignature
-        from mlflow.types import ColSpec, DataType, Schema
+    import_pyfunc()
+    import mlflow.pyfunc
+    from mlflow.models import Model, ModelSignature
+    from mlflow.types import ColSpec, DataType, Schema
 
     def schema(names: str, optional: str = "") -> Schema:
         return Schema([ColSpec(DataType.double, name, required=name not in optional) for name in names + optional])

@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from tractexp.errors import UserError
+from tractexp.tracking.model import import_pyfunc
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, prepare
 
@@ -111,6 +112,7 @@ def main() -> None:
     run_id = problem = ""
     try:
         prepare(uri := pickle.load(sys.stdin.buffer))
+        import_pyfunc()
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except (EOFError, pickle.UnpicklingError):
         os._exit(0)  # nothing to log, and perhaps nobody listens
