@@ -6,8 +6,8 @@ the product reports of a parameter. Ranks of true intervals are uniform: they cr
 narrow, in the middle where they are too wide, at one end where estimates are biased. The rank is that of the normal
 distribution whose 95 % are the reported interval, each side of the estimate by itself. `phasors` are sets of
 `hidden_effects` with nothing missing, two dips under 13 kinds of noise in turn; `waves` are those of `wave_records`.
-Rows are appended to calibration.jsonl, so that a study goes on where it stopped; `--tables` prints what is stored. The
-seeds are no other study's.
+Rows are appended to calibration.jsonl, so that a study goes on where it stopped; `--tables` prints what is stored. A
+row may say which `commit` made it. The seeds are no other study's.
 """
 
 import argparse

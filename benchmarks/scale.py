@@ -100,7 +100,7 @@ def write(path: Path, t: np.ndarray, U: np.ndarray, P: np.ndarray, Q: np.ndarray
     """A table with noise in P and Q."""
     noise = NOISE * np.random.default_rng(seed).standard_normal((2, len(t)))
     table = np.column_stack([t, U, P + noise[0], Q + noise[1]])
-    np.savetxt(path, table, "%.6g", ",", header="t,U,P,Q", comments="")
+    np.savetxt(path, table, ["%.9g", *["%.6g"] * 3], ",", header="t,U,P,Q", comments="")
 
 
 def table(folder: Path, rows: int) -> None:

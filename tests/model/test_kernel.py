@@ -2,6 +2,8 @@
 
 import copy
 import ctypes
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.kernel import Kernel
 from tractexp.kernel.layout import LANES
+from tractexp.kernel.lowered import Phase
 from tractexp.kernel.numbers import Numbers
 from tractexp.kernel.stencil import Stencil
 from tractexp.model.drive import Drive, Excitation
@@ -282,6 +285,18 @@ def test_every_width_that_this_processor_has_gives_the_same_response(drive, moto
         responses.append(other.simulate(drive, values, [1, 3]).outputs)
     assert np.isfinite(responses[0]).any()
     assert all(np.array_equal(responses[0], one, equal_nan=True) for one in responses[1:])
+
+
+@pytest.mark.parametrize("more", [0, 1])
+def test_an_expression_is_printed_whole_up_to_so_many_nodes(more):
+    terms = sympy.symbols(f"x:{listing.LONG - 1 + more}")
+    none, start = Phase((), (), ()), Phase((), (), (sympy.Add(*terms),))
+    lowered = SimpleNamespace(
+        start=start, rest=None, constant=none, derivative=none, renewal=none, output=none, starts=["s"], constants=[],
+        states=[], memories=[], outputs=[],
+    )  # fmt: skip
+    _, line = listing.equations(cast(Any, lowered))
+    assert (f"x{listing.LONG - 2}" in line, "terms and more" in line) == (not more, bool(more))
 
 
 def test_a_kernel_is_printed_for_people(model):

@@ -15,7 +15,7 @@ import tractexp
 from tractexp.identification import advice, agreement
 from tractexp.identification.advice import advise
 from tractexp.identification.agreement import compare_events
-from tractexp.identification.descent import descend
+from tractexp.identification.descent import descend, normal
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
@@ -303,6 +303,33 @@ def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monk
     monkeypatch.setattr(agreement, "only", counted)
     assert agreement.disagreeing(known) == ([], [])
     assert max(sizes) == known.likelihood.free + 2
+
+
+def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(model):
+    """Over every row and every P0 and Q0 at once, as the least squares of the whole have them."""
+    known = study.judged(Problem(model, records((0.3, 0.4, 0.5), 0.003)), study.TYPICAL).uncertainty
+    likelihood, gains = known.likelihood, compare_events(known).gains
+    _, J = likelihood.jacobian(known.unit)
+
+    def errors(rows):
+        own, nuisances = J[rows][:, : likelihood.free], J[rows][:, likelihood.free :]
+        information = Information.of(known.names, known.values, known.upper - known.lower, own, nuisances)
+        return information.standard_errors
+
+    whole = errors(np.ones(len(J), dtype=bool))
+    for e, gain in enumerate(gains.values()):
+        assert list(gain.values()) == pytest.approx(errors(~likelihood.part_of(e)) / whole, rel=1e-9)
+
+
+def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_itself(model):
+    """P0 and Q0 of each event stand in columns of their own, which are never written out."""
+    likelihood = Likelihood.of(Problem(model, records((0.3, 0.5), 0.003)))
+    unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
+    base = likelihood.rows(unit)
+    alone, together = (normal(likelihood.rows, unit, base, lanes, apart) for apart in ((), likelihood.apart))
+    for one, other in zip(alone, together, strict=True):
+        assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
+    assert (together[1] == np.swapaxes(together[1], 1, 2)).all()
 
 
 def test_a_fit_at_a_bound_says_so(model):

@@ -9,6 +9,7 @@ import uncertainty as study
 from pages import charts, read, unpacked
 
 from tractexp.errors import UserError
+from tractexp.identification.descent import descend
 from tractexp.identification.posterior import PosteriorSample
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import End, LikelihoodProfile, checked, profiles, revised
@@ -83,6 +84,25 @@ def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_sa
     assert narrow  # a parabola anyway
     assert not narrow & set(judged.profiled)
     assert judged.verdicts["T_m"].word == IDENTIFIED
+
+
+@pytest.mark.parametrize(("deviation", "seed", "Q_s0"), [(0.01, 2, 0.02), (0.005, 3, 0.05)])
+def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile_was_begun_from(deviation, seed, Q_s0):
+    """Where the static load draws next to no reactive power, q_v is hardly known, and X' and C follow it in a curve.
+
+    With one parameter held at its truth after the other, the best fit from the truth is close enough to the optimum.
+    """
+    known = study.judged(Problem(study.model(), events((0.3,), deviation, seed, Q_s0)), study.TYPICAL).uncertainty
+    judged = checked(known)
+    likelihood = judged.likelihood
+    start = np.repeat(likelihood.to_unit(np.array(study.TYPICAL)), len(judged.names), axis=0)
+    held = np.eye(len(judged.names), start.shape[1], dtype=bool)
+    ends = descend(likelihood.rows, start, held, apart=likelihood.apart)
+    close = ends.deviance - judged.deviance < threshold()
+    assert close.sum() >= 2
+    low, high = judged.intervals.T
+    values, slack = likelihood.values(ends.unit[close]), 1e-3 * (high - low)
+    assert ((values > low - slack) & (values < high + slack)).all()
 
 
 def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):

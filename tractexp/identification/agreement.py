@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.identification.descent import Rows, descend
+from tractexp.identification.descent import MOST_NUMBERS, Rows, descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.uncertainty import Uncertainty
@@ -34,15 +34,19 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     _, J = likelihood.of_records.jacobian(uncertainty.unit)
     free, width = likelihood.free, uncertainty.upper - uncertainty.lower
 
-    def errors(rows: np.ndarray) -> np.ndarray:
-        own, nuisances = rows[:, :free], rows[:, free:]
-        return Information.of(uncertainty.names, uncertainty.values, width, own, nuisances).standard_errors
+    def information(own: np.ndarray, nuisances: np.ndarray) -> Information:
+        return Information.of(uncertainty.names, uncertainty.values, width, own, nuisances)
 
-    whole = errors(J)
+    def errors(triangles: Sequence[np.ndarray]) -> np.ndarray:
+        return information(np.concatenate(triangles), np.empty((sum(map(len, triangles)), 0))).standard_errors
+
+    own_rows = [J[likelihood.part_of(e)] for e in range(likelihood.problem.drive.events)]
+    triangles = [np.linalg.qr(information(J[:, :free], J[:, free:]).J).R for J in own_rows]
+    whole = errors(triangles)
     gains: dict[str, dict[str, float]] = {}
     for e, event in enumerate(likelihood.problem.events):
         with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
-            ratio = errors(J * ~likelihood.part_of(e)[:, None]) / whole
+            ratio = errors(triangles[:e] + triangles[e + 1 :]) / whole
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(uncertainty)
     return EventAgreement(gains, odd, notes)
@@ -62,8 +66,7 @@ def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
     while len(left) > 1:
         groups = [left, *([o for o in left if o != e] for e in left), *([e] for e in left)]
-        start = np.tile(uncertainty.unit, (len(groups), 1))
-        deviance = descend(only(likelihood, groups), start, apart=likelihood.apart).deviance
+        deviance = _deviances(likelihood, uncertainty.unit, groups)
         n = len(left)
         excess = deviance[0] - deviance[1 : n + 1] - deviance[n + 1 :]
         worst = int(excess.argmax())
@@ -79,6 +82,15 @@ def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
         notes.append(f"{name(left[worst])} does not fit with the rest: {measured}")
         del left[worst]
     return odd, notes
+
+
+def _deviances(likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]) -> np.ndarray:
+    """What the best fits to groups of events alone leave, from coordinates (D,), as many at once as memory allows."""
+    together = max(1, MOST_NUMBERS // (2 * likelihood.problem.drive.measured.size))
+    parts = [groups[k : k + together] for k in range(0, len(groups), together)]
+    start = np.tile(unit, (together, 1))
+    ends = [descend(only(likelihood, part), start[: len(part)], apart=likelihood.apart) for part in parts]
+    return np.concatenate([descent.deviance for descent in ends])
 
 
 def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:

@@ -31,37 +31,41 @@ class Descent:
 
 @dataclass(frozen=True, eq=False)
 class SeparableColumns:
-    """Coordinates (k,) that act on different rows, (k, R) where True: one simulation has the differences of all."""
+    """Coordinates (k,) that act on different rows, (k, R) where True: one simulation has the differences of all.
+
+    Several of them act on the same rows.
+    """
 
     coordinates: np.ndarray
     rows: np.ndarray
 
 
+def _alone(size: int, apart: Sequence[SeparableColumns]) -> np.ndarray:
+    """Which of so many coordinates are in none of the groups."""
+    return np.setdiff1d(np.arange(size), np.concatenate([np.empty(0, dtype=int), *(g.coordinates for g in apart)]))
+
+
 def forward_differences(
     rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: Sequence[SeparableColumns] = ()
 ) -> np.ndarray:
-    """Derivatives (n, D, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
+    """Derivatives (n, k, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
 
-    One that cannot be simulated is zero.
+    First those to each coordinate that is in no group, then one of each group: in each row that to the coordinate that
+    acts there. One that cannot be simulated is zero.
     """
     n, d = unit.shape
-    shared = {int(c) for group in apart for c in group.coordinates}
-    alone = np.array([c for c in range(d) if c not in shared], dtype=int)
+    alone = _alone(d, apart)
     steps = np.zeros((len(alone) + len(apart), d))  # which coordinates move in each simulation
     steps[np.arange(len(alone)), alone] = 1
-    for k, group in enumerate(apart):
-        steps[len(alone) + k, group.coordinates] = 1
+    for k, group in enumerate(apart, len(alone)):
+        steps[k, group.coordinates] = 1
     h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
     moved = unit[:, None, :] + steps * h[:, None, :]
-    change = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
-    change -= base[:, None, :]
-    J = change
-    if apart:
-        J = np.empty((n, d, base.shape[1]))
-        J[:, alone] = change[:, : len(alone)]
-        for k, group in enumerate(apart, len(alone)):
-            J[:, group.coordinates] = change[:, k, None] * group.rows
-    J /= h[:, :, None]
+    J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
+    J -= base[:, None, :]
+    J[:, : len(alone)] /= h[:, alone, None]
+    for k, group in enumerate(apart, len(alone)):
+        J[:, k] /= h[:, group.coordinates[group.rows.argmax(axis=0)]]
     if (lost := ~np.isfinite(J.sum(axis=2))).any():
         J[lost] = np.where(np.isfinite(J[lost]), J[lost], 0.0)
     return J
@@ -100,15 +104,38 @@ def normal(
     """
     n, d = unit.shape
     gradient, H = np.empty((n, d)), np.empty((n, d, d))
-    together = max(1, MOST_NUMBERS // (d * base.shape[1]))
+    apart = () if central else apart
+    together = max(1, MOST_NUMBERS // ((len(_alone(d, apart)) + len(apart)) * base.shape[1]))
     for first in range(0, n, together):
         part = slice(first, first + together)
         if central:
             _, J = central_differences(rows, unit[part], lanes[part])
         else:
             J = forward_differences(rows, unit[part], base[part], lanes[part], apart)
-        gradient[part] = (J @ base[part, :, None])[:, :, 0]
-        H[part] = J @ np.swapaxes(J, 1, 2)
+        gradient[part], H[part] = _products(J, base[part], d, apart)
+    return gradient, H
+
+
+def _products(
+    J: np.ndarray, base: np.ndarray, size: int, apart: Sequence[SeparableColumns]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gradient (n, D) and matrix (n, D, D) of derivatives (n, k, R) as `forward_differences` has them.
+
+    Coordinates of a group have nothing in common with each other, so that their columns are never written out.
+    """
+    gradient, H, alone = np.zeros((len(J), size)), np.zeros((len(J), size, size)), _alone(size, apart)
+    own = J[:, : len(alone)]
+    gradient[:, alone] = (own @ base[:, :, None])[:, :, 0]
+    H[:, alone[:, None], alone] = own @ np.swapaxes(own, 1, 2)
+    for e, rows in enumerate(apart[0].rows if apart else ()):
+        theirs = np.array([group.coordinates[e] for group in apart])
+        both = np.concatenate([alone, theirs])
+        columns = J[:, :, rows]
+        acting = columns[:, len(alone) :]
+        gradient[:, theirs] = (acting @ base[:, rows, None])[:, :, 0]
+        block = acting @ np.swapaxes(columns, 1, 2)
+        H[:, theirs[:, None], both] = block
+        H[:, both[:, None], theirs] = np.swapaxes(block, 1, 2)
     return gradient, H
 
 

@@ -4,6 +4,8 @@ Where the likelihood is no parabola, the interval of the information matrix misl
 profiles advance in lockstep, two lanes (down and up) for each parameter, so that one simulation call carries a
 step of every one of them. A lane ends where the deviance has risen too far, though beyond a crest it may fall again:
 so the rest of each range is looked at, too, from every valley, and lanes go on from where the records fit as well.
+Every point of a profile that the records do not rule out belongs to the intervals of all parameters, not only of the
+profiled one: where it lies beyond another's, a lane of that goes on from there.
 
 Deviances are told over what a parameter's may rise by, in units of the chi-squared quantile: under least squares, that
 of another scatter (`Uncertainty.limits`), one threshold holds for all. Source: Chandler and Bate 2007.
@@ -82,6 +84,15 @@ class Profiles:
     threshold: float
     simulations: int
     restarts: int
+    region: "_Region"
+
+    @property
+    def wider(self) -> np.ndarray:
+        """(d,) Whether points of the profiles that the records do not rule out lie beyond the interval by curvature."""
+        uncertainty = self.uncertainty
+        ends = zip(uncertainty.values - uncertainty.half, uncertainty.values + uncertainty.half, strict=True)
+        units = [_in_range(uncertainty, c, interval) for c, interval in enumerate(ends)]
+        return np.array([bool(self.region.outermost(c, *unit)) for c, unit in enumerate(units)])
 
     @property
     def notes(self) -> list[str]:
@@ -129,8 +140,9 @@ def revised(
 def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
-    That is for intervals wider than `DOUBTFUL` of the value, and for parameters that have another value in another
-    valley; a narrow one is a parabola anyway. Parameters that are not identifiable by structure have no profile.
+    That is for intervals wider than `DOUBTFUL` of the value, for parameters that have another value in another valley,
+    and for those that another's profile leads beyond their interval; else a narrow one is a parabola. Parameters that
+    are not identifiable by structure have no profile.
     """
     bounds = zip(uncertainty.lower, uncertainty.upper, strict=True)
     sizes = np.array([size(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)])
@@ -138,15 +150,24 @@ def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncount
     doubtful |= uncertainty.information.identifiable & uncertainty.elsewhere
     if not doubtful.any():
         return uncertainty
-    result = profiles(
-        uncertainty, names=[n for n, d in zip(uncertainty.names, doubtful, strict=True) if d], parts=parts
-    )
+    result = _of_doubtful(uncertainty, doubtful, parts)
     return replace(
         result.uncertainty,
         verdicts=result.verdicts,
         profiled={p.name: p.interval for p in result.profiles},
         notes=[*result.uncertainty.notes, *result.notes],
     )
+
+
+def _of_doubtful(uncertainty: Uncertainty, doubtful: np.ndarray, parts: Callable[[int], Counting]) -> Profiles:
+    """Profiles of the doubtful (d,) parameters and of those that these lead beyond their interval by curvature."""
+    names = [name for name, d in zip(uncertainty.names, doubtful, strict=True) if d]
+    result = profiles(uncertainty, names=names, parts=parts)
+    wider = doubtful | result.wider & uncertainty.information.identifiable
+    if (wider == doubtful).all():
+        return result
+    whole = _of_doubtful(result.uncertainty, wider, parts)
+    return replace(whole, restarts=result.restarts + whole.restarts)
 
 
 def profiles(
@@ -162,21 +183,18 @@ def profiles(
     simulations, restarts, names = 0, 0, names or uncertainty.names
     while True:
         column = np.array([uncertainty.names.index(name) for name in names])
-        lanes = _Lanes(uncertainty, column, np.tile(uncertainty.unit, (len(names), 1)), np.zeros(len(names)))
+        drawing = _Drawing(uncertainty, column)
         with parts(points) as ended:
-            simulations += lanes.run(points, ended)
-        curves = [lanes.profile(k) for k in range(len(names))]
-        better = lanes.better
-        if better is None:
-            places, spent = _elsewhere(uncertainty, column, curves)
-            further = _Lanes(uncertainty, places.column, places.unit, places.rise)
-            simulations += spent + further.run(points)
-            better = further.better
-            curves = [_joined(p, [further.profile(int(k)) for k in np.flatnonzero(places.column == c)])
-                    for p, c in zip(curves, column, strict=True)]  # fmt: skip
-        if better is None or restarts == RESTARTS:
-            return Profiles(uncertainty, tuple(curves), threshold(), simulations, restarts)
-        descent = descend(uncertainty.likelihood.rows, better[None], apart=uncertainty.likelihood.apart)
+            drawing.begin(points, ended)
+        if drawing.better is None:
+            drawing.look_elsewhere(points)
+        for _ in names:  # what one lane went through may lead another on, and that the next
+            if drawing.better is not None or not drawing.go_on(points):
+                break
+        simulations += drawing.simulations
+        if drawing.better is None or restarts == RESTARTS:
+            return Profiles(uncertainty, tuple(drawing.curves), threshold(), simulations, restarts, drawing.region)
+        descent = descend(uncertainty.likelihood.rows, drawing.better[None], apart=uncertainty.likelihood.apart)
         simulations += descent.simulations
         uncertainty = uncertainty.at(descent.unit[0])
         restarts += 1
@@ -191,15 +209,86 @@ class _Places:
     rise: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class _Region:
+    """Points of lanes: coordinates (n, D), and by what share of what it may rise by each parameter's deviance is up.
+
+    That is `rise` (n, d).
+    """
+
+    unit: np.ndarray
+    rise: np.ndarray
+
+    def joined(self, other: "_Region") -> "_Region":
+        return _Region(np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise]))
+
+    def outermost(self, c: int, low: float, high: float) -> list[int]:
+        """Which points lie farthest below and above an interval of the c-th parameter and fit; [] where none does."""
+        values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], (low + high) / 2)
+        if not len(values):
+            return []
+        down, up = int(values.argmin()), int(values.argmax())
+        return [down] * bool(values[down] < low - SMALLEST_STEP) + [up] * bool(values[up] > high + SMALLEST_STEP)
+
+
+class _Drawing:
+    """Profiles of some parameters (k,) about one optimum, as their lanes go on."""
+
+    def __init__(self, uncertainty: Uncertainty, column: np.ndarray):
+        self.uncertainty, self.column = uncertainty, column
+        self.curves: list[LikelihoodProfile] = []
+        self.region = _Region(np.empty((0, len(uncertainty.unit))), np.empty((0, len(uncertainty.names))))
+        self.better: np.ndarray | None = None
+        self.simulations = 0
+
+    def begin(self, points: int, ended: Callable[[], None]) -> None:
+        """Lanes from the optimum."""
+        k = len(self.column)
+        lanes = self._run(_Places(self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k)), points, ended)
+        self.curves = [lanes.profile(i) for i in range(k)]
+
+    def look_elsewhere(self, points: int) -> None:
+        """Lanes from where the rest of a range fits as well."""
+        places, spent = _elsewhere(self.uncertainty, self.column, self.curves)
+        self.simulations += spent
+        self._join(places, points)
+
+    def go_on(self, points: int) -> bool:
+        """Lanes from points of all lanes that fit and lie beyond a profile's interval; False where there are none."""
+        where = [(int(c), k) for c, p in zip(self.column, self.curves, strict=True)
+                 for k in self.region.outermost(int(c), *_in_range(self.uncertainty, int(c), p.interval))]  # fmt: skip
+        if where:
+            c, k = np.array(where).T
+            self._join(_Places(c, self.region.unit[k], self.region.rise[k, c] * threshold()), points)
+        return bool(where)
+
+    def _join(self, places: "_Places", points: int) -> None:
+        lanes = self._run(places, points)
+        self.curves = [_joined(p, [lanes.profile(int(k)) for k in np.flatnonzero(places.column == c)])
+                       for p, c in zip(self.curves, self.column, strict=True)]  # fmt: skip
+
+    def _run(self, places: "_Places", points: int, ended: Callable[[], None] = lambda: None) -> "_Lanes":
+        lanes = _Lanes(self.uncertainty, places.column, places.unit, places.rise)
+        self.simulations += lanes.run(points, ended)
+        self.better = lanes.better
+        self.region = self.region.joined(lanes.region)
+        return lanes
+
+
+def _in_range(uncertainty: Uncertainty, c: int, interval: tuple[float, float]) -> tuple[float, float]:
+    """An interval of the c-th parameter in its range."""
+    low, width = uncertainty.lower[c], uncertainty.upper[c] - uncertainty.lower[c]
+    return (interval[0] - low) / width, (interval[1] - low) / width
+
+
 def _elsewhere(
     uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
 ) -> tuple[_Places, int]:
     """The best place of each range beyond the profile's interval that fits as well, and the simulations spent."""
     begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
-    width = uncertainty.upper - uncertainty.lower
     wanted = []  # (column, value in the range)
     for c, profile in zip(column, curves, strict=True):
-        low, high = (np.array(profile.interval) - uncertainty.lower[c]) / width[c]
+        low, high = _in_range(uncertainty, c, profile.interval)
         values = np.concatenate([GRID, begin[1:, c]])
         wanted += [(c, v) for v in values[(values < low - SEEN) | (values > high + SEEN)]]
     if not wanted:
@@ -218,18 +307,22 @@ def _elsewhere(
 
 
 def _joined(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
-    """A profile with what was found beyond a crest: its interval reaches over both."""
+    """A profile with what further lanes found: the least of both at each value, and an interval over both.
+
+    What fits best of a lane from beyond the interval is another minimum, unless it is in the interval.
+    """
     for other in others:
         every = sorted((profile, other), key=lambda p: p.interval)
-        values = np.concatenate([profile.values, other.values])
-        order = np.argsort(values, kind="stable")
+        values = np.union1d(profile.values, other.values)
+        least = float(other.values[other.deviance.argmin()])
+        low, high = profile.interval
         profile = replace(
             profile,
-            values=values[order],
-            deviance=np.concatenate([profile.deviance, other.deviance])[order],
+            values=values,
+            deviance=np.minimum(*(np.interp(values, p.values, p.deviance, np.inf, np.inf) for p in every)),
             interval=(every[0].interval[0], max(p.interval[1] for p in every)),
             ends=(every[0].ends[0], max(every, key=lambda p: p.interval[1]).ends[1]),
-            minima=(*profile.minima, float(other.values[other.deviance.argmin()])),
+            minima=profile.minima if low <= least <= high else (*profile.minima, least),
         )
     return profile
 
@@ -250,8 +343,17 @@ class _Lanes:
         self.rise = np.repeat(rise, 2)
         self.open = np.ones(len(self.column), dtype=bool)
         self.path: list[list[tuple[float, float]]] = [[] for _ in self.column]
+        self.trail: list[tuple[np.ndarray, np.ndarray]] = []  # coordinates (n, D), deviances above the optimum's (n,)
         self.better: np.ndarray | None = None
         self.simulations = 0
+
+    @property
+    def region(self) -> _Region:
+        """Every point of the lanes."""
+        limits, size = self.uncertainty.limits, len(self.uncertainty.unit)
+        unit = np.concatenate([np.empty((0, size)), *(unit for unit, _ in self.trail)])
+        rise = np.concatenate([np.empty(0), *(rise for _, rise in self.trail)])
+        return _Region(unit, rise[:, None] / limits)
 
     def run(self, points: int, ended: Callable[[], None] = lambda: None) -> int:
         """At most so many points on every lane, until one is better than the optimum; the simulations spent."""
@@ -291,6 +393,7 @@ class _Lanes:
         self.unit[lanes] = descent.unit
         self._adapt(lanes, rise, moved)
         self.rise[lanes] = rise
+        self.trail.append((descent.unit, descent.deviance - self.uncertainty.deviance))
         for lane, value, height in zip(lanes, target, rise, strict=True):
             if np.isfinite(height):
                 self.path[lane].append((value, height))

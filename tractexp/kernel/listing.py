@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
     from tractexp.kernel.lowered import Lowered, Phase
 
-LONG = 500  # letters of an expression: no one reads more
+LONG = 500  # nodes of an expression: no one reads more
 
 
 def equations(lowered: "Lowered") -> Iterator[str]:
