@@ -9,7 +9,7 @@ import pytest
 import tractexp
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.incomplete import PredictedDeviance, bears_out
+from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import standard_errors
@@ -90,16 +90,6 @@ def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not()
     assert not other.clear_of(one)
 
 
-@pytest.mark.parametrize(("after", "chi2", "stands"), [(0.587, 44.0, False), (0.53, 44.0, True), (0.587, 1.5, True)])
-def test_what_most_of_a_loud_deviance_says_the_error_in_S_must_say_too(after, chi2, stands):
-    """A real transformer: 89 % of the deviance was gone, and 59 of 81 % of the response were missed still."""
-    before = SimpleNamespace(error=SimpleNamespace(value=0.81), chi2_per_sample=chi2)
-    judged = SimpleNamespace(
-        before=before, after=SimpleNamespace(error=SimpleNamespace(value=after)), telling=True, helps=True
-    )
-    assert bears_out(judged, Criteria()) is stands
-
-
 # a motor whose law nobody has
 
 
@@ -146,9 +136,10 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
     assert "beside undervoltage_trip this is left" in inexact.headline
 
 
-def test_its_share_is_within_its_interval_though_the_model_is_not_exact(inexact):
+def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
+    """What is off is a bias by the swing, 3.6 standard errors: a covariance of residuals holds scatter alone."""
     share = next(e for e in inexact.after if e.parameter.name == "tripped_share")
-    assert abs(share.value - 0.25) < 3 * share.error
+    assert share.value == pytest.approx(0.25, rel=0.005)
 
 
 def test_the_covariance_by_least_squares_is_wider_where_residuals_are_correlated(inexact):

@@ -5,11 +5,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
 from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.gap import Curves, GapTest, gap
+from tractexp.discrepancy.gap import Curves, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import (
@@ -59,8 +58,11 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """
     if not events or weighed.survivors.adequate:
         return weighed
-    weighed.survivors.explanations.base.context.effort.say("judging what leaves something on the held-out events")
-    return _by_deviance(weighed, events, seed) or _by_size(weighed, events, seed)
+    context = weighed.survivors.explanations.base.context
+    context.effort.say("judging what leaves something on the held-out events")
+    there = judged_on(context, events, weighed.bare, [weighed.bare])[()].gap.before
+    named = None if there.chi2_per_sample > LOUD else _by_deviance(weighed, events, seed)
+    return named or _by_size(weighed, events, seed)
 
 
 def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut | None:
@@ -86,7 +88,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
         sets[fit.names] = PredictedDeviance(fit, one.left, one.after, bool(rejected.get(fit.names, False)), least)
     predicted = Predictions(context.catalogue, sets)
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
-    if not chosen or not all(bears_out(gaps[f.names], context.criteria) for f in chosen):
+    if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
         return None
 
     def rival(fit: Refit) -> Rival:
@@ -97,13 +99,6 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     retained = each_apart(rival, chosen, explained.base.context.effort.parts)
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
     return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
-
-
-def bears_out(one: GapTest, criteria: Criteria) -> bool:
-    """Whether held-out events bear a set out: by the deviance, and where what the base model leaves is louder than the
-    noise by the model's error, too, since a few samples can be most of a deviance."""
-    smaller = one.before.error.value >= criteria.ahead * one.after.error.value
-    return one.telling and one.helps and (smaller or one.before.chi2_per_sample <= LOUD)
 
 
 def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
