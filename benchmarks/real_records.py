@@ -41,7 +41,7 @@ def row(name: str, fitted: str) -> dict[str, Any]:
     near = found.content["nearest"]
     return {
         "record": name, "fitted": fitted, **verdict, "reason": found.reason,
-        "sets": [c["effects"] for c in found.content["candidates"] if c["status"] in ("chosen", "tied")],
+        "sets": found.content["name_sets"],
         "nearest": near and near["effects"], "gap": found.content["gap"], "near_gap": near and near.get("gap"),
         "seconds": time.perf_counter() - started,
     }  # fmt: skip
@@ -57,7 +57,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     head = ["record", "dips fitted", "verdict", "names", "fitted: before, after [%]", "held out: before, after [%]"]
     lines = [head, ["---"] * len(head)]
     for one in rows:
-        names, gaps, whole = joined(one["names"]), one["gap"], ", complete" if one["complete"] else ", incomplete"
+        names, gaps = "; ".join(joined(names) for names in one["sets"]), one["gap"]
+        whole = ", complete" if one["complete"] else ", incomplete"
         if not one["names"]:
             names, gaps, whole = f"nearest: {joined(one['nearest'])}", one["near_gap"], ""
         both = (gaps["train"], gaps["validate"])

@@ -3,8 +3,8 @@
 Dips of loads whose parameters, voltage, sampling rate and frequency are drawn, with noise of 0.1 and 1 %. In each kind
 the load, or its voltage, also changes for another reason, smeared over the cycle of a phasor. Counted is what
 `tractexp.record.detect` makes of it; a record without such a change is a false alarm where anything is noted, refused
-or cut. The seeds are of a series of their own. They chose no constant but `USUAL_U`, whose fault
-they showed and whose value is six standard deviations. docs/records.md has the table from steadiness.json.
+or cut. The seeds are of a series that chose no constant; an earlier one had shown a
+fault of `USUAL_U`. docs/records.md has the table from steadiness.json.
 """
 
 import json
@@ -21,7 +21,7 @@ from tractexp import files
 from tractexp.errors import UserError
 from tractexp.record import Base, Event, Record, detect
 
-SERIES, COUNT = 20261127, 200  # seeds of these records, and so many of each kind and noise
+SERIES, COUNT = 2026112702, 200  # seeds of these records, and so many of each kind and noise
 NOISES = (1e-3, 1e-2)
 STORED = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).parents[1] / "docs" / "records.md"

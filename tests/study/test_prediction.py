@@ -1,6 +1,7 @@
 """Names by what they predict of held-out events: the rule by itself, and where a model is never exact."""
 
 import json
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -73,6 +74,22 @@ def test_a_model_that_diverges_is_behind_any_that_does_not():
     lost.squares[2] = np.inf
     assert off("a", error=0.5).clear_of(lost)
     assert not lost.clear_of(off("a", error=0.5))
+
+
+class Families:
+    """`trip` has a member of two stages."""
+
+    def textbook(self, names):
+        return tuple(name.removesuffix("_in_stages") for name in names)
+
+
+@pytest.mark.parametrize(("error", "name"), [(0.09, "trip"), (0.05, "trip_in_stages")])
+def test_of_one_family_a_larger_member_must_be_ahead(error, name):
+    one, other = off("trip", error=0.1), off("trip_in_stages", error=error)
+    other = replace(other, fit=replace(other.fit, parameters=5))
+    sets = {p.names: p for p in (off(error=1.0), one, other)}
+    (chosen,) = Predictions(Families(), sets).explaining(Criteria())
+    assert chosen.names == (name,)
 
 
 def test_contributions_begin_with_the_member_that_helps_most():

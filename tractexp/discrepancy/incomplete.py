@@ -104,12 +104,13 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
 def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets that predict the held-out events best by the size of the model's error."""
     explained = weighed.survivors.explanations
-    predicted = predictions(explained, events)
-    explaining = predicted.explaining(explained.base.context.criteria)
+    predicted, criteria = predictions(explained, events), explained.base.context.criteria
+    explaining = predicted.explaining(criteria)
     if not explaining:
         return weighed
     best, size = explaining[0], len(explaining[0].names)
-    others = [p for p in predicted.ranked(size) if len(p.names) == size and p not in explaining]
+    ranked = predicted.ranked(size, criteria.ahead)
+    others = [p for p in ranked if len(p.names) == size and p not in explaining]
     bare = predicted.bare.fit
 
     def rival(one: PredictionError, rejected: bool) -> Rival:

@@ -1,4 +1,4 @@
-"""Fits and tests where what is left is no noise: least squares, each channel weighed by the size of its own residual.
+"""Fits and tests where what is left is no noise: least squares, every channel alike.
 
 Under a wrong model the likelihood of the noise before the dip is no likelihood: a few samples at the edges, many times
 louder than that noise, bend every parameter. Least squares asks for no noise, and the covariance of its estimates holds
@@ -22,11 +22,11 @@ from tractexp.noise import Noise
 
 
 def residual_noise(context: Context, fit: Refit) -> Noise:
-    """White noise of the size of what a fit leaves in each channel: under it the deviance is a sum of squares."""
+    """White noise of the size of what a fit leaves, the same in each channel: under it the deviance is the sum of
+    squares that names are judged by."""
     residual = context.residuals(fit.unit[None], fit.names)[0]
-    counts = np.maximum(context.valid.sum(axis=1), 1)
-    levels = np.sqrt((np.where(context.valid, residual, 0.0) ** 2).sum(axis=1) / counts)
-    return Noise(Noise.white(*levels.tolist()).pairs, np.eye(len(levels)))
+    level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))
+    return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))
 
 
 def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:

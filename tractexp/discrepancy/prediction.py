@@ -116,24 +116,25 @@ class Predictions(Generic[OneSet]):
         """The base model."""
         return self.sets[()]
 
-    def ranked(self, most: int) -> list[OneSet]:
-        """Sets of at most so many effects, the best first; of one family the best."""
-        best: dict[Names, OneSet] = {}
-        for one in sorted(self.sets.values(), key=lambda p: (p.left, len(p.names), p.names)):
+    def ranked(self, most: int, factor: float) -> list[OneSet]:
+        """Sets of at most so many effects, the best first; of one family the simplest that the best is not ahead of by
+        a factor."""
+        families: dict[Names, list[OneSet]] = {}
+        for one in sorted(self.sets.values(), key=_rank):
             if 0 < len(one.names) <= most:
-                best.setdefault(self.catalogue.textbook(one.names), one)
-        return list(best.values())
+                families.setdefault(self.catalogue.textbook(one.names), []).append(one)
+        return sorted((_simplest(members, factor) for members in families.values()), key=_rank)
 
     def explaining(self, criteria: Criteria) -> list[OneSet]:
         """The set that predicts best and those tied with it; none where none divides what the base model leaves."""
         chosen = self.bare
         for size in range(1, 1 + max(map(len, self.sets))):
-            best = next((p for p in self.ranked(size) if len(p.names) == size), None)
+            best = next((p for p in self.ranked(size, criteria.ahead) if len(p.names) == size), None)
             if best is not None and best.ahead_of(chosen, criteria.ahead):
                 chosen = best
         if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
             return []
-        others = [p for p in self.ranked(len(chosen.names)) if p is not chosen]
+        others = [p for p in self.ranked(len(chosen.names), criteria.ahead) if p is not chosen]
         return [chosen, *(p for p in others if self._rivals(p, chosen, criteria.ahead))]
 
     def _rivals(self, one: OneSet, chosen: OneSet, factor: float) -> bool:
@@ -150,6 +151,15 @@ class Predictions(Generic[OneSet]):
             steps.append(step)
             left -= set(step.names)
         return steps
+
+
+def _rank(one: Prediction) -> tuple[float, int, Names]:
+    return one.left, len(one.names), one.names
+
+
+def _simplest(members: Sequence[OneSet], factor: float) -> OneSet:
+    """The one with the fewest parameters of those that the first, which leaves least, is not ahead of."""
+    return min((one for one in members if not members[0].ahead_of(one, factor)), key=lambda one: one.fit.parameters)
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +180,7 @@ def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredic
     predicted = each_apart(lambda f: _predicted(there, f), list(fits.values()), context.effort.parts)
     sets = dict(zip(fits, predicted, strict=True))
     result = ErrorPredictions(context.catalogue, sets, there, noise)
-    best = result.ranked(max(map(len, fits)))[:1]
+    best = result.ranked(max(map(len, fits)), context.criteria.ahead)[:1]
     subsets = [s for p in best for k in range(1, len(p.names)) for s in itertools.combinations(p.names, k)]
     if missing := [s for s in subsets if s not in sets]:
         again = refit(context, noise, [(s, fits[best[0].names].unit) for s in missing])

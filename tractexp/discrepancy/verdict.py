@@ -182,7 +182,7 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         return _by_deviance(weighed, sets)
     chosen = [predicted.sets[tuple(names)] for names in sets]
     size = len(chosen[0].names)
-    rest = [p for p in predicted.ranked(size) if p.names not in sets]
+    rest = [p for p in predicted.ranked(size, predicted.context.criteria.ahead) if p.names not in sets]
     off = joined([in_percent(p.error) for p in chosen], "and")
     following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
     worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
