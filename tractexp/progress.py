@@ -99,7 +99,8 @@ def counting(what: str, total: int, progress: Progress = None) -> Iterator[Calla
         spent = time.perf_counter() - started
         if spent >= due and done < total:
             due = spent + NEXT_LINES
-            say(f"  {done} of {total} {what}, about {spent * (total - done) / done:.0f} s left")
+            rate, rest = done / spent, spent * (total - done) / done
+            say(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
             sys.stdout.flush()
 
     yield count

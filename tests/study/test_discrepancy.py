@@ -449,7 +449,8 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     near = content(found)["nearest"]
     assert near["effects"]
     assert 0 < near["explained"] < 1
-    assert "gap" not in near  # that of waveforms
+    assert near["gap"]["train"]["after"]["chi2_per_sample"] < near["gap"]["train"]["before"]["chi2_per_sample"]
+    assert near["gap"]["validate"] is None
     rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
     assert len(rows) == sum(e.record.samples for e in found.context.events)
     assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise

@@ -2,13 +2,19 @@
 
 import math
 from collections.abc import Mapping
+from types import SimpleNamespace
 
+import numpy as np
+
+# NumPy's, which overflow to infinity where Python's raise
+FUNCTIONS = SimpleNamespace(**{name: getattr(np, name, getattr(math, name)) for name in dir(math) if name[0] != "_"})
 VALUES = "at"  # what holds the numbers in such a text: at['T_m']
 
 
 def evaluated(texts: Mapping[str, str], known: Mapping[str, float]) -> dict[str, float]:
-    """What is known, and after it each quantity of what stands before it."""
-    numbers = dict(known)
-    for name, text in texts.items():
-        numbers[name] = float(eval(text, {"math": math, VALUES: numbers}))
-    return numbers
+    """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE 754 has it."""
+    numbers = {name: np.float64(value) for name, value in known.items()}
+    with np.errstate(all="ignore"):
+        for name, text in texts.items():
+            numbers[name] = np.float64(eval(text, {"math": FUNCTIONS, VALUES: numbers}))
+    return {name: float(value) for name, value in numbers.items()}
