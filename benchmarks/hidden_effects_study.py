@@ -42,7 +42,7 @@ LEFT_OUT = "left out "  # the group of trials whose effect is taken from the cat
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
-NEWEST = HERE / "judgement_members.jsonl"  # the judgement set
+NEWEST = HERE / "judgement.jsonl"  # the judgement set
 KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
