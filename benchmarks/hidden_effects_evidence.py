@@ -2,7 +2,7 @@
 
 import itertools
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import marked
@@ -46,8 +46,8 @@ def tables(rows: Rows) -> str:
     failed = len(rows) - len(good)
     parts = [
         f"{len(rows)} data sets" + (f", of which {failed} could not be simulated or investigated." if failed else "."),
-        *(_table(head, lines) for head, lines in (_answers(good), _strangers(good), _pairs(good)) if lines),
-        _partly(good), _proposals(good), _table(*_seconds(good)),
+        *(marked.table(head, lines) for head, lines in (_answers(good), _strangers(good), _pairs(good)) if lines),
+        _partly(good), _proposals(good), marked.table(*_seconds(good)),
         *(f"![{what}]({_path(name)})" for name, what in FIGURES.items()),
     ]  # fmt: skip
     return "\n\n".join(filter(None, parts))
@@ -79,10 +79,6 @@ def share(right: int, of: int) -> str:
         return "-"
     low, high = binomtest(right, of).proportion_ci(0.95, "exact")
     return f"{right / of:.1%} ({low:.0%}-{high:.0%})" if of < 1000 else f"{right / of:.1%}"
-
-
-def _table(head: Sequence[str], lines: Sequence[Sequence[object]]) -> str:
-    return "\n".join("| " + " | ".join(map(str, line)) + " |" for line in (head, ["---"] * len(head), *lines))
 
 
 def _rank(row: dict, price: Callable[[int, int], float]) -> str:

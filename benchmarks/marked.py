@@ -1,8 +1,14 @@
 """Text in a page of the docs that is generated from a stored result, between two marks that name the script."""
 
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from tractexp import files
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A Markdown table."""
+    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in (head, ["---"] * len(head), *rows))
 
 
 def marks(name: str) -> tuple[str, str]:

@@ -55,7 +55,7 @@ def percent(misfit: Mapping[str, Any] | None) -> str:
 def table(rows: list[dict[str, Any]]) -> str:
     """Markdown: a line for each investigation."""
     head = ["record", "dips fitted", "verdict", "names", "fitted: before, after [%]", "held out: before, after [%]"]
-    lines = [head, ["---"] * len(head)]
+    lines = []
     for one in rows:
         names, gaps = "; ".join(joined(names) for names in one["sets"]), one["gap"]
         whole = ", complete" if one["complete"] else ", incomplete"
@@ -64,7 +64,7 @@ def table(rows: list[dict[str, Any]]) -> str:
         both = (gaps["train"], gaps["validate"])
         errors = [f"{percent(g['before'])}, {percent(g['after'])}" if g else "-" for g in both]
         lines.append([one["record"], one["fitted"], one["verdict"] + whole, names, *errors])
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+    return marked.table(head, lines)
 
 
 def joined(names: list[str]) -> str:

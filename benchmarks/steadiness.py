@@ -144,11 +144,9 @@ def row(kind: str, noise: float, drawn: int = COUNT) -> dict[str, object]:
 
 
 def table(stored: list[dict[str, float]]) -> str:
-    lines = ["| what else happens | " + " | ".join(f"noise {100 * n:g} %" for n in NOISES) + " |", "|---|---|---|"]
-    for kind in KINDS:
-        cells = [f"{r['right'] / r['drawn']:.1%}" for r in stored if r["kind"] == kind]
-        lines.append(f"| {kind} | {' | '.join(cells)} |")
-    return "\n".join(lines)
+    head = ["what else happens", *(f"noise {100 * n:g} %" for n in NOISES)]
+    shares = {kind: [f"{r['right'] / r['drawn']:.1%}" for r in stored if r["kind"] == kind] for kind in KINDS}
+    return marked.table(head, [[kind, *cells] for kind, cells in shares.items()])
 
 
 def main() -> int:

@@ -8,8 +8,8 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
 from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.gap import Curves, gap
-from tractexp.discrepancy.held_out import Assessment, HeldOut, judged_on
+from tractexp.discrepancy.gap import Curves, curves, gap
+from tractexp.discrepancy.held_out import Assessment, HeldOut, carried, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import (
     ErrorPredictions,
@@ -60,8 +60,8 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
         return weighed
     context = weighed.survivors.explanations.base.context
     context.effort.say("judging what leaves something on the held-out events")
-    there = judged_on(context, events, weighed.bare, [weighed.bare])[()].gap.before
-    named = None if there.chi2_per_sample > LOUD else _by_deviance(weighed, events, seed)
+    there, (unit,), noise = carried(context, events, [weighed.bare])
+    named = None if curves(there, unit, noise).chi2_per_sample > LOUD else _by_deviance(weighed, events, seed)
     return named or _by_size(weighed, events, seed)
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hidden_effects.hidden import Hidden, motors, split
+from hidden_effects.laws import FroelichSaturation
 from hidden_effects.site import Site
 from independent.source import Dip
 
@@ -27,13 +28,10 @@ class BrokenTorque(Hidden):
 
 
 @dataclass(frozen=True)
-class BoundedFlux(Hidden):
-    """The core's magnetizing curve is Froelich's; `amount` is the flux before the event over its bound."""
+class BoundedFlux(FroelichSaturation):
+    """Froelich's magnetizing curve, of half the amount that is noticeable."""
 
-    reference, largest, unit = 0.2, 0.85, "1"
-
-    def apply(self, site: Site) -> Site:
-        return motors(site, saturation=self.amount, ceiling=True)
+    reference = 0.2
 
 
 @dataclass(frozen=True)
