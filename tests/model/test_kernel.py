@@ -2,6 +2,8 @@
 
 import copy
 import ctypes
+import subprocess
+import sys
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -359,3 +361,33 @@ def test_constants_of_the_exponential_are_those_of_a_polynomial_close_to_it():
     x = np.linspace(-np.log(2) / 2, np.log(2) / 2, 10001).astype(np.longdouble)
     exact = np.exp(x)
     assert np.abs(np.polyval(np.array(math.EXP, dtype=np.longdouble), x) / exact - 1).max() < 1.7e-14
+
+
+CROWDED = """
+import ctypes
+from tractexp.kernel import objects, steady
+
+memory = ctypes.CDLL(None)
+memory.mmap.restype, memory.mmap.argtypes = ctypes.c_void_p, [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 4]
+memory.munmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
+UNUSED = 0x4022  # private, of no file, and never reserved: it costs addresses alone
+room = lambda size: memory.mmap(None, size, 0, UNUSED, -1, 0)
+
+objects.load(steady.text(2))
+far, pieces = room(4 << 30), []
+for size in (1 << 24, 1 << 20, 1 << 16, 1 << 12):  # all that is free above is taken
+    while (piece := room(size)) > far:
+        pieces.append((piece, size))
+    memory.munmap(piece, size)
+for piece, size in [entry for entry in pieces if entry[1] > 1 << 12][:3]:  # but single pages
+    memory.munmap(piece + (1 << 13), 1 << 12)
+for width in (4, 8):
+    objects.load(steady.text(width))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="memory is mapped by Linux's call")
+def test_code_is_linked_where_sections_would_lie_further_apart_than_it_reaches():
+    # A linker that gives each section of an object a place of its own ends the process here.
+    ended = subprocess.run([sys.executable, "-c", CROWDED], capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr

@@ -77,6 +77,11 @@ def _ready(text: str, machine: Any) -> Any:
 
 @functools.cache
 def _linker() -> Any:
+    """LLVM's linker that places all sections of an object in one piece of memory.
+
+    Code finds its constants within 2 GB. The older linker places each section where the system has room, and where a
+    process has much memory mapped that can be further: it then ends the process.
+    """
     from llvmlite import binding as llvm
 
-    return llvm.create_lljit_compiler(target.machine())
+    return llvm.create_lljit_compiler(target.machine(), use_jit_link=True)
