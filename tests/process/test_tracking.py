@@ -1,8 +1,10 @@
 """What a run leaves in MLflow, read back through MLflow's own public client."""
 
+import importlib
 import json
 import logging
 import os
+import pickle
 import re
 import signal
 import socket
@@ -573,6 +575,28 @@ def test_to_start_the_process_imports_nothing_that_takes_time():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_process_that_logs_imports_nothing_that_mlflow_does_without(uri):
+    program = (
+        "import sys; from tractexp.tracking import process;"
+        "process.log = lambda run, uri: [name for name, module in sys.modules.items() if module]; process.main()"
+    )
+    told = pickle.dumps(uri) + pickle.dumps(TrackedRun("e", "r"))
+    done = subprocess.run([sys.executable, "-c", program], input=told, capture_output=True)
+    modules, problem = pickle.loads(done.stdout)
+    assert not problem
+    assert {"mlflow.pyfunc", "mlflow.store.tracking.sqlalchemy_store"} <= {*modules}
+    assert not {name.partition(".")[0] for name in modules} & {*process.OPTIONAL}
+
+
+def test_a_package_is_absent_within_and_there_again_afterwards(monkeypatch):
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    with process.absent(["colorsys", "pickle"]):
+        with pytest.raises(ImportError):
+            importlib.import_module("colorsys")
+        assert importlib.import_module("pickle") is pickle  # it was there before
+    assert importlib.import_module("colorsys").rgb_to_hsv
 
 
 def test_a_second_process_passes_its_sentence_on(tmp_path):

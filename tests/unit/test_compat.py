@@ -93,6 +93,40 @@ def test_what_the_store_hands_out_is_a_copy():
     assert again == 1, CHANGED.format("hydra_config_store", "ConfigStore.load hands out the schema itself")
 
 
+def test_hydra_makes_every_schema_at_once_and_the_door_makes_one_when_it_is_read():
+    from dataclasses import dataclass
+
+    from hydra.core.config_store import ConfigStore
+
+    @dataclass
+    class Settings:
+        size: int = 3
+
+    def schema():
+        made.append(Settings)
+        return Settings
+
+    made: list = []
+    store = ConfigStore.instance()
+    store.store(group="compat_test", name="eager", node=Settings)
+    hydra_config_store.store_later("compat_test", "later", schema)
+    try:
+        eager, later = (vars(store.repo["compat_test"][f"{name}.yaml"]) for name in ("eager", "later"))
+        assert "node" in eager, MENDED.format("Hydra", "hydra_config_store")
+        assert "node" not in later
+        assert not made
+        nodes = [store.load(f"compat_test/{name}.yaml") for name in ("eager", "later", "later")]
+        nodes[1].node.size = 4
+    except (AttributeError, KeyError, TypeError) as error:
+        pytest.fail(CHANGED.format("hydra_config_store", error))
+    finally:
+        store.repo.pop("compat_test", None)
+    assert [node.node.size for node in nodes] == [3, 4, 3]
+    assert nodes[0].node._metadata.object_type is nodes[2].node._metadata.object_type is Settings
+    assert (nodes[0].group, nodes[0].name) == ("compat_test", "eager.yaml")
+    assert (nodes[2].group, nodes[2].name) == ("compat_test", "later.yaml")
+
+
 def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_function_goes_in_one():
     import numpy as np
     from scipy.optimize import differential_evolution
