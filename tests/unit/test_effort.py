@@ -54,6 +54,18 @@ def test_a_long_step_says_how_many_parts_and_how_long_they_take_but_no_time_spen
     assert lines[-1] == "  still fitting"
 
 
+def test_one_part_alone_says_nothing(monkeypatch):
+    monkeypatch.setattr(effort, "SILENCE", 0.04)
+    lines = []
+    with Effort(lines.append).audible() as spent:
+        spent.say("fitting")
+        with spent.parts(1), spent.parts(5) as ended:
+            ended()
+            while len(lines) < 2:
+                time.sleep(0.01)
+    assert re.fullmatch(r"  still fitting: 1 of 5, about \d+ s left", lines[1])
+
+
 def test_independent_items_are_counted_as_they_end():
     ended = []
     found = each_apart(lambda x: x + 1, [1, 2, 3], lambda total: nullcontext(lambda: ended.append(total)))
