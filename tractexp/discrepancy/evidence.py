@@ -12,7 +12,7 @@ from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.wording import joined, with_error
 
-CHOSEN, KEPT = "added", "tied"
+CHOSEN = "added"
 FITTED, ONE_STEP = "refitted", "one step"
 
 
@@ -46,7 +46,7 @@ class Evidence:
     @property
     def standing(self) -> int:
         """0 for what was added, 1 for what is tied with it, 2 for the rest."""
-        return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
+        return {CHOSEN: 0, TIED: 1}.get(self.status, 2)
 
 
 def evidence(findings: Findings) -> list[Evidence]:
@@ -128,7 +128,7 @@ def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     if names in findings.verdict.sets:
         helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
         left = f"leaves no more than chance does{helps}"
-        return (CHOSEN, left) if names == findings.names else (KEPT, left)
+        return (CHOSEN, left) if names == findings.names else (TIED, left)
     if rival.rejected:
         names = _names(findings, findings.survivors.rivals[0])
         best = names[0] if len(names) == 1 else "the best set"

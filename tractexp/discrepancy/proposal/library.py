@@ -11,6 +11,7 @@ from typing import Any
 
 from tractexp.discrepancy.proposal import balances, shapes
 from tractexp.model import sites
+from tractexp.model.equations import Equations
 from tractexp.parameter import Parameter
 
 SOURCE = "a term proposed by the data; see docs/missing-effects.md"
@@ -103,12 +104,17 @@ class Balance:
     latex: str
     sizes: tuple[Size, ...]
     places: tuple[sites.Site, ...] = ()
+    in_waves: tuple[sites.Site, ...] | None = None  # where they are others
     kinds: tuple[str, ...] = (ANSWER,)
     without: tuple[str, ...] = ("constant", "relay", "below")  # signals that make no sense here: a flux is not switched
 
     @property
     def build(self) -> Callable[..., Any]:
         return getattr(balances, self.name)
+
+    def places_in(self, eq: Equations) -> tuple[sites.Site, ...]:
+        """The sites it edits in equations of phasors or of waves."""
+        return self.places if self.in_waves is None or not eq.waves else self.in_waves
 
 
 @dataclass(frozen=True)
@@ -244,7 +250,7 @@ BALANCES = (
             (sites.Q_static,), without=_SWITCHED),
     Balance("motor", "the motors' power by one share",
             r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})", (_SHARE,),
-            (sites.P_motor, sites.Q_motor), without=_SWITCHED),
+            (sites.P_motor, sites.Q_motor), (sites.motor_current,), without=_SWITCHED),
     Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}",
             (Size("size", 20.0, "pu", 0.05, power_exponent=1),), (sites.load_torque,), without=_SWITCHED),
     Balance("coupling", "the coupling of rotor and stator", r"c \rightarrow c\,(1 + k\,{g})",

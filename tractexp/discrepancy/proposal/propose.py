@@ -46,7 +46,7 @@ class TermEstimate:
 
 @dataclass(frozen=True)
 class Acting:
-    """When a term acts in one event: the times of the record [s] between which it changes the power, and how much."""
+    """When a term acts in one event: the times of the record [s] between which it changes the load, and how much."""
 
     event: str
     start: float
@@ -93,8 +93,6 @@ def propose(
     `among` are the terms that are tried, by default the whole library.
     """
     context = base.context
-    if not context.domain.calibrated:
-        return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
     if not validate:
         return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
     under = context_of_terms(context)
@@ -143,14 +141,14 @@ def _next_event(result: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
 
 
 def change(result: Fitted, fit: Refit) -> np.ndarray:
-    """What a term adds to the calculated power (C, N) [pu], all else as it was fitted with it."""
+    """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
     without = result.context.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))})
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 
 
 def _acting(result: Fitted, fit: Refit) -> list[Acting]:
-    """Where in each event a term changes the power by more than a tenth of the most it does."""
+    """Where in each event a term changes a channel by more than a tenth of the most it does."""
     context, added, terms = result.context, change(result, fit), []
     for e, event in enumerate(context.events):
         own = added[:, context.drive.part(e)]
