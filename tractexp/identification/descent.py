@@ -42,7 +42,10 @@ class SeparableColumns:
 
 def _alone(size: int, apart: Sequence[SeparableColumns]) -> np.ndarray:
     """Which of so many coordinates are in none of the groups."""
-    return np.setdiff1d(np.arange(size), np.concatenate([np.empty(0, dtype=int), *(g.coordinates for g in apart)]))
+    alone = np.ones(size, dtype=bool)
+    for group in apart:
+        alone[group.coordinates] = False
+    return np.flatnonzero(alone)
 
 
 def forward_differences(
