@@ -87,6 +87,26 @@ def test_a_browser_reads_what_deflate_has_packed_in_every_kind_of_block(tmp_path
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_charts_are_drawn_in_the_frame_in_which_mlflow_shows_an_artifact(tmp_path):
+    """A frame that may run scripts and nothing else, of an origin of its own."""
+    chart = Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    tell = "parent.postMessage(document.querySelectorAll('.js-plotly-plot').length, '*')"
+    inside = Worked(Report("charts").charts([chart, chart], "two"), tell).save(tmp_path / "inside.html")
+    content = json.dumps(inside.read_text(encoding="utf-8")).replace("</", "<\\/")
+    outside = f"""
+    addEventListener("message", event => {{
+      document.getElementById("told").textContent = `${{event.data}} charts of ${{event.origin}}`; }});
+    const frame = document.createElement("iframe");
+    frame.sandbox = "allow-scripts";
+    frame.src = URL.createObjectURL(new Blob([{content}], {{type: "text/html"}}));
+    document.body.append(frame);"""
+    together = "--disable-features=IsolateSandboxedIframes"  # in one process, for which a headless browser waits
+    dom, complaints = drawn(Worked(Report("viewer"), outside), tmp_path, together, "--virtual-time-budget=5000")
+    assert complaints == []
+    assert "2 charts of null" in dom
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
 def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_path):
     y = np.sin(np.arange(100_000) / 50)
     y[[77_777, 20_000]] = 9, -9
