@@ -21,7 +21,7 @@ from command_line import free_port, run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
-from tractexp.tracking import TrackedRun, process
+from tractexp.tracking import TrackedRun, model, process
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
 from tractexp.tracking.store import sentences
@@ -357,6 +357,20 @@ def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_p
         tracking.prepare(f"sqlite:///{database}")
 
 
+def test_the_signature_of_the_model_is_what_mlflow_itself_writes(tmp_path, uri):
+    from mlflow.models import Model, ModelSignature
+    from mlflow.types import ColSpec, DataType, Schema
+
+    (tmp_path / "result.json").write_text("{}")
+    run_id = tracking.log(TrackedRun("e", "r", model=tmp_path / "result.json"), uri)
+    (logged,) = client(uri).search_logged_models([client(uri).get_run(run_id).info.experiment_id])
+    there = Path(logged.artifact_location.removeprefix("file://"))
+    columns = [ColSpec(DataType.double, name, required=name != "f") for name in "tUf"]
+    signature = ModelSignature(Schema(columns), Schema([ColSpec(DataType.double, name) for name in "PQ"]))
+    assert Model.load(str(there)).signature == signature
+    assert signature.to_dict() == model.SIGNATURE
+
+
 def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):
     number = client(uri).create_experiment("gone")
     client(uri).delete_experiment(number)
@@ -586,7 +600,7 @@ def test_the_process_that_logs_imports_nothing_that_mlflow_does_without(uri):
     done = subprocess.run([sys.executable, "-c", program], input=told, capture_output=True)
     modules, problem = pickle.loads(done.stdout)
     assert not problem
-    assert {"mlflow.pyfunc", "mlflow.store.tracking.sqlalchemy_store"} <= {*modules}
+    assert {"mlflow.models", "mlflow.store.tracking.sqlalchemy_store"} <= {*modules}
     assert not {name.partition(".")[0] for name in modules} & {*process.OPTIONAL}
 
 

@@ -18,11 +18,10 @@ from types import TracebackType
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.tracking.model import import_pyfunc
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, prepare
 
-OPTIONAL = ("polars", "pyarrow", "scipy", "IPython", "pygments")  # what MLflow imports where it is, and logs without
+OPTIONAL = ("pandas", "polars", "pyarrow", "scipy", "IPython", "pygments")  # what MLflow imports and logs without
 _ahead: "list[Logger]" = []
 
 
@@ -127,7 +126,6 @@ def main() -> None:
         with absent(OPTIONAL):
             import_mlflow()
             prepare(uri := pickle.load(sys.stdin.buffer))
-            import_pyfunc()
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except (EOFError, pickle.UnpicklingError):
         os._exit(0)  # nothing to log, and perhaps nobody listens
