@@ -50,10 +50,10 @@ def proposed(page: Report, findings: Findings) -> None:
 def _numbers(page: Report, proposal: Proposal) -> None:
     rows = [
         [
-            k.name,
-            k.symbol.replace("\\varphi", "φ"),
-            k.about,
-            k.unit,
+            k.parameter.name,
+            k.parameter.symbol.replace("\\varphi", "φ"),
+            k.parameter.about,
+            k.parameter.unit,
             with_error(k.value, k.error),
             _interval(*k.interval),
         ]

@@ -5,7 +5,7 @@ Instants, levels, times and frequencies stand on grids that know nothing of any 
 
 import functools
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -130,6 +130,14 @@ class Term:
         return ":".join(
             (self.signal.kind, self.balance.name, self.signal.name, *([self.clock.name] if self.clock else []))
         )
+
+    def parameters(self, values: Mapping[str, float], prefix: str = "") -> list[Parameter]:
+        """Its sizes and those of its signal, with these defaults; names begin with `prefix`."""
+        where = self.balance.words
+        sizes = [
+            s.parameter(prefix + s.name, f"size in {s.where or where}", values[s.name]) for s in self.balance.sizes
+        ]
+        return sizes + [s.parameter(prefix + s.name, values[s.name]) for s in self.signal.shapes]
 
     @property
     def exogenous(self) -> bool:
