@@ -3,6 +3,8 @@
 import shutil
 import subprocess
 
+WHEN_DRAWN = """const work = () => {%s};
+    if (document.querySelector(".chart")) document.addEventListener("drawn", work); else work();"""
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
@@ -12,7 +14,7 @@ def drawn(page, folder, *options):
     command = [
         BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
         f"--user-data-dir={folder / 'browser'}", "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
-        "--v=0", *options, "--dump-dom", path.as_uri(),
+        "--v=0", "--virtual-time-budget=5000", *options, "--dump-dom", path.as_uri(),
     ]  # fmt: skip
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
@@ -26,5 +28,5 @@ class Worked:
 
     def save(self, path):
         text = self.page.save(path).read_text(encoding="utf-8")
-        path.write_text(text.replace("</body>", f"<p id=told></p><script>{self.script}</script></body>"))
+        path.write_text(text.replace("</body>", f"<p id=told></p><script>{WHEN_DRAWN % self.script}</script></body>"))
         return path

@@ -1,14 +1,14 @@
 """The part of Plotly.js that pages carry."""
 
 import base64
+import gzip
 import re
-import zlib
 
 import numpy as np
 import pytest
 
 from tractexp.blocks import Report, plotly
-from tractexp.blocks.chart import Chart
+from tractexp.blocks.chart import Chart, script
 
 
 @pytest.fixture(scope="module")
@@ -25,10 +25,8 @@ def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path
 
 
 def test_the_part_keeps_its_license_its_lines_and_bars_and_no_map(whole):
-    text, size = re.fullmatch(r'run\(inflate\("([\w+/=]+)", (\d+)\)\);', plotly.program()).groups()
-    part = zlib.decompress(base64.b64decode(text), wbits=-zlib.MAX_WBITS).decode()
-    assert len(part.encode()) == int(size)
-    assert part == plotly.needed(whole)
+    part = gzip.decompress(base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', script())[1])).decode()
+    assert part.startswith(plotly.needed(whole))
     assert part[:200] == whole[:200]
     assert "Licensed under the MIT license" in part[:200]
     assert plotly.TRACE in part

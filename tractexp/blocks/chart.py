@@ -6,6 +6,7 @@ along; `chart.js` draws it. Nothing is drawn here and that package is not import
 
 import base64
 import functools
+import gzip
 import json
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tractexp import files, quoting
+from tractexp import files, quoting, store
 from tractexp.blocks import plotly, style
 
 MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
@@ -42,7 +43,13 @@ def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = files.packaged("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
     drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
-    return "\n".join([files.packaged("blocks/inflate.js"), LICENSE, plotly.program(), drawing])
+    program = store.TEXTS.get(store.key("charts", plotly.digest(), drawing), lambda: packed(plotly.code() + drawing))
+    return "\n".join([files.packaged("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");'])
+
+
+def packed(program: str) -> bytes:
+    """A program as gzip and base 64 pack it: two fifths of its length, and the same for the same program."""
+    return base64.b64encode(gzip.compress(program.encode(), mtime=0))
 
 
 class Chart:

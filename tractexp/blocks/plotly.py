@@ -1,20 +1,17 @@
-"""Plotly.js with what our charts draw and nothing else, deflated: a tenth of it.
+"""Plotly.js with what our charts draw and nothing else: a quarter of it.
 
 The library is one file of modules that esbuild has wrapped, each a top-level variable holding a function that makes the
 module at its first call; the last one registers the kinds of traces. Where that registers those of our charts alone,
 what nothing calls any more is left out. A file that is made otherwise is taken whole.
 """
 
-import base64
 import functools
 import hashlib
 import importlib.util
 import re
-import zlib
 from pathlib import Path
 
 from tractexp.errors import UserError
-from tractexp.store import TEXTS, key
 
 TRACE = 'moduleType:"trace",name:"bar"'  # the kind that charts need beside lines, which are part of the core
 COMMON = re.compile(r"[ ,]([\w$]+)=\([\w$]+,[\w$]+\)=>\(\)=>\{try\{return [\w$]+\|\|[\w$]+\(\([\w$]+=\{exports:")
@@ -32,19 +29,15 @@ def library() -> Path:
     raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
 
 
+def code() -> str:
+    """The library as pages carry it."""
+    return needed(library().read_text(encoding="utf-8"))
+
+
 @functools.cache
-def program() -> str:
-    """What a page carries of it: `run(inflate(TEXT, SIZE))` for `inflate.js`."""
-    whole = library().read_bytes()
-    entry = key("plotly", *(hashlib.sha256(content).hexdigest() for content in (whole, Path(__file__).read_bytes())))
-    return TEXTS.get(entry, lambda: packed(needed(whole.decode())).encode()).decode()
-
-
-def packed(code: str) -> str:
-    """A program that runs another one, which it carries as deflated text: two fifths of its length."""
-    content = code.encode()
-    deflated = zlib.compress(content, 9, wbits=-zlib.MAX_WBITS)
-    return f'run(inflate("{base64.b64encode(deflated).decode()}", {len(content)}));'
+def digest() -> str:
+    """SHA-256 of all that `code` hangs on."""
+    return hashlib.sha256(library().read_bytes() + Path(__file__).read_bytes()).hexdigest()
 
 
 def needed(whole: str) -> str:
