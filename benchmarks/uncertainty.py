@@ -144,8 +144,7 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     likelihood = Likelihood.of(problem, Noise(((true, true),)))
     unit = likelihood.to_unit(truth)[0]
     _, J = likelihood.jacobian(unit)
-    d = len(truth)
-    return Information.of(NAMES, truth, problem.upper - problem.lower, J[:, :d], J[:, d:])
+    return Information(tuple(NAMES), truth, problem.upper - problem.lower, J.without_own)
 
 
 def coverage_record(seed: int, only: Sequence[str] = tuple(CONDITIONS)) -> dict:

@@ -225,7 +225,7 @@ def _descended(
 
     def descended() -> tuple[np.ndarray, ...]:
         begin = np.take_along_axis(starts, table, axis=1)
-        done = descend(rows, begin, table == at.dimension, *effort, context.apart(len(prior)))
+        done = descend(rows, begin, table == at.dimension, *effort, context.apart)
         return done.unit, done.deviance, np.array(spent)
 
     wants = [(tuple(names), unit) for names, unit in wanted]
