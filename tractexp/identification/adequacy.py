@@ -94,7 +94,8 @@ def surprise(
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
     rng = np.random.default_rng(seed)
-    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.valid
+    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist())
+    drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
     basis, split = J.basis(), of_each_event(J, steady)
 
@@ -103,12 +104,12 @@ def surprise(
         by_test = surprises.statistics(rest.reshape(len(rows), observed.drive.channels, -1), observed.problem)
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
-    apart = squares and Apart.of(squares, unit, J, least)
-    parts = [left(rows[None]) | ({APART: apart.of_records} if apart else {})]
+    excess = squares and Excess.of(squares, unit, J, least)
+    parts = [left(rows[None]) | ({APART: excess.of_records} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
     for some in np.split(drawn, range(together, DRAWS, together)):
         white = likelihood.whiten(some)
-        parts.append(left(white) | ({APART: apart.of_draws(white, some)} if apart else {}))
+        parts.append(left(white) | ({APART: excess.of_draws(white, some)} if excess else {}))
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     p_values = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(p_values, key=p_values.__getitem__)
@@ -124,10 +125,11 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
 
 
 @dataclass(frozen=True, eq=False)
-class Apart:
+class Excess:
     """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and of draws of noise.
 
-    `J` are whitened sensitivities to the coordinates inside, `plain` those of Eq. (8) to all of them.
+    `J` are whitened sensitivities to the coordinates inside, `plain` those of Eq. (8) to all of them; `squares` is
+    what least squares reach.
     """
 
     of_records: np.ndarray
@@ -135,21 +137,23 @@ class Apart:
     J: Sensitivities
     plain: Sensitivities
     inside: np.ndarray
+    squares: SeparableBasis
 
     @classmethod
-    def of(cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float) -> "Apart":
+    def of(cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float) -> "Excess":
         """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
         likelihood = squares.with_initial_power
         rows, plain = likelihood.jacobian(unit)
-        return cls(np.array([rows @ rows / max(least, 1e-300)]), likelihood, J, plain, _inside(unit))
+        inside, of_records = _inside(unit), np.array([rows @ rows / max(least, 1e-300)])
+        free = plain.only(inside & (np.arange(len(inside)) < plain.k))
+        return cls(of_records, likelihood, J, plain, inside, free.basis())
 
     def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         """Of draws (b, C, N), whitened (b, R): (b,)."""
         raw, k = self.likelihood.whiten(drawn), self.plain.k
         likely = raw - self.plain.only(self.inside).times(self.J.fit(white))
         shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
-        free = self.plain.only(self.inside & (np.arange(len(self.inside)) < k))
-        rest = free.basis().without(shifted)
+        rest = self.squares.without(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
 
 
