@@ -138,6 +138,7 @@ def descend(
     apart: SeparableColumns = NOT_SEPARABLE,
     *,
     central: bool = False,
+    ended: Callable[[], None] = lambda: None,
 ) -> Descent:
     """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
 
@@ -146,7 +147,8 @@ def descend(
     box rests for that step. Source: Marquardt 1963, with several dampings per step.
 
     Forward differences are enough for an estimate, whose standard errors are far wider than what they truncate. The
-    minimum itself, to more than four digits, takes `central` ones.
+    minimum itself, to more than four digits, takes `central` ones. `ended` is called at the end of each lane that comes
+    to one.
 
     Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
@@ -175,7 +177,10 @@ def descend(
         unit[won], base[won], deviance[won] = trials[pick, best][better], ends[better], outcome[better]
         damping[lanes] = np.clip(np.where(better, tried[pick, best], tried[:, -1] * 10), LEAST_DAMPING, MOST_DAMPING)
         hopeless = ~better & (damping[lanes] >= MOST_DAMPING)
-        active[lanes] = ~((better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance)))
+        done = (better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance))
+        active[lanes] = ~done
+        for _ in lanes[done]:
+            ended()
     return Descent(unit, deviance, spent)
 
 

@@ -40,7 +40,9 @@ class SeparableColumns:
 
     def shared(self, size: int) -> np.ndarray:
         """Which of so many coordinates act on all rows, (k,)."""
-        return np.setdiff1d(np.arange(size), self.coordinates.ravel())
+        shared = np.ones(size, dtype=bool)
+        shared[self.coordinates] = False
+        return np.flatnonzero(shared)
 
     def moves(self, size: int) -> np.ndarray:
         """Which of so many coordinates move in each simulation, (k + m, size): first those that act on all rows."""
