@@ -39,7 +39,7 @@ SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launc
 WRITTEN, RESULT = 8, 4  # files of a search; which of them is the result, after the three of its configuration
 WORKERS, MACHINES, DISKS = 5, 10, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
 MOMENTS, STATEMENTS = 16, 18  # kills of a search at any moment; of what logs, at a statement
-SHARING = 4  # commands that begin at once on one cache
+SHARING = 6  # commands that begin at once on one cache
 FULL = OSError(errno.ENOSPC, "No space left on device")
 
 

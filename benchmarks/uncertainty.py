@@ -1,9 +1,9 @@
-"""Are the intervals and verdicts true? python benchmarks/uncertainty.py [--records 500] [--out FOLDER] [--part NAME]
+"""Are the intervals and verdicts true? python benchmarks/uncertainty.py [--records 40] [--part NAME ...] [--tables]
 
 Records of known truth come from the printed, polar Eqs. (1)-(3) solved by SciPy (`printed`), never from
 `tractexp.model`, and from the flux-state simulator in `independent`, whose truth lies outside the model class.
-Each record is read, searched and judged as `task=identify` does it. Results are kept per record, so that an
-interrupted study goes on where it stopped. Prints the tables of docs/uncertainty.md.
+Each record is read, searched and judged as `task=identify` does it. Rows are stored in uncertainty.jsonl record by
+record, so that an interrupted study goes on where it stopped; docs/uncertainty.md has its table from there.
 """
 
 import os
@@ -13,13 +13,18 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import argparse
 import json
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import marked
 import numpy as np
 import oracle  # noqa: F401
+from model_error import rows_of, six_digits
 
+STORED = Path(__file__).with_suffix(".jsonl")
+PAGE = Path(__file__).parents[1] / "docs" / "uncertainty.md"
 NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
 LOW = np.array([0.04, 0.2, 0.7, 0.003, 0.3, 0.8, 2.6])  # truths are drawn between these
 HIGH = np.array([0.15, 0.5, 0.92, 0.010, 0.6, 2.0, 5.0])
@@ -144,8 +149,7 @@ def bound(load, events, truth: np.ndarray, deviation: float, correlation: float)
     likelihood = Likelihood.of(problem, Noise(((true, true),)))
     unit = likelihood.to_unit(truth)[0]
     _, J = likelihood.jacobian(unit)
-    d = len(truth)
-    return Information.of(NAMES, truth, problem.upper - problem.lower, J[:, :d], J[:, d:])
+    return Information(tuple(NAMES), truth, problem.upper - problem.lower, J.without_own)
 
 
 def coverage_record(seed: int, only: Sequence[str] = tuple(CONDITIONS)) -> dict:
@@ -302,78 +306,79 @@ def timing(repeats: int = 9) -> dict:
     return {"fit": parts[0], "judgement": parts[1], "profiles": parts[2], "total": parts.sum(), "samples": len(t)}
 
 
-def study(record: Callable[[int], dict], path: Path, records: int) -> Iterator[dict]:
-    """Results of `records` seeds, those already in the file first; new ones are added to it as they come."""
-    from joblib import Parallel, delayed
-
-    done = [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
-    yield from (row["result"] for row in done[:records])
-    left = sorted(set(range(records)) - {row["seed"] for row in done})
-    path.parent.mkdir(parents=True, exist_ok=True)
-    made = Parallel(n_jobs=2, return_as="generator")(delayed(record)(seed) for seed in left)
-    with path.open("a") as file:
-        for seed, result in zip(left, made, strict=True):
-            file.write(json.dumps({"seed": seed, "result": result}) + "\n")
-            file.flush()
-            yield result
+RECORDS = {"coverage": coverage_record, "verdicts": verdict_record, "independent": independent_record}
+SHARE = {"coverage": 1, "verdicts": len(CASES), "independent": 2}  # of the records asked for
 
 
-def show_coverage(results: list[dict]) -> None:
-    """Tables of docs/uncertainty.md: coverage and root mean square error, for parameters the truth identifies."""
-    print("\nconditions | verdict at the truth | " + " | ".join(NAMES))
+def study(part: str, records: int, path: Path = STORED) -> Iterator[dict[str, Any]]:
+    """Rows of so many seeds that the file lacks, added to it as they come."""
+    seeds = {row["seed"] for row in rows_of(path) if row["part"] == part}
+    for seed in sorted(set(range(records)) - seeds):
+        row = {"part": part, "seed": seed, "result": six_digits(RECORDS[part](seed))}
+        with path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row, separators=(",", ":")) + "\n")
+        yield row
+
+
+def results(rows: Iterable[dict[str, Any]], part: str) -> list[dict[str, Any]]:
+    """What the records of a part came to, by seed."""
+    return [row["result"] for row in sorted(rows, key=lambda row: row["seed"]) if row["part"] == part]
+
+
+def text(rows: Sequence[dict[str, Any]]) -> str:
+    """The table of the page, and a sentence of each of the other parts; of those that have rows."""
+    shown = {"coverage": coverage_table, "verdicts": verdicts_in_words, "independent": independent_in_words}
+    return "\n\n".join(show(found) for part, show in shown.items() if (found := results(rows, part)))
+
+
+def coverage_table(rows: Sequence[dict[str, Any]]) -> str:
+    """How many intervals hold the truth, of parameters that the noise lets be known within 20 % and of others."""
+    head = ["noise", "known within 20 %", "intervals", "hold the truth", "by curvature alone", "error over the bound",
+            "that of Eq. (8)"]  # fmt: skip
+    lines = []
     for label in CONDITIONS:
-        rows = [r[label] for r in results]
-        take = lambda key, rows=rows: np.array([r[key] for r in rows])  # noqa: E731
-        relative = take("relative")
-        for word, mask in (("identified", relative <= 0.2), ("weak", relative > 0.2)):
-            counts = mask.sum(axis=0)
-            mean = lambda x, mask=mask, counts=counts: np.where(mask, x, 0).sum(axis=0) / np.maximum(counts, 1)  # noqa: E731
-            for what, values in (
-                ("records", counts),
-                ("coverage %", 100 * mean(take("inside"))),
-                ("coverage % of the curvature alone", 100 * mean(take("curvature"))),
-                ("RMSE / bound, most likely", np.sqrt(mean(take("likely") ** 2))),
-                ("RMSE / bound, Eq. (8)", np.sqrt(mean(take("eq8") ** 2))),
-            ):
-                cells = [f"{v:.3g}" if n >= 25 else "-" for v, n in zip(values, counts, strict=True)]
-                print(f"{label} | {word}: {what} | " + " | ".join(cells))
-        print(f"{label} | warned of a missing effect: {100 * np.mean(take('notes') > 0):.1f} %")
+        of = {key: np.array([row[label][key] for row in rows]) for key in rows[0][label] if key != "words"}
+        for word, mask in (("yes", of["relative"] <= 0.2), ("no", of["relative"] > 0.2)):
+            share = lambda key, mask=mask, of=of: f"{100 * of[key][mask].mean():.0f} %"  # noqa: E731
+            size = lambda key, mask=mask, of=of: f"{np.sqrt(np.mean(of[key][mask] ** 2)):.2f}"  # noqa: E731
+            if mask.any():
+                cells = [share("inside"), share("curvature"), size("likely"), size("eq8")]
+                lines.append([label, word, int(mask.sum()), *cells])
+    return marked.table(head, lines)
 
 
-def show_verdicts(results: list[dict]) -> None:
-    total = np.array([[r[label]["right"] for label in CASES] for r in results])
-    print(f"\nverdicts right: {100 * total.mean():.1f} % of {total.size}")
-    for label, right in zip(CASES, total.T, strict=True):
-        wrong = [r[label]["said"] for r in results if not r[label]["right"]]
-        print(f"{label} | {100 * right.mean():.1f} % of {len(right)} | {wrong[:2] or ''}")
+def verdicts_in_words(rows: Sequence[dict[str, Any]]) -> str:
+    """How many records of known verdicts got them."""
+    right = {label: sum(row[label]["right"] for row in rows) for label in CASES}
+    wrong = [f"{label} {n} of {len(rows)}" for label, n in right.items() if n < len(rows)]
+    whole = f"Verdicts are those known by construction in {sum(right.values())} of {len(rows) * len(CASES)} records"
+    return f"{whole} ({', '.join(wrong)})." if wrong else f"{whole}."
 
 
-def show_independent(results: list[dict]) -> None:
-    inside, off = (np.array([r[key] for r in results]) for key in ("inside", "off"))
-    print("\nflux-state simulator | " + " | ".join(NAMES))
-    print("coverage % | " + " | ".join(f"{100 * x:.0f}" for x in inside.mean(axis=0)))
-    print("bias % | " + " | ".join(f"{100 * x:+.1f}" for x in off.mean(axis=0)))
-    print(f"warned of a missing effect: {100 * np.mean([r['warned'] for r in results]):.0f} %")
-
-
-STUDIES = {
-    "coverage": (coverage_record, show_coverage, 1),
-    "verdicts": (verdict_record, show_verdicts, len(CASES)),
-    "independent": (independent_record, show_independent, 5),
-}
+def independent_in_words(rows: Sequence[dict[str, Any]]) -> str:
+    """What the flux-state simulator's records came to."""
+    inside, off = (np.array([row[key] for row in rows]) for key in ("inside", "off"))
+    each = [f"{name} {100 * bias:+.0f} %, {held} held" for name, held, bias in
+            zip(NAMES, inside.sum(axis=0).tolist(), off.mean(axis=0), strict=True)]  # fmt: skip
+    warned = sum(row["warned"] for row in rows)
+    return (
+        f"Of {len(rows)} records of a simulator with stator transients, {warned} are said to lack an effect; mean"
+        f" errors, and how many intervals hold the truth: {'; '.join(each)}."
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--records", type=int, default=500)
-    parser.add_argument("--out", type=Path, default=Path("outputs/benchmarks/uncertainty"), help="kept results")
-    parser.add_argument("--part", choices=[*STUDIES, "timing"], help="one study only")
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--records", type=int, default=40)
+    parser.add_argument("--part", nargs="*", choices=[*RECORDS, "timing"], default=list(RECORDS))
+    parser.add_argument("--tables", action="store_true", help="write the page from what is stored, and run nothing")
     chosen = parser.parse_args()
-    if chosen.part in (None, "timing"):
+    if "timing" in chosen.part:
         print(" | ".join(f"{key} {value:.3g}" for key, value in timing().items()))
-    for name, (record, show, share) in STUDIES.items():
-        if chosen.part in (None, name):
-            show(list(study(record, chosen.out / f"{name}.jsonl", -(-chosen.records // share))))
+    for part in () if chosen.tables else [part for part in chosen.part if part in RECORDS]:
+        for row in study(part, -(-chosen.records // SHARE[part])):
+            print(f"\r{part} {row['seed']}", end="", flush=True)
+    print("", marked.replace(PAGE, "benchmarks/uncertainty.py", text(rows_of(STORED))), sep="\n")
 
 
 if __name__ == "__main__":

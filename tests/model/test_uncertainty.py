@@ -15,12 +15,13 @@ import tractexp
 from tractexp.identification import advice, agreement
 from tractexp.identification.advice import advise
 from tractexp.identification.agreement import compare_events
-from tractexp.identification.descent import descend, normal
+from tractexp.identification.descent import central_differences, descend, normal
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.residual_tests import jarque_bera, ljung_box
+from tractexp.identification.separable import NOT_SEPARABLE
 from tractexp.identification.uncertainty import conclude
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
 from tractexp.noise import Noise
@@ -138,9 +139,9 @@ def test_a_difference_is_one_sided_where_the_other_side_is_lost():
             return made
 
     at = np.array([0.3, 0.5, 0.5, 1.0])
-    rows, J = Straight(None, None, None).jacobian(at)
-    np.testing.assert_allclose(rows, A @ at)
-    np.testing.assert_allclose(J, A, rtol=1e-6, atol=1e-9)
+    rows, J = central_differences(Straight(None, None, None).rows, at[None], np.zeros(1, dtype=int))
+    np.testing.assert_allclose(rows[0], A @ at)
+    np.testing.assert_allclose(J[0].T, A, rtol=1e-6, atol=1e-9)
 
 
 def test_jacobian_agrees_with_the_printed_equations(model):
@@ -160,7 +161,7 @@ def test_jacobian_agrees_with_the_printed_equations(model):
             P, Q = study.printed(moved, t, U, 0.0, P0=events[0].P0)
             sides.append(np.concatenate((P, Q + (events[0].Q0 - Q[0]) * U ** moved[6])))
         expected = (sides[0] - sides[1]) / (2 * h) * (problem.upper - problem.lower)[j]
-        np.testing.assert_allclose(J[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name)
+        np.testing.assert_allclose(J.shared[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name)
 
 
 def test_the_t_circuits_fourth_number_is_found_to_be_one_too_many(model):
@@ -305,20 +306,52 @@ def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monk
     assert max(sizes) == known.likelihood.free + 2
 
 
+def test_a_jacobian_takes_as_many_simulations_for_many_events_and_no_more_fits(model, monkeypatch):
+    """Time and memory grow with the records, not with their number of events, too."""
+    known = study.judged(Problem(model, records((0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6), 0.003)), study.TYPICAL)
+    uncertainty, rows, taken = known.uncertainty, Likelihood.rows, []
+    monkeypatch.setattr(Likelihood, "rows", lambda self, unit, *lanes: (taken.append(len(unit)), rows(self, unit))[1])
+    _, J = uncertainty.likelihood.jacobian(uncertainty.unit)
+    assert taken == [2 * (uncertainty.likelihood.free + 2) + 1]
+    assert J.columns.shape == (uncertainty.likelihood.free + 2, uncertainty.likelihood.problem.drive.measured.size)
+    only, fits = agreement.only, []
+    monkeypatch.setattr(
+        agreement, "only", lambda likelihood, groups: (fits.append(groups), only(likelihood, groups))[1]
+    )
+    assert agreement.disagreeing(uncertainty) == ([], [])
+    assert [len(groups) for groups in fits] == [1 + 2 * agreement.SUSPECTS]
+
+
+def test_the_events_that_are_fitted_by_themselves_are_those_that_disagree_most(model, monkeypatch):
+    """Among twice as many as are fitted, what is linear finds the same as a fit without and of each."""
+    changed = study.TYPICAL.copy()
+    changed[3] *= 1.15
+    depths = (0.3, 0.35, 0.45, 0.5, 0.55, 0.6, 0.65)
+    (odd,) = records((0.4,), 0.003, seed=9, truth=changed)
+    events = [*records(depths, 0.003), replace(odd, record=replace(odd.record, name="changed"))]
+    uncertainty = study.judged(Problem(model, events), study.TYPICAL).uncertainty
+    few = agreement.disagreeing(uncertainty)
+    monkeypatch.setattr(agreement, "SUSPECTS", len(events))
+    assert few == agreement.disagreeing(uncertainty)
+    assert few[0] == ["changed"]
+
+
 def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(model):
     """Over every row and every P0 and Q0 at once, as the least squares of the whole have them."""
     known = study.judged(Problem(model, records((0.3, 0.4, 0.5), 0.003)), study.TYPICAL).uncertainty
     likelihood, gains = known.likelihood, compare_events(known).gains
-    _, J = likelihood.jacobian(known.unit)
+    J = likelihood.jacobian(known.unit)[1].dense
 
     def errors(rows):
         own, nuisances = J[rows][:, : likelihood.free], J[rows][:, likelihood.free :]
         information = Information.of(known.names, known.values, known.upper - known.lower, own, nuisances)
         return information.standard_errors
 
-    whole = errors(np.ones(len(J), dtype=bool))
+    whole = errors(np.arange(len(J)))
     for e, gain in enumerate(gains.values()):
-        assert list(gain.values()) == pytest.approx(errors(~likelihood.part_of(e)) / whole, rel=1e-9)
+        assert list(gain.values()) == pytest.approx(
+            errors(np.setdiff1d(np.arange(len(J)), likelihood.apart.rows[e])) / whole, rel=1e-9
+        )
 
 
 def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_itself(model):
@@ -326,10 +359,10 @@ def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_its
     likelihood = Likelihood.of(Problem(model, records((0.3, 0.5), 0.003)))
     unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
     base = likelihood.rows(unit)
-    alone, together = (normal(likelihood.rows, unit, base, lanes, apart) for apart in ((), likelihood.apart))
-    for one, other in zip(alone, together, strict=True):
+    alone, together = (normal(likelihood.rows, unit, base, lanes, apart) for apart in (NOT_SEPARABLE, likelihood.apart))
+    for one, other in (alone[0], together[0]), (alone[1].dense, together[1].dense):
         assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
-    assert (together[1] == np.swapaxes(together[1], 1, 2)).all()
+    assert (together[1].dense == np.swapaxes(together[1].dense, 1, 2)).all()
 
 
 def test_a_fit_at_a_bound_says_so(model):

@@ -1,5 +1,6 @@
 """Sweeps: isolation of failures, killed workers, what is not run again, the parent run, and bit-identical results."""
 
+import contextlib
 import importlib.util
 import json
 import os
@@ -495,3 +496,36 @@ def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses
     (tmp_path / "4").write_text("nor is this")
     assert [job.folder.name for job in place(jobs, tmp_path)] == ["0", "3", "1", "5"]
     assert [job.folder.name for job in place(jobs, tmp_path / "new")] == ["0", "1", "2", "3"]
+
+
+@pytest.mark.parametrize(("error", "sends"), [(None, 1), (RuntimeError, 1), (KeyboardInterrupt, 0)])
+def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(error, sends, tmp_path, monkeypatch):
+    """To look for each of 2,000 finished jobs in the store takes a minute."""
+    from types import SimpleNamespace
+
+    from tractexp import tracking
+    from tractexp.sweep import parent
+
+    run, closed, sent = tracking.TrackedRun("experiment", "sweep", {}), [], []
+    monkeypatch.setattr(parent, "_described", lambda *_: run)
+    monkeypatch.setattr(parent, "_opened", lambda *_: "id")
+    monkeypatch.setattr(parent, "_closed", lambda folder, run, *_: closed.append(run.status))
+    monkeypatch.setattr(parent, "_send", lambda *_: sent.append(closed[-1]))
+    jobs = [SimpleNamespace(config={"tracking": {"enabled": True, "uri": "sqlite:///x.db"}}, folder=tmp_path / "0")]
+    with contextlib.suppress(RuntimeError, KeyboardInterrupt), parent.parent_run(tmp_path, jobs, [], afresh=False):
+        if error:
+            raise error
+    assert closed == ["KILLED" if error is KeyboardInterrupt else "FAILED"]
+    assert len(sent) == sends
+
+
+def test_what_the_jobs_of_a_sweep_share_is_spelled_once_for_each(monkeypatch):
+    """Once for every setting of every job took half a minute before a sweep of 2,000 began."""
+    from tractexp import tracking
+    from tractexp.sweep.parent import shared_settings
+
+    flatten, spelled = tracking.flatten, []
+    monkeypatch.setattr(tracking, "flatten", lambda config: (spelled.append(config), flatten(config))[1])
+    configs = [{"seed": k, "optimizer": {"name": "pso", "population": 20}} for k in range(5)]
+    assert shared_settings(configs) == {"optimizer.name": "pso", "optimizer.population": "20"}
+    assert len(spelled) == len(configs)

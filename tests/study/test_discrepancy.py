@@ -37,7 +37,8 @@ from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.score_test import ScoreTest, signed_drop
 from tractexp.errors import UserError
 from tractexp.identification import observed, surprises
-from tractexp.identification.descent import SeparableColumns, normal
+from tractexp.identification.descent import normal
+from tractexp.identification.separable import SeparableColumns
 from tractexp.identification.surprises import Scale, tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
@@ -493,10 +494,10 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
         return np.sin(x @ J.T)
 
     unit, lanes = np.full((2, 3), 0.4), np.arange(2)
-    masks = np.array([np.arange(40) < 20, np.arange(40) >= 20])
+    apart = SeparableColumns(np.array([[1], [2]]), (np.arange(20), np.arange(20, 40)))
     alone = normal(rows, unit, rows(unit, lanes), lanes)
-    together = normal(rows, unit, rows(unit, lanes), lanes, [SeparableColumns(np.array([1, 2]), masks)])
-    for one, other in zip(alone, together, strict=True):
+    together = normal(rows, unit, rows(unit, lanes), lanes, apart)
+    for one, other in (alone[0], together[0]), (alone[1].dense, together[1].dense):
         assert other == pytest.approx(one, rel=1e-9)
     assert calls == [2, 6, 2, 4]
 

@@ -15,8 +15,8 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels, Key
 from tractexp.discrepancy.records import Records
 from tractexp.domain import Domain, domain_of
-from tractexp.identification.descent import SeparableColumns
 from tractexp.identification.problem import Problem
+from tractexp.identification.separable import SeparableColumns
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
@@ -143,10 +143,7 @@ class Context:
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
 
-    def apart(self, further_rows: int) -> list[SeparableColumns]:
-        """P0 and Q0 act on the rows of their own event only; `further_rows` follow those of the records."""
-        events, size = len(self.events), self.drive.measured.size
-        rows = np.zeros((events, size + further_rows), dtype=bool)
-        for e in range(events):
-            rows[e, :size].reshape(self.drive.measured.shape)[:, self.drive.part(e)] = True
-        return [SeparableColumns(len(self.coordinates.base) + np.arange(events) * 2 + c, rows) for c in (0, 1)]
+    @property
+    def apart(self) -> SeparableColumns:
+        """P0 and Q0 of each event, which act on its own rows only."""
+        return SeparableColumns.of_power(self.drive, len(self.coordinates.base))

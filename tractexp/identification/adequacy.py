@@ -9,17 +9,19 @@ missing, or the model is the wrong one.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Any
 
 import numpy as np
 
 from tractexp.identification import surprises
+from tractexp.identification.descent import MOST_NUMBERS
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
+from tractexp.identification.separable import Sensitivities, SeparableBasis
 from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, tail
 
 DRAWS = 199
@@ -88,46 +90,76 @@ def surprise(
     if likelihood.noise.mix is None or not observed.problem.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
-    inside = (unit > WALL) & (unit < 1 - WALL)
+    inside = _inside(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
-    J = J[:, inside]
+    J = J.only(inside)
     rng = np.random.default_rng(seed)
-    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist()) * likelihood.valid
+    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist())
+    drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
-    white = likelihood.whiten(drawn)
-    Q, _ = np.linalg.qr(J)
-    rest = np.concatenate([rows[None], white])
-    rest -= (rest @ Q) @ Q.T
-    channels = rest.reshape(len(rest), observed.drive.channels, -1)
-    by_test = surprises.statistics(channels, observed.problem)
-    if observed.drive.events > 1:
-        split = _of_each_event(likelihood, J[:, : len(steady)][:, steady], Q)
-        by_test[PER_EVENT] = surprises.of_each_event(rest, split, least=1e-9)
-    if squares is not None:
-        by_test[APART] = given_up(squares, unit, least, J, white, drawn)
-    left = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
-    loudest = min(left, key=left.__getitem__)
-    ratio, where = loudest_stretch(channels[0], observed.problem)
-    return Surprise(min(1.0, max(len(left) * left[loudest], SMALLEST_P)), loudest, ratio, where)
+    basis, split = J.basis(), of_each_event(J, steady)
+
+    def left(rows: np.ndarray) -> dict[str, np.ndarray]:
+        rest = basis.without(rows)
+        by_test = surprises.statistics(rest.reshape(len(rows), observed.drive.channels, -1), observed.problem)
+        return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
+
+    excess = squares and Excess.of(squares, unit, J, least)
+    parts = [left(rows[None]) | ({APART: excess.of_records} if excess else {})]
+    together = max(1, MOST_NUMBERS // len(rows))
+    for some in np.split(drawn, range(together, DRAWS, together)):
+        white = likelihood.whiten(some)
+        parts.append(left(white) | ({APART: excess.of_draws(white, some)} if excess else {}))
+    by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    p_values = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
+    loudest = min(p_values, key=p_values.__getitem__)
+    ratio, where = loudest_stretch(basis.without(rows[None]).reshape(observed.drive.channels, -1), observed.problem)
+    return Surprise(min(1.0, max(len(p_values) * p_values[loudest], SMALLEST_P)), loudest, ratio, where)
 
 
-def given_up(
-    squares: Likelihood, unit: np.ndarray, least: float, J: np.ndarray, white: np.ndarray, drawn: np.ndarray
-) -> np.ndarray:
-    """What the likelihood leaves of Eq. (8) over what least squares leave: of the records, then of each draw, (1 + b,).
+def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
+    """What `steady` shared coordinates (k,) of their own for each event could change beside the event's own."""
+    shared = J.without_own.T
+    columns = np.concatenate([shared[~steady], shared[steady]])
+    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(surprises.DISTINCT, 1e-9)
 
-    `J` (R, d) are the whitened sensitivities to the coordinates inside, `white` (b, R) and `drawn` (b, C, N) the draws.
+
+@dataclass(frozen=True, eq=False)
+class Excess:
+    """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and of draws of noise.
+
+    `J` are whitened sensitivities to the coordinates inside, `plain` those of Eq. (8) to all of them; `squares` is
+    what least squares reach.
     """
-    plain, free = squares.with_initial_power, squares.free
-    rows, columns = plain.jacobian(unit)
-    raw = plain.whiten(drawn)
-    inside = (unit > WALL) & (unit < 1 - WALL)
-    likely = raw - np.linalg.lstsq(J, white.T, rcond=None)[0].T @ columns[:, inside].T
-    shifted = raw + _means(plain, drawn) @ columns[:, free:].T
-    Q, _ = np.linalg.qr(columns[:, :free][:, inside[:free]])
-    rest = shifted - (shifted @ Q) @ Q.T
-    ratio = (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
-    return np.concatenate([[rows @ rows / max(least, 1e-300)], ratio])
+
+    of_records: np.ndarray
+    likelihood: Likelihood
+    J: Sensitivities
+    plain: Sensitivities
+    inside: np.ndarray
+    squares: SeparableBasis
+
+    @classmethod
+    def of(cls, squares: Likelihood, unit: np.ndarray, J: Sensitivities, least: float) -> "Excess":
+        """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
+        likelihood = squares.with_initial_power
+        rows, plain = likelihood.jacobian(unit)
+        inside, of_records = _inside(unit), np.array([rows @ rows / max(least, 1e-300)])
+        free = plain.only(inside & (np.arange(len(inside)) < plain.k))
+        return cls(of_records, likelihood, J, plain, inside, free.basis())
+
+    def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
+        """Of draws (b, C, N), whitened (b, R): (b,)."""
+        raw, k = self.likelihood.whiten(drawn), self.plain.k
+        likely = raw - self.plain.only(self.inside).times(self.J.fit(white))
+        shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
+        rest = self.squares.without(shifted)
+        return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
+
+
+def _inside(unit: np.ndarray) -> np.ndarray:
+    """Which coordinates (D,) rest on no bound."""
+    return (unit > WALL) & (unit < 1 - WALL)
 
 
 def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
@@ -153,13 +185,6 @@ def _linear(likelihood: Likelihood) -> np.ndarray:
     problem = likelihood.problem
     beside = {p.name for effect in problem.model.effects for p in effect.parameters if p.null is None}
     return np.array([name.partition("[")[0] not in beside for name in problem.space.names])
-
-
-def _of_each_event(likelihood: Likelihood, J: np.ndarray, Q: np.ndarray) -> np.ndarray:
-    """How columns (R, k) of their own for each event would move the rows, (k E, R), without what the fit takes."""
-    events = likelihood.problem.drive.events
-    split = np.concatenate([(J * likelihood.part_of(e)[:, None]).T for e in range(events)])
-    return split - (split @ Q) @ Q.T
 
 
 def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:

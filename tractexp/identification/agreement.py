@@ -1,7 +1,8 @@
 """Several events fitted together: what each adds, and which do not fit with the rest."""
 
+import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.uncertainty import Uncertainty
 
 DISAGREES = 0.01  # p-value below which an event does not fit with the others
+SUSPECTS = 4  # events that are fitted by themselves, and the others without them
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,58 +32,83 @@ class EventAgreement:
 
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
-    likelihood = uncertainty.likelihood
+    likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
     _, J = likelihood.of_records.jacobian(uncertainty.unit)
-    free, width = likelihood.free, uncertainty.upper - uncertainty.lower
+    own = J.without_own
 
-    def information(own: np.ndarray, nuisances: np.ndarray) -> Information:
-        return Information.of(uncertainty.names, uncertainty.values, width, own, nuisances)
+    def errors(triangle: np.ndarray) -> np.ndarray:
+        return Information(uncertainty.names, uncertainty.values, width, triangle).standard_errors
 
-    def errors(triangles: Sequence[np.ndarray]) -> np.ndarray:
-        return information(np.concatenate(triangles), np.empty((sum(map(len, triangles)), 0))).standard_errors
-
-    own_rows = [J[likelihood.part_of(e)] for e in range(likelihood.problem.drive.events)]
-    triangles = [np.linalg.qr(information(J[:, :free], J[:, free:]).J).R for J in own_rows]
-    whole = errors(triangles)
+    others, whole = without_each([own[rows] for rows in J.rows])
     gains: dict[str, dict[str, float]] = {}
-    for e, event in enumerate(likelihood.problem.events):
+    for event, triangle in zip(likelihood.problem.events, others, strict=True):
         with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
-            ratio = errors(triangles[:e] + triangles[e + 1 :]) / whole
+            ratio = errors(triangle) / errors(whole)
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(uncertainty)
     return EventAgreement(gains, odd, notes)
+
+
+def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
+    """Triangles (k, k) with the products of all rows (R_e, k) but those of each, and of all rows."""
+    joined = lambda above, below: np.linalg.qr(np.concatenate([above, below])).R  # noqa: E731
+    nothing = rows[0][:0]
+    before = list(itertools.accumulate(rows, joined, initial=nothing))
+    after = list(itertools.accumulate(rows[::-1], joined, initial=nothing))[::-1]
+    return [joined(a, b) for a, b in zip(before[:-1], after[1:], strict=True)], before[-1]
 
 
 def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     """Events that separate parameters fit much better than shared ones do, the worst first, one at a time.
 
     Compares the deviance of all events fitted together with that of the rest plus that of the event alone; the
-    difference is chi-squared with as many degrees of freedom as there are identifiable parameters.
+    difference is chi-squared with as many degrees of freedom as there are identifiable parameters. Fits are made
+    without and of the `SUSPECTS` events alone for which it is largest where the model is linear.
     """
     from scipy.special import chdtri
 
     likelihood = uncertainty.likelihood
-    left, odd, notes = list(range(likelihood.problem.drive.events)), [], []
+    left, odd, notes = list(range(likelihood.problem.drive.events)), list[str](), list[str]()
     freedom = max(int(np.count_nonzero(uncertainty.information.identifiable)), 1)
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
+    linear = _linear(likelihood, uncertainty.unit)
     while len(left) > 1:
-        groups = [left, *([o for o in left if o != e] for e in left), *([e] for e in left)]
+        suspects = [left[k] for k in np.argsort(-_excess([linear[e] for e in left]), kind="stable")[:SUSPECTS]]
+        groups = [left, *([o for o in left if o != e] for e in suspects), *([e] for e in suspects)]
         deviance = _deviances(likelihood, uncertainty.unit, groups)
-        n = len(left)
+        n = len(suspects)
         excess = deviance[0] - deviance[1 : n + 1] - deviance[n + 1 :]
         worst = int(excess.argmax())
-        limit = float(chdtri(freedom, DISAGREES / n))
+        limit = float(chdtri(freedom, DISAGREES / len(left)))
         if excess[worst] <= limit:
             break
         measured = f"deviance higher by {excess[worst]:.3g} where {limit:.3g} is the limit of chance"
-        if n == 2:
+        if len(left) == 2:
             odd += [name(e) for e in left if name(e) not in odd]
             notes.append(f"{name(left[0])} and {name(left[1])} do not fit together: {measured}")
             break
-        odd.append(name(left[worst]))
-        notes.append(f"{name(left[worst])} does not fit with the rest: {measured}")
-        del left[worst]
+        odd.append(name(suspects[worst]))
+        notes.append(f"{name(suspects[worst])} does not fit with the rest: {measured}")
+        left.remove(suspects[worst])
     return odd, notes
+
+
+def _linear(likelihood: Likelihood, unit: np.ndarray) -> list[np.ndarray]:
+    """Sensitivities and, last, the rows of each event at coordinates (D,), less what its own P0 and Q0 take."""
+    rows, J = likelihood.of_records.jacobian(unit)
+    both = replace(J, columns=np.insert(J.columns, J.k, rows, axis=0), k=J.k + 1).without_own
+    return [both[mine] for mine in J.rows]
+
+
+def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
+    """By how much the deviance of all events is above that of all but each and of each, (E,), in a linear model.
+
+    The last number of a triangle is the root of the deviance that is left.
+    """
+    others, whole = without_each(linear)
+    alone = [np.linalg.qr(rows).R for rows in linear]
+    least = [np.array([triangle[-1, -1] ** 2 for triangle in triangles]) for triangles in (others, alone)]
+    return whole[-1, -1] ** 2 - least[0] - least[1]
 
 
 def _deviances(likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]) -> np.ndarray:
@@ -95,8 +122,12 @@ def _deviances(likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequen
 
 def only(likelihood: Likelihood, groups: Sequence[Sequence[int]]) -> Rows:
     """Rows in which lane k counts the events of `groups[k]` alone."""
-    parts = np.array([likelihood.part_of(e) for e in range(likelihood.problem.drive.events)])
-    masks = np.array([parts[list(group)].any(axis=0) for group in groups])
+    drive = likelihood.problem.drive
+    masks = np.zeros((len(groups), *drive.measured.shape), dtype=bool)
+    for mask, group in zip(masks, groups, strict=True):
+        for e in group:
+            mask[:, drive.part(e)] = True
+    masks = masks.reshape(len(groups), -1)
 
     def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         return likelihood.of_records.rows(unit) * masks[lanes]

@@ -4,10 +4,12 @@ Profiles, starts and subsets of events are lanes. A call with the differences of
 dampings of all steps replace hundreds of single simulations, which cost as much to call as to run.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+
+from tractexp.identification.separable import NOT_SEPARABLE, NormalMatrix, SeparableColumns
 
 # (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot be simulated
 Rows = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -29,67 +31,60 @@ class Descent:
     simulations: int
 
 
-@dataclass(frozen=True, eq=False)
-class SeparableColumns:
-    """Coordinates (k,) that act on different rows, (k, R) where True: one simulation has the differences of all.
-
-    Several of them act on the same rows.
-    """
-
-    coordinates: np.ndarray
-    rows: np.ndarray
-
-
-def _alone(size: int, apart: Sequence[SeparableColumns]) -> np.ndarray:
-    """Which of so many coordinates are in none of the groups."""
-    alone = np.ones(size, dtype=bool)
-    for group in apart:
-        alone[group.coordinates] = False
-    return np.flatnonzero(alone)
-
-
 def forward_differences(
-    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: Sequence[SeparableColumns] = ()
+    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
 ) -> np.ndarray:
-    """Derivatives (n, k, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
+    """Derivatives (n, k + m, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
 
-    First those to each coordinate that is in no group, then one of each group: in each row that to the coordinate that
-    acts there. One that cannot be simulated is zero.
+    First those to each coordinate that acts on all rows, then those to the m of each row's own event. One that cannot
+    be simulated is zero.
     """
     n, d = unit.shape
-    alone = _alone(d, apart)
-    steps = np.zeros((len(alone) + len(apart), d))  # which coordinates move in each simulation
-    steps[np.arange(len(alone)), alone] = 1
-    for k, group in enumerate(apart, len(alone)):
-        steps[k, group.coordinates] = 1
+    shared, steps = apart.shared(d), apart.moves(d)
     h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
     moved = unit[:, None, :] + steps * h[:, None, :]
     J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
     J -= base[:, None, :]
-    J[:, : len(alone)] /= h[:, alone, None]
-    for k, group in enumerate(apart, len(alone)):
-        J[:, k] /= h[:, group.coordinates[group.rows.argmax(axis=0)]]
+    J[:, : len(shared)] /= h[:, shared, None]
+    for mine, coordinates in zip(apart.rows, apart.coordinates, strict=True):
+        J[:, len(shared) :, mine] /= h[:, coordinates, None]
     if (lost := ~np.isfinite(J.sum(axis=2))).any():
         J[lost] = np.where(np.isfinite(J[lost]), J[lost], 0.0)
     return J
 
 
-def central_differences(rows: Rows, unit: np.ndarray, lanes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (n, R) at `unit` (n, D) and their derivatives (n, D, R) from both sides: one batch of n (2 D + 1).
+def central_differences(
+    rows: Rows, unit: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows (n, R) at `unit` (n, D) and derivatives (n, k + m, R) from both sides, in the order of the forward ones.
 
-    Next to a wall, or where one side cannot be simulated, the difference is one-sided.
+    One batch of n (2 (k + m) + 1). Next to a wall, or where one side cannot be simulated, the difference is one-sided.
     """
     n, d = unit.shape
     up = np.minimum(unit + CENTRAL, 1.0) - unit
     down = unit - np.maximum(unit - CENTRAL, 0.0)
-    steps = np.concatenate([np.zeros((n, 1, d)), np.eye(d) * up[:, None], np.eye(d) * -down[:, None]], axis=1)
-    batch = rows((unit[:, None] + steps).reshape(-1, d), np.repeat(lanes, 2 * d + 1)).reshape(n, 2 * d + 1, -1)
-    base, above, below = batch[:, 0], batch[:, 1 : d + 1], batch[:, d + 1 :]
+    shared, moves = apart.shared(d), apart.moves(d)
+    steps = np.concatenate([np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1)
+    batch = rows((unit[:, None] + steps).reshape(-1, d), np.repeat(lanes, steps.shape[1])).reshape(*steps.shape[:2], -1)
+    base, above, below = batch[:, 0], batch[:, 1 : len(moves) + 1], batch[:, len(moves) + 1 :]
+    J, k = np.zeros_like(above), len(shared)
+    J[:, :k] = _from_both_sides(base, above[:, :k], below[:, :k], up[:, shared], down[:, shared])
+    for mine, own in zip(apart.rows, apart.coordinates, strict=True):
+        J[:, k:, mine] = _from_both_sides(
+            base[:, mine], above[:, k:, mine], below[:, k:, mine], up[:, own], down[:, own]
+        )
+    return base, J
+
+
+def _from_both_sides(
+    base: np.ndarray, above: np.ndarray, below: np.ndarray, up: np.ndarray, down: np.ndarray
+) -> np.ndarray:
+    """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k) from there."""
     lost_up, lost_down = np.isnan(above).any(axis=2), np.isnan(below).any(axis=2)
     for side, lost in (above, lost_up), (below, lost_down):
         side[lost] = base[np.nonzero(lost)[0]]
     span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
-    return base, (above - below) / np.where(span > 0, span, 1.0)[..., None]
+    return (above - below) / np.where(span > 0, span, 1.0)[..., None]
 
 
 def normal(
@@ -97,49 +92,41 @@ def normal(
     unit: np.ndarray,
     base: np.ndarray,
     lanes: np.ndarray,
-    apart: Sequence[SeparableColumns] = (),
+    apart: SeparableColumns = NOT_SEPARABLE,
     *,
     central: bool = False,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (n, D) and Gauss-Newton matrix (n, D, D) of half the sum of squares; `base` (n, R) are the rows there.
+) -> tuple[np.ndarray, NormalMatrix]:
+    """Gradient (n, D) and Gauss-Newton matrix of half the sum of squares; `base` (n, R) are the rows there.
 
     Lanes are taken in groups, so that their differences stay in memory however long the records are.
     """
-    n, d = unit.shape
-    gradient, H = np.empty((n, d)), np.empty((n, d, d))
-    apart = () if central else apart
-    together = max(1, MOST_NUMBERS // ((len(_alone(d, apart)) + len(apart)) * base.shape[1]))
+    n, parts = len(unit), []
+    together = max(1, MOST_NUMBERS // (len(apart.moves(unit.shape[1])) * base.shape[1]))
     for first in range(0, n, together):
         part = slice(first, first + together)
         if central:
-            _, J = central_differences(rows, unit[part], lanes[part])
+            _, J = central_differences(rows, unit[part], lanes[part], apart)
         else:
             J = forward_differences(rows, unit[part], base[part], lanes[part], apart)
-        gradient[part], H[part] = _products(J, base[part], d, apart)
-    return gradient, H
+        parts.append(_products(J, base[part], unit.shape[1], apart))
+    gradient, shared, cross, own = (np.concatenate(pieces) for pieces in zip(*parts, strict=True))
+    return gradient, NormalMatrix(shared, cross, own, apart.shared(unit.shape[1]), apart)
 
 
-def _products(
-    J: np.ndarray, base: np.ndarray, size: int, apart: Sequence[SeparableColumns]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gradient (n, D) and matrix (n, D, D) of derivatives (n, k, R) as `forward_differences` has them.
-
-    Coordinates of a group have nothing in common with each other, so that their columns are never written out.
-    """
-    gradient, H, alone = np.zeros((len(J), size)), np.zeros((len(J), size, size)), _alone(size, apart)
-    own = J[:, : len(alone)]
-    gradient[:, alone] = (own @ base[:, :, None])[:, :, 0]
-    H[:, alone[:, None], alone] = own @ np.swapaxes(own, 1, 2)
-    for e, rows in enumerate(apart[0].rows if apart else ()):
-        theirs = np.array([group.coordinates[e] for group in apart])
-        both = np.concatenate([alone, theirs])
-        columns = J[:, :, rows]
-        acting = columns[:, len(alone) :]
-        gradient[:, theirs] = (acting @ base[:, rows, None])[:, :, 0]
-        block = acting @ np.swapaxes(columns, 1, 2)
-        H[:, theirs[:, None], both] = block
-        H[:, both[:, None], theirs] = np.swapaxes(block, 1, 2)
-    return gradient, H
+def _products(J: np.ndarray, base: np.ndarray, size: int, apart: SeparableColumns) -> tuple[np.ndarray, ...]:
+    """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the differences have them."""
+    shared, m = apart.shared(size), apart.count
+    n, k, events = len(J), len(shared), len(apart.rows)
+    gradient, own = np.zeros((n, size)), J[:, :k]
+    gradient[:, shared] = (own @ base[:, :, None])[:, :, 0]
+    cross, blocks = np.empty((n, events, m, k)), np.empty((n, events, m, m))
+    for e, mine in enumerate(apart.rows if m else ()):
+        columns = J[:, :, mine]
+        acting = columns[:, k:]
+        gradient[:, apart.coordinates[e]] = (acting @ base[:, mine, None])[:, :, 0]
+        products = acting @ np.swapaxes(columns, 1, 2)
+        cross[:, e], blocks[:, e] = products[:, :, :k], products[:, :, k:]
+    return gradient, own @ np.swapaxes(own, 1, 2), cross, blocks
 
 
 def descend(
@@ -148,7 +135,7 @@ def descend(
     frozen: np.ndarray | None = None,
     iterations: int = 40,
     tolerance: float = 1e-4,
-    apart: Sequence[SeparableColumns] = (),
+    apart: SeparableColumns = NOT_SEPARABLE,
     *,
     central: bool = False,
     ended: Callable[[], None] = lambda: None,
@@ -181,17 +168,13 @@ def descend(
         rest = frozen[lanes] | ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
         tried = damping[lanes, None] * DAMPINGS
         trials = np.clip(x[:, None, :] + _steps(H, gradient, rest, tried), 0.0, 1.0)
-        width = trials.shape[1]
-        candidates = rows(trials.reshape(-1, x.shape[1]), np.repeat(lanes, width)).reshape(len(lanes), width, -1)
-        spent += (len(lanes) + 2 * x.size if central else x.size) + trials.shape[0] * width
-        outcome = _squares(candidates)
-        best = outcome.argmin(axis=1)
+        spent += (len(lanes) + 2 * x.size if central else x.size) + trials.shape[0] * trials.shape[1]
+        best, outcome, ends = _best(rows, trials, lanes, base.shape[1])
         pick = np.arange(len(lanes))
-        gain = deviance[lanes] - outcome[pick, best]
+        gain = deviance[lanes] - outcome
         better = gain > 0
         won = lanes[better]
-        unit[won], base[won] = trials[pick, best][better], candidates[pick, best][better]
-        deviance[won] = outcome[pick, best][better]
+        unit[won], base[won], deviance[won] = trials[pick, best][better], ends[better], outcome[better]
         damping[lanes] = np.clip(np.where(better, tried[pick, best], tried[:, -1] * 10), LEAST_DAMPING, MOST_DAMPING)
         hopeless = ~better & (damping[lanes] >= MOST_DAMPING)
         done = (better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance))
@@ -201,23 +184,33 @@ def descend(
     return Descent(unit, deviance, spent)
 
 
-def _steps(H: np.ndarray, gradient: np.ndarray, rest: np.ndarray, damping: np.ndarray) -> np.ndarray:
+def _best(rows: Rows, trials: np.ndarray, lanes: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which of q trials (n, q, D) of each lane leaves the least, its sum of squares (n,) and its rows (n, `size`)."""
+    n, width, d = trials.shape
+    best, outcome, ends = np.empty(n, dtype=int), np.empty(n), np.empty((n, size))
+    together = max(1, MOST_NUMBERS // (width * size))
+    for first in range(0, n, together):
+        part = slice(first, first + together)
+        candidates = rows(trials[part].reshape(-1, d), np.repeat(lanes[part], width)).reshape(-1, width, size)
+        squares = _squares(candidates)
+        best[part], outcome[part] = squares.argmin(axis=1), squares.min(axis=1)
+        ends[part] = candidates[np.arange(len(candidates)), best[part]]
+    return best, outcome, ends
+
+
+def _steps(H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, damping: np.ndarray) -> np.ndarray:
     """Damped Newton steps (n, k, D) for k dampings; resting coordinates stay."""
     free = ~rest
-    H = H * (free[:, :, None] & free[:, None, :])
-    diagonal = np.einsum("ndd->nd", H)
+    diagonal = H.diagonal * free
     floor = np.maximum(1e-12 * diagonal.max(axis=1, keepdims=True), 1e-30)
     scale = np.where(free, np.maximum(diagonal, floor), 1.0)
-    eye = np.eye(H.shape[1])
-    damped = H[:, None] + eye * (damping[:, :, None, None] * scale[:, None, None, :])
-    damped += eye * (rest[:, None, None, :] + 1e-14 * scale[:, None, None, :])
-    side = np.broadcast_to((-gradient * free)[:, None, :, None], (*damping.shape, H.shape[1], 1))
-    return np.clip(np.linalg.solve(damped, side)[..., 0], -LARGEST_STEP, LARGEST_STEP)
+    added = damping[:, :, None] * scale[:, None], (rest + 1e-14 * scale)[:, None]
+    return np.clip(H.solve(-gradient * free, free, added), -LARGEST_STEP, LARGEST_STEP)
 
 
-def _flat(H: np.ndarray, gradient: np.ndarray, rest: np.ndarray, tolerance: float) -> np.ndarray:
+def _flat(H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, tolerance: float) -> np.ndarray:
     """Whether even the undamped step promises less than `tolerance`, (n,)."""
-    step = _steps(H, gradient, rest, np.full((len(H), 1), 1e-9))[:, 0]
+    step = _steps(H, gradient, rest, np.full((len(gradient), 1), 1e-9))[:, 0]
     return -np.einsum("nd,nd->n", gradient, step) < tolerance
 
 

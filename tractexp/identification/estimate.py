@@ -281,11 +281,9 @@ def noise_at(
     """
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
-    residual, columns = rows.reshape(measured.shape), J.T.reshape(-1, *measured.shape)
+    residual = rows.reshape(measured.shape)
     values = likelihood.values(unit)
-    return observed.noise(residual, likelihood.valid, columns, values, input_modes, whole) or noise_of(
-        likelihood, residual
-    )
+    return observed.noise(residual, likelihood.valid, J, values, input_modes, whole) or noise_of(likelihood, residual)
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:

@@ -6,14 +6,16 @@ nothing but noise is left its least squares are the most precise estimate there 
 followed, in the likelihood, by P0 and Q0 of each event, in the unit cube.
 """
 
+import functools
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.identification.descent import SeparableColumns, central_differences
+from tractexp.identification.descent import central_differences
 from tractexp.identification.prior import departures
 from tractexp.identification.problem import Problem
+from tractexp.identification.separable import Sensitivities, SeparableColumns
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
@@ -121,7 +123,8 @@ class Likelihood:
         rows = response.by_candidate - drive.measured
         with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
             rows *= self.valid
-        rows[response.miss.max(axis=0) > 0] = np.nan
+        for e, missed in enumerate(response.miss > 0):
+            rows[missed, :, drive.part(e)] = np.nan
         return rows
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
@@ -139,22 +142,12 @@ class Likelihood:
             return np.empty((len(unit), 0))
         return self.prior * departures(self.problem, self.values(unit))
 
-    def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened rows (R,) and their central differences (R, D) at one point (D,) of the unit cube."""
-        rows, J = central_differences(self.rows, unit[None], np.zeros(1, dtype=int))
-        return rows[0], J[0].T
+    def jacobian(self, unit: np.ndarray) -> tuple[np.ndarray, Sensitivities]:
+        """Whitened rows (R,) at one point (D,) of the unit cube, and their central differences."""
+        rows, J = central_differences(self.rows, unit[None], np.zeros(1, dtype=int), self.apart)
+        return rows[0], Sensitivities(J[0], self.free, self.apart.rows)
 
-    @property
-    def apart(self) -> list[SeparableColumns]:
-        """P0 and Q0 act on the rows of their own event only: one simulation has the differences of all events."""
-        events = self.problem.drive.events
-        if not self.initial_power:
-            return []
-        rows = np.array([self.part_of(e) for e in range(events)])
-        return [SeparableColumns(self.free + np.arange(events) * 2 + c, rows) for c in (0, 1)]
-
-    def part_of(self, event: int) -> np.ndarray:
-        """Which rows (R,) belong to an event."""
-        mask = np.zeros(self.problem.drive.measured.shape, dtype=bool)
-        mask[:, self.problem.drive.part(event)] = True
-        return mask.ravel()
+    @functools.cached_property
+    def apart(self) -> SeparableColumns:
+        """P0 and Q0 of each event, which act on its own rows only."""
+        return SeparableColumns.of_power(self.problem.drive, self.free if self.initial_power else None)

@@ -55,7 +55,7 @@ def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     is one valley on either side of it.
     """
     _, J = likelihood.jacobian(unit)
-    direction = np.linalg.svd(J[:, : likelihood.free], full_matrices=False)[2][-1]
+    direction = np.linalg.svd(J.shared, full_matrices=False)[2][-1]
     points = []
     for way in (direction, -direction):
         room = np.where(way > 0, 1 - unit[: len(way)], unit[: len(way)]) / np.maximum(np.abs(way), 1e-12)

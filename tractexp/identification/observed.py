@@ -12,6 +12,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
+from tractexp.identification.separable import Sensitivities
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import louder
@@ -48,15 +49,15 @@ class Observed:
         return self.problem.drive
 
     def noise(
-        self, residuals: np.ndarray, valid: np.ndarray, columns: np.ndarray, values: np.ndarray,
+        self, residuals: np.ndarray, valid: np.ndarray, J: Sensitivities, values: np.ndarray,
         input_errors: np.ndarray | None, whole: bool,
     ) -> Noise | None:  # fmt: skip
         """Noise from what a fit leaves (C, N) in quiet, or of the `whole` records; None where too few samples are.
 
-        `columns` (k, C, N) are what each coordinate could still change at free `values` (d,).
+        `J` is what each coordinate could still change at free `values` (d,).
         """
-        basis = np.linalg.qr(columns.reshape(len(columns), -1)[np.any(columns != 0, axis=(1, 2))].T)[0]
-        rest = np.maximum(1 - (basis**2).sum(axis=1), LEAST_REST).reshape(residuals.shape)  # the fit took the others
+        rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(residuals.shape)  # the fit took the others
+        columns = J.columns.reshape(-1, *residuals.shape)
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, valid)
         walk = functools.partial(
             walk_of_load, self.events, self.drive, self.problem.power, residuals, columns, valid,

@@ -148,11 +148,8 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
         raise UserError(f"nothing can be planned at these parameters: {refusal}")
     likelihood = Likelihood.of(problem, noise)
     _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
-    width, free = problem.upper - problem.lower, likelihood.free
-    return [
-        Information.of(problem.space.names, np.asarray(values), width, rows[:, :free], rows[:, free:])
-        for rows in (J * likelihood.part_of(e)[:, None] for e in range(problem.drive.events))
-    ]
+    width, rows = problem.upper - problem.lower, J.without_own
+    return [Information(problem.space.names, np.asarray(values), width, rows[own]) for own in J.rows]
 
 
 def combined(informations: Sequence[Information]) -> Information:

@@ -22,6 +22,7 @@ from tractexp.identification.blocks import blocks_of, quantile
 from tractexp.identification.descent import central_differences
 from tractexp.identification.information import STRUCTURAL, Information
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.separable import Sensitivities
 
 ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
 WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out
@@ -52,23 +53,18 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     free, drive = likelihood.free, problem.drive
     blocks = blocks_of(problem.events, drive, free)
     held_by = _prior_jacobian(likelihood, unit)
-    shaped, rows, power = (
-        J.reshape(drive.channels, -1, J.shape[1]),
-        rows.reshape(drive.channels, -1),
-        _of_power(whole, blocks),
-    )
-    influences = lambda columns: _influences(shaped, rows, columns, free, blocks, power, held_by, likelihood.prior)  # noqa: E731
-    J = np.concatenate([J[:, :free], held_by])
+    rows, power = rows.reshape(drive.channels, -1), _of_power(whole, blocks)
+    influences = lambda columns: _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)  # noqa: E731
+    shared = np.concatenate([J.shared, held_by])
     every = np.arange(free)
     inside = every[(unit[:free] > WALL) & (unit[:free] < 1 - WALL)]
     root, ratio = np.zeros((free, free)), np.ones(free)
-    own, ratio[inside], spread = robust_root(J[:, inside], influences(inside))
+    own, ratio[inside], spread = robust_root(shared[:, inside], influences(inside))
     root[np.ix_(every[: len(own)], inside)] = own
     if len(inside) < free:
         held = np.setdiff1d(every, inside)
-        own_J = J[: rows.size]
-        rows = rows - (own_J @ np.linalg.lstsq(own_J, rows.ravel())[0]).reshape(rows.shape)
-        full, wider, _ = robust_root(J, influences(every))
+        rows = rows - (J.shared @ np.linalg.lstsq(J.shared, rows.ravel())[0]).reshape(rows.shape)
+        full, wider, _ = robust_root(shared, influences(every))
         ratio[held] = wider[held]
         errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(full.T @ full))[held], 0.0))
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
@@ -85,35 +81,36 @@ def _prior_jacobian(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     return J[0].T
 
 
-def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> np.ndarray:
-    """The change of P0 and Q0 of each event when a block is left out of their means, (G, 2 E), in ranges."""
-    drive, free = likelihood.problem.drive, likelihood.free
-    change = np.zeros((len(blocks), drive.events, 2))
-    for e, steady in enumerate(likelihood.problem.steady):
-        n = steady.stop - steady.start
-        for b, block in enumerate(blocks):
-            a, z = max(block.start, steady.start), min(block.stop, steady.stop)
-            if 0 < z - a < n:
-                off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
-                change[b, e] = -np.nan_to_num(off) * (z - a) / (n - (z - a))
-    return change.reshape(len(blocks), -1) / likelihood.width[free:]
+def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int, np.ndarray]]:
+    """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is left out of their
+    means."""
+    drive, changes = likelihood.problem.drive, list[tuple[int, np.ndarray]]()
+    width = likelihood.width[likelihood.free :].reshape(drive.events, 2)
+    for block in blocks:
+        e = int(np.searchsorted(drive.first, block.start, "right")) - 1
+        steady, change = likelihood.problem.steady[e], np.zeros(2)
+        a, z, n = max(block.start, steady.start), min(block.stop, steady.stop), steady.stop - steady.start
+        if 0 < z - a < n:
+            off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
+            change = -np.nan_to_num(off) * (z - a) / (n - (z - a))
+        changes.append((e, change / width[e]))
+    return changes
 
 
 def _influences(
-    J: np.ndarray, rows: np.ndarray, columns: np.ndarray, free: int, blocks: Sequence[slice], power: np.ndarray,
-    held_by: np.ndarray, weight: float,
+    J: Sensitivities, rows: np.ndarray, columns: np.ndarray, blocks: Sequence[slice],
+    power: Sequence[tuple[int, np.ndarray]], held_by: np.ndarray, weight: float,
 ) -> np.ndarray:  # fmt: skip
-    """The change (G + k, columns) of the estimate when each block of J (C, N, D) and rows (C, N) is left out.
+    """The change (G + k, columns) of the estimate when each block of J and rows (C, N) is left out.
 
     `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left out; each moves the
     estimate by what one standard deviation of it does.
     """
-    own, before = J[:, :, columns], J[:, :, free:]
-    flat = own.reshape(-1, len(columns))
-    cross = flat.T @ before.reshape(len(flat), -1)
-    prior = held_by[:, columns]
+    flat, prior = J.shared[:, columns], held_by[:, columns]
+    cross = [flat[mine].T @ J.own(e) for e, mine in enumerate(J.rows)]
     total = flat.T @ flat + prior.T @ prior
-    moves = moves_without_blocks(own, rows, blocks, total, [cross @ change for change in power])
+    shifts = [cross[e] @ change for e, change in power]
+    moves = moves_without_blocks(flat.reshape(*rows.shape, -1), rows, blocks, total, shifts)
     return np.concatenate([moves, weight * prior @ np.linalg.pinv(total)])
 
 

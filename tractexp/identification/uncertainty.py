@@ -197,7 +197,7 @@ def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
     problem, free = likelihood.problem, likelihood.free
     rows, J = likelihood.jacobian(unit)
     width = problem.upper - problem.lower
-    information = Information.of(problem.space.names, likelihood.values(unit), width, J[:, :free], J[:, free:])
+    information = Information(problem.space.names, likelihood.values(unit), width, J.without_own)
     factor = float(stdtrit(max(likelihood.samples - len(unit), 1), (1 + LEVEL) / 2))
     return likelihood, float(rows @ rows), information, np.full(free, factor), np.full(free, threshold())
 

@@ -112,9 +112,11 @@ class Noise:
     def draw(self, rng: np.random.Generator, count: int, lengths: Sequence[int]) -> np.ndarray:
         """Noise of events of these lengths end to end, (count, C, N) [pu]."""
         ends = np.cumsum([0, *lengths]).tolist()
-        drawn = [self._drawn(rng, count, slice(a, b), e) for e, (a, b) in enumerate(itertools.pairwise(ends))]
-        joined = np.concatenate(drawn, axis=2)
-        return joined if self.mix is None else np.linalg.solve(self.mix, joined)
+        drawn = np.empty((count, self.channels, ends[-1]))
+        for e, (a, b) in enumerate(itertools.pairwise(ends)):
+            own = self._drawn(rng, count, slice(a, b), e)
+            drawn[:, :, a:b] = own if self.mix is None else np.linalg.solve(self.mix, own)
+        return drawn
 
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""

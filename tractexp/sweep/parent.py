@@ -1,6 +1,6 @@
 """The parent run of a sweep in MLflow."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -18,8 +18,8 @@ from tractexp.tracking.sweepfile import FILE, parent_of
 def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool) -> Iterator[None]:
     """Open the parent run of a sweep's jobs, or open it again, and close it with the status the sweep ends with.
 
-    FINISHED where every job is, KILLED where the sweep is interrupted, FAILED otherwise. `afresh` never opens an
-    old one again.
+    FINISHED where every job is, KILLED where the sweep is interrupted, FAILED otherwise. What could not be logged is
+    then sent, but where it is interrupted: who ends a sweep does not wait. `afresh` never opens an old one again.
     """
     node = jobs[0].config["tracking"]
     if not node["enabled"]:
@@ -42,6 +42,8 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         raise
     finally:
         _closed(folder, replace(run, status=status, metrics=metrics(jobs)), run_id, uri)
+        if status != "KILLED":
+            _send(folder, uri)
 
 
 def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
@@ -59,10 +61,9 @@ def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
 
 
 def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
-    """Close the parent run, and send what could not be sent before; what still cannot be is kept."""
+    """Close the parent run."""
     from tractexp import tracking
     from tractexp.tracking.runfile import save
-    from tractexp.tracking.sync import NOT, sync, waiting
 
     try:
         entry = save(folder, run, uri, sweep=True)
@@ -71,6 +72,12 @@ def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
             entry.logged(run_id)
     except UserError as error:
         say(f"not logged: {error}")
+
+
+def _send(folder: Path, uri: str) -> None:
+    """Send what could not be sent before; what still cannot be is kept."""
+    from tractexp.tracking.sync import NOT, sync, waiting
+
     left = waiting(folder)
     if left and sync(folder, uri, tell=lambda line: None)[NOT]:
         say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
@@ -84,17 +91,23 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
     return {"jobs": len(jobs), **counts, **({"best_objective": min(best)} if best else {})}
 
 
+def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
+    """The settings that all jobs of a sweep have, as `tracking.flatten` spells them."""
+    from tractexp import tracking
+
+    settings = [tracking.flatten(config) for config in configs]
+    return {key: value for key, value in settings[0].items() if all(flat.get(key) == value for flat in settings)}
+
+
 def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
     from tractexp import tracking
     from tractexp.api.task import Job
 
     first = Job(jobs[0].config, jobs[0].choices, folder)
-    shared = {key: value for key, value in tracking.flatten(jobs[0].config).items()
-              if all(tracking.flatten(job.config).get(key) == value for job in jobs[1:])}  # fmt: skip
     return tracking.TrackedRun(
         experiment=first.experiment,
         name=f"sweep {folder.name}",
-        parameters=shared,
+        parameters=shared_settings([job.config for job in jobs]),
         tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
         description=f"A sweep of {len(jobs)} jobs: {quoting.markdown(' '.join(overrides))}",
     )

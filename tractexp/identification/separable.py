@@ -1,0 +1,221 @@
+"""Derivatives that fall apart by event: P0 and Q0 of an event move its own rows, the parameters move all rows.
+
+A matrix of R rows and k + m E coordinates then has R (k + m) numbers that are not zero, its normal equations E small
+blocks beside one of the parameters. Time and memory grow with the records, and not with their number of events, too.
+The coordinates of an event are taken out of the others by themselves (Frisch and Waugh 1933), and the blocks of the
+normal equations out of the parameters' (Schur's complement).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tractexp.model.drive import Drive
+from tractexp.noise.span import spanned
+
+
+@dataclass(frozen=True, eq=False)
+class SeparableColumns:
+    """Coordinates (E, m) of E events, each of which acts on `rows[e]` (R_e,) only, the indices of its event's rows.
+
+    One simulation moves a coordinate of every event at once and has the differences of all of them.
+    """
+
+    coordinates: np.ndarray
+    rows: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of_power(cls, drive: Drive, first: int | None) -> "SeparableColumns":
+        """P0 and Q0 of each event, coordinates from `first` on in the order of the events; None where they are held."""
+        index = np.arange(drive.measured.size).reshape(drive.measured.shape)
+        rows = tuple(index[:, drive.part(e)].ravel() for e in range(drive.events))
+        count = 0 if first is None else 2
+        return cls((first or 0) + np.arange(count * drive.events).reshape(drive.events, count), rows)
+
+    @property
+    def count(self) -> int:
+        """m, coordinates of each event."""
+        return self.coordinates.shape[1]
+
+    def shared(self, size: int) -> np.ndarray:
+        """Which of so many coordinates act on all rows, (k,)."""
+        shared = np.ones(size, dtype=bool)
+        shared[self.coordinates] = False
+        return np.flatnonzero(shared)
+
+    def moves(self, size: int) -> np.ndarray:
+        """Which of so many coordinates move in each simulation, (k + m, size): first those that act on all rows."""
+        shared = self.shared(size)
+        moves = np.zeros((len(shared) + self.count, size))
+        moves[np.arange(len(shared)), shared] = 1
+        for j, group in enumerate(self.coordinates.T, len(shared)):
+            moves[j, group] = 1
+        return moves
+
+
+NOT_SEPARABLE = SeparableColumns(np.empty((0, 0), dtype=int), ())
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivities:
+    """Derivatives `columns` (k + m, R) of rows to `k` coordinates of all rows, then to the m of each row's own event.
+
+    Coordinates stand in this order: the k shared ones, then the m of each event.
+    """
+
+    columns: np.ndarray
+    k: int
+    rows: tuple[np.ndarray, ...]
+
+    @property
+    def shared(self) -> np.ndarray:
+        """(R, k)."""
+        return self.columns[: self.k].T
+
+    def own(self, event: int) -> np.ndarray:
+        """(R_e, m) of one event."""
+        return self.columns[self.k :, self.rows[event]].T
+
+    @property
+    def dense(self) -> np.ndarray:
+        """Every entry, (R, k + m E)."""
+        m = len(self.columns) - self.k
+        whole = np.zeros((self.columns.shape[1], self.k + m * len(self.rows)))
+        whole[:, : self.k] = self.shared
+        for e, rows in enumerate(self.rows):
+            whole[rows, self.k + e * m : self.k + (e + 1) * m] = self.own(e)
+        return whole
+
+    def only(self, coordinates: np.ndarray) -> "Sensitivities":
+        """Those to the coordinates that a mask (k + m E,) has; of an event the others are zero."""
+        own = self.columns[self.k :].copy()
+        for rows, mine in zip(self.rows, coordinates[self.k :].reshape(len(self.rows), -1), strict=True):
+            own[np.ix_(~mine, rows)] = 0.0
+        shared = self.columns[: self.k][coordinates[: self.k]]
+        return replace(self, columns=np.concatenate([shared, own]), k=len(shared))
+
+    def times(self, coefficients: np.ndarray) -> np.ndarray:
+        """Changes (b, R) of the rows for changes (b, k + m E) of the coordinates."""
+        changes = coefficients[:, : self.k] @ self.columns[: self.k]
+        own = coefficients[:, self.k :].reshape(len(coefficients), len(self.rows), -1)
+        for e, rows in enumerate(self.rows):
+            changes[:, rows] += own[:, e] @ self.own(e).T
+        return changes
+
+    def fit(self, rows: np.ndarray) -> np.ndarray:
+        """Changes (b, k + m E) of the coordinates whose changes of the rows are nearest to those of `rows` (b, R)."""
+        free = self._own_basis().without_own(self.columns[: self.k])
+        shared = np.linalg.lstsq(free.T, rows.T, rcond=None)[0].T
+        left = rows - shared @ self.columns[: self.k]
+        own = [left[:, mine] @ np.linalg.pinv(self.own(e)).T for e, mine in enumerate(self.rows)]
+        return np.concatenate([shared, *own], axis=1)
+
+    @property
+    def without_own(self) -> np.ndarray:
+        """The shared ones (R, k), less what each event's own coordinates do as well."""
+        return self._own_basis().without_own(self.columns[: self.k]).T
+
+    def basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
+        """Of the rows that they can reach; see `spanned` for what is left out of each event's own."""
+        alone = self._own_basis(distinct, least)
+        return replace(alone, shared=spanned(alone.without_own(self.columns[: self.k]), distinct, least))
+
+    def _own_basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
+        own = tuple(spanned(self.own(e).T, distinct, least) for e in range(len(self.rows)))
+        return SeparableBasis(np.empty((0, self.columns.shape[1])), own, self.rows)
+
+
+@dataclass(frozen=True, eq=False)
+class SeparableBasis:
+    """Orthonormal rows: `shared` (k, R), and of each event `own` (m, R_e) on its `rows` (R_e,)."""
+
+    shared: np.ndarray
+    own: tuple[np.ndarray, ...]
+    rows: tuple[np.ndarray, ...]
+
+    def without_own(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (b, R) less their part in the span of each event's own."""
+        left = rows.copy()
+        for basis, mine in zip(self.own, self.rows, strict=True):
+            part = rows[:, mine]
+            left[:, mine] = part - (part @ basis.T) @ basis
+        return left
+
+    def without(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (b, R) less their part in the span."""
+        left = self.without_own(rows)
+        left -= (left @ self.shared.T) @ self.shared
+        return left
+
+    def energy(self, rows: np.ndarray) -> np.ndarray:
+        """Squares of what the span has of rows (b, R), (b,)."""
+        energy = ((rows @ self.shared.T) ** 2).sum(axis=1)
+        for basis, mine in zip(self.own, self.rows, strict=True):
+            energy += ((rows[:, mine] @ basis.T) ** 2).sum(axis=1)
+        return energy
+
+    @property
+    def leverage(self) -> np.ndarray:
+        """How much of the variance of each row (R,) the span takes."""
+        leverage = (self.shared**2).sum(axis=0)
+        for basis, mine in zip(self.own, self.rows, strict=True):
+            leverage[mine] += (basis**2).sum(axis=0)
+        return leverage
+
+
+@dataclass(frozen=True, eq=False)
+class NormalMatrix:
+    """Gauss-Newton matrices of n lanes: `shared` (n, k, k), `cross` (n, E, m, k) and `own` (n, E, m, m).
+
+    `positions` (k,) and `columns` say which coordinates these are.
+    """
+
+    shared: np.ndarray
+    cross: np.ndarray
+    own: np.ndarray
+    positions: np.ndarray
+    columns: SeparableColumns
+
+    @property
+    def diagonal(self) -> np.ndarray:
+        """(n, D)."""
+        whole = np.zeros((len(self.shared), len(self.positions) + self.columns.coordinates.size))
+        whole[:, self.positions] = np.einsum("nkk->nk", self.shared)
+        whole[:, self.columns.coordinates] = np.einsum("nemm->nem", self.own)
+        return whole
+
+    @property
+    def dense(self) -> np.ndarray:
+        """Every entry, (n, D, D)."""
+        n, size = self.diagonal.shape
+        whole = np.zeros((n, size, size))
+        whole[:, self.positions[:, None], self.positions] = self.shared
+        for e, mine in enumerate(self.columns.coordinates):
+            whole[:, mine[:, None], mine] = self.own[:, e]
+            whole[:, mine[:, None], self.positions] = self.cross[:, e]
+            whole[:, self.positions[:, None], mine] = np.swapaxes(self.cross[:, e], 1, 2)
+        return whole
+
+    def solve(self, side: np.ndarray, kept: np.ndarray, added: Sequence[np.ndarray]) -> np.ndarray:
+        """Solutions (n, q, D) for a `side` (n, D) and q diagonals, the sum of the `added` (n, q, D).
+
+        Rows and columns that are not `kept` (n, D) are those of the diagonals alone.
+        """
+        at, apart = self.positions, self.columns.coordinates
+        mask, own_mask = kept[:, at], kept[:, apart]
+        A = self.shared * (mask[:, :, None] & mask[:, None, :])
+        B = self.cross * (own_mask[:, :, :, None] & mask[:, None, None, :])
+        C = self.own * (own_mask[:, :, :, None] & own_mask[:, :, None, :])
+        A, C = A[:, None], C[:, None]
+        for diagonals in added:
+            A = A + np.eye(len(at)) * diagonals[:, :, None, at]
+            C = C + np.eye(apart.shape[1]) * diagonals[:, :, apart][..., None, :]
+        own_side = np.concatenate([B, side[:, apart][..., None]], axis=3)[:, None]
+        own = np.linalg.solve(C, np.broadcast_to(own_side, (*C.shape[:-1], own_side.shape[-1])))
+        taken = np.einsum("nemk,nqemj->nqkj", B, own)
+        rest = side[:, None, at, None] - taken[..., -1:]
+        solution = np.empty((*A.shape[:2], side.shape[1]))
+        solution[:, :, at] = shared = np.linalg.solve(A - taken[..., :-1], rest)[..., 0]
+        solution[:, :, apart] = own[..., -1] - np.einsum("nqemk,nqk->nqem", own[..., :-1], shared)
+        return solution
