@@ -14,7 +14,7 @@ import pytest
 from command_line import run_command
 from scipy.special import chdtrc
 
-from hidden_effects import Case, Noise, make, write
+from hidden_effects import Case, Noise, Recorder, make, write
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.catalogue import catalogue
@@ -48,6 +48,8 @@ from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 FEW = ("stator_resistance", "speed_dependent_torque", "exponential_recovery")
+SLOW = Recorder(rate=250.0, samples=500)  # an investigation takes as long as there are samples
+FAST = Recorder()  # 500 samples a second, where half of them do not show what is to be shown
 QUIET, LOUD = Noise(0.002), Noise(0.005)
 
 
@@ -55,8 +57,8 @@ def base():
     return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
 
 
-def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, **settings):
-    records = make(Case(effect, size, events=count, noise=noise, **settings), seed)
+def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, recorder=SLOW, **settings):
+    records = make(Case(effect, size, events=count, noise=noise, recorder=recorder, **settings), seed)
     return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
 
 
