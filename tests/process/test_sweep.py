@@ -68,7 +68,7 @@ def site(tmp_path_factory):
     for name, body in PLUGINS.items():
         head = "import os, pathlib\nfrom tractexp.identification.optimizer import Optimizer\n"
         head += "from tractexp.plugin import plugin\n"
-        settings = "    odds: float = 0.5\n    marker: str = 'marker'\n"
+        settings = "    odds: float = 0.5\n    marker: str = 'marker'\n    population: int = 20\n"
         text = (
             f'{head}\n@plugin\nclass Faulty(Optimizer):\n    """Fails.\n\n    Source: none.\n    """\n{settings}{body}'
         )
@@ -265,13 +265,16 @@ def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
 
 
 @needs_dask  # the next test has another that dies once, by loky
-def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(site, tmp_path):
-    launcher = (TWO, "hydra.launcher.backend=dask")
-    sweep = (*SILENT, *launcher, PLAIN, "optimizer=dies,pso", "seed=0,1", HERE)
+def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(logged, site, tmp_path):
+    """And those end with the same bits as on processes."""
+    launcher = ("tracking.enabled=false", "hydra/launcher=dask", TWO)
+    sweep = (*QUICK, *launcher, PLAIN, "optimizer=dies,pso", "seed=0,1", HERE)
     done = tractexp("-m", *sweep, cwd=tmp_path, site=site)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "marker").exists()
-    assert len(results(tmp_path / "sweep")) == 4
+    ends = results(tmp_path / "sweep")
+    assert len(ends) == 4
+    assert [ends["pso", seed] for seed in (0, 1)] == [results(logged[1])["pso", seed] for seed in (0, 1)]
 
 
 def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(site, tmp_path):
@@ -288,12 +291,11 @@ def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(
 
 
 def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged, tmp_path):
+    """Of Dask the test of its killed workers tells it."""
     _, sweep, _ = logged
     threads = ("hydra.launcher.backend=threading", TWO)
     first = {of: content for of, content in results(sweep).items() if of[1] == 0}
     launchers = [("hydra.launcher.n_jobs=1",), threads, ("hydra/launcher=basic",)]  # two processes ran `logged`
-    if importlib.util.find_spec("distributed") is not None:
-        launchers.append(("hydra/launcher=dask", TWO))
     for k, launcher in enumerate(launchers):
         command = (
             "-m",
@@ -305,8 +307,7 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
             "seed=0",
             f"hydra.sweep.dir=sweep{k}",
         )
-        run = tractexp if "hydra/launcher=dask" in launcher else run_command
-        done = run(*command, cwd=tmp_path)
+        done = run_command(*command, cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert results(tmp_path / f"sweep{k}") == first
 
