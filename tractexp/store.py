@@ -10,6 +10,7 @@ sums alone would not keep anyone out, who could write them too; that is what the
 import atexit
 import contextlib
 import dataclasses
+import functools
 import hashlib
 import hmac
 import importlib.metadata
@@ -110,7 +111,7 @@ class Store:
                 path.unlink(missing_ok=True)
 
 
-CODE, TEXTS = Store("code", 4000), Store("texts", 4000)  # some 10 kB each
+CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)  # some 10 kB each
 SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)  # draws of 10 MB
 
 
@@ -160,8 +161,14 @@ def _content(thing: Any) -> bytes:
 
 def environment() -> str:
     """What stands behind every number computed here: the code of all plugins, libraries, interpreter, processor."""
-    versions = [f"{name} {importlib.metadata.version(name)}" for name in LIBRARIES]
+    versions = [f"{name} {version(name)}" for name in LIBRARIES]
     return repr((provenance.code(), versions, sys.version, platform.machine(), platform.processor()))
+
+
+@functools.cache  # the files of a package are searched for each time
+def version(library: str) -> str:
+    """The version of a library that is installed."""
+    return importlib.metadata.version(library)
 
 
 def installed(part: Any) -> bool:

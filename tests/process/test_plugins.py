@@ -155,7 +155,7 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
     text = PAGE.read_text(encoding="utf-8")
     told = set(re.findall(r"`eq\.(\w+)", text))
     framework = {
-        "parameters", "definitions", "steps", "known_before", "shown", "states", "memories", "requirements", "edits",
+        "parameters", "definitions", "steps", "values_before", "shown", "states", "memories", "requirements", "edits",
         "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts",
         "real", "latex", "outputs",
     }  # fmt: skip

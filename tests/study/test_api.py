@@ -332,7 +332,7 @@ def test_type_checkers_see_the_names_that_a_program_gets():
 def test_every_call_has_the_door_and_every_result_a_picture():
     """All that is in a module of `api`, found rather than listed."""
     from tractexp import PUBLIC
-    from tractexp.api.load import known_kinds
+    from tractexp.api.load import result_kinds
     from tractexp.outcome import Outcome
 
     for name in (name for name, module in PUBLIC.items() if ".api." in module):
@@ -340,8 +340,8 @@ def test_every_call_has_the_door_and_every_result_a_picture():
             UserError, match=rf"^{name}\(\) has no argument 'nonsense'|is no setting|nothing to|missing a required"
         ):
             getattr(tractexp, name)(nonsense=1)
-    assert len(known_kinds()) == 15
-    for cls in known_kinds().values():
+    assert len(result_kinds()) == 15
+    for cls in result_kinds().values():
         assert issubclass(cls, Outcome)
         assert cls._repr_html_
         assert cls.write

@@ -73,7 +73,7 @@ def test_result_json_tells_estimate_search_and_origin(fit, tmp_path):
     told = json.loads((tmp_path / "result.json").read_text())
     assert told["parameters"].keys() == told["intervals"].keys() == told["search"]["parameters"].keys()
     assert set(told["search"]) >= {"objective", "epsilon_p", "epsilon_q", "simulations", "seconds"}
-    assert told["search"]["objective"] == fit.found.objective
+    assert told["search"]["objective"] == fit.end.objective
     assert told["adequacy"]["grade"] == "adequate"
     assert told["tractexp_version"]
     (record,) = told["records"]

@@ -29,7 +29,6 @@ from tractexp.discrepancy.proposal.refit import fitted
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.discrepancy.records import Records
-from tractexp.domain import PHASORS, WAVES
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect
@@ -217,11 +216,8 @@ def test_nothing_is_proposed_where_nothing_is_missing():
     assert to_dict(found, "x.py") is None
 
 
-def test_without_a_held_out_event_or_on_waveforms_nothing_is_proposed():
-    anything = SimpleNamespace(context=SimpleNamespace(domain=PHASORS))
-    assert "none was held out" in propose(anything, None, None, None, (), 0).why
-    anything.context.domain = WAVES
-    assert "of phasors" in propose(anything, None, None, None, ("an event",), 0).why
+def test_without_a_held_out_event_nothing_is_proposed():
+    assert "none was held out" in propose(SimpleNamespace(context=None), None, None, None, (), 0).why
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
 

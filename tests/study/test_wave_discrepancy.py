@@ -5,6 +5,7 @@ voltage and of the currents, offsets, quantization.
 """
 
 import json
+import runpy
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,8 @@ import tractexp
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.injection import Injection
 from tractexp.discrepancy.next_event.choose import next_event
+from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.proposal.propose import propose
 from tractexp.discrepancy.remainder import remainders
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
@@ -103,6 +106,28 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     part = slice(first.event.start, None)
     before, after = (np.abs((first.measured - made)[:2, part]).max() for made in (first.before, first.after))
     assert after < before
+
+
+def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_path):
+    steps, few = planted.steps, ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip")
+    among = [term(f"answer:{name}") for name in few]
+    proposed = propose(steps.base, steps.first, steps.bare, steps.last.noise, steps.withheld, 0, among)
+    proposal = proposed.proposal
+    assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
+    assert proposal.values["size"] < 0
+    assert proposal.validate.closed > 0.9
+    (tmp_path / "proposed_effect.py").write_text(proposal.source, encoding="utf-8")
+    effect = runpy.run_path(str(tmp_path / "proposed_effect.py"))["ProposedEffect"]()
+    context, fit = proposal.train.context, proposed.tried[0][1].fit
+    faults = [context.catalogue[name].effect for name in context.catalogue.of_measurement]
+    model = compose(context.load.motor, context.load.static, [effect, *faults], domain="waves")
+    own = {f"proposed_{name}": value for name, value in proposal.values.items()}
+    at = lambda name: own[name] if name in own else context.coordinates.value(name, fit.unit)  # noqa: E731
+    values = np.array([[at(name) for name in model.names]])
+    drawn = model.simulate(context.drive, values, context.problem.step.substeps).outputs[:, 0]
+    with_it, without = proposal.train.with_it.calculated, proposal.train.without.calculated
+    # all but the power before the dip, which the fit leaves free
+    assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 
 
 def test_an_event_that_would_decide_is_found_in_waveforms(planted):

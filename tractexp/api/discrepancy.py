@@ -309,7 +309,7 @@ def investigate(
 def _steps(question: Question, progress: Progress) -> "Steps":
     """The investigation."""
     from tractexp.discrepancy.criteria import Criteria
-    from tractexp.discrepancy.investigate import investigate as found
+    from tractexp.discrepancy.investigate import investigate as findings_of
 
     q, base = question, question.model
     with telling(progress) as tell:
@@ -317,7 +317,7 @@ def _steps(question: Question, progress: Progress) -> "Steps":
             tell(shown_in_words(base.shown))
         if base.priors:
             tell(f"{MODEL.priors} holds no fit of an investigation, which judges by the records alone")
-        return found(
+        return findings_of(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
             criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
         )  # fmt: skip

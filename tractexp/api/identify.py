@@ -45,20 +45,20 @@ class FitSpec(Setup):
     optimizer: Choice
     check_intervals: bool = True
 
-    def found(self, progress: Progress) -> "SearchResult":
+    def search_end(self, progress: Progress) -> "SearchResult":
         """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
 
-    def so_far(self, found: "SearchResult | None") -> "Identification | None":
+    def so_far(self, end: "SearchResult | None") -> "Identification | None":
         """Where a search was when it was stopped, as an identification that nothing is judged of."""
         from tractexp.identification.result import conclude
         from tractexp.identification.search import REFUSED
 
-        if found is None or not found.objective < REFUSED:
+        if end is None or not end.objective < REFUSED:
             return None
         node, name = self.model.node, self.optimizer.name
-        return Identification(conclude(self.problem, found, self.validate, self.seed, node, name)[0], self, found)
+        return Identification(conclude(self.problem, end, self.validate, self.seed, node, name)[0], self, end)
 
 
 @dataclass(frozen=True)
@@ -118,19 +118,19 @@ class Identification(Written):
 
     result: Result
     setup: FitSpec | None = None  # None where only a result.json is known
-    found: "SearchResult | None" = None
+    end: "SearchResult | None" = None
     behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: FitSpec, found: "SearchResult", progress: Progress = False) -> "Identification":
+    def of(cls, setup: FitSpec, end: "SearchResult", progress: Progress = False) -> "Identification":
         """Judge what a search found."""
-        result, details = _concluded(setup, found, progress)
-        return cls(result, setup, found, details)
+        result, details = _concluded(setup, end, progress)
+        return cls(result, setup, end, details)
 
     @functools.cached_property
     def details(self) -> FitDetails:
         """What stands behind the result: computed again where this was loaded."""
-        return self.behind or _concluded(self.spec, self.ended)[1]
+        return self.behind or _concluded(self.spec, self.search_result)[1]
 
     @property
     def spec(self) -> FitSpec:
@@ -143,11 +143,11 @@ class Identification(Written):
         return self.setup
 
     @property
-    def ended(self) -> "SearchResult":
+    def search_result(self) -> "SearchResult":
         """Where the search ended."""
         _ = self.spec
-        assert self.found is not None
-        return self.found
+        assert self.end is not None
+        return self.end
 
     @functools.cached_property
     def model(self) -> LoadModel:
@@ -320,24 +320,25 @@ class Identification(Written):
         return f"; its {joined(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
-        found = None if self.found is None else asdict(self.found)
-        return {"setup": self.setup and self.setup.to_dict(), "result": asdict(self.result), "found": found}
+        end = None if self.end is None else asdict(self.end)
+        return {"setup": self.setup and self.setup.to_dict(), "result": asdict(self.result), "found": end}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         from tractexp.identification.search import History, SearchResult
 
-        setup, found = content["setup"], content["found"]
-        if found is not None:
-            history = History(**{key: np.array(v, dtype=float) for key, v in found["history"].items()})
-            found = SearchResult(**found | {"values": np.array(found["values"], dtype=float), "history": history})
-        return cls(Result.of(content["result"], "the saved result"), setup and FitSpec.from_dict(setup), found)
+        setup, end = content["setup"], content["found"]
+        if end is not None:
+            history = History(**{key: np.array(v, dtype=float) for key, v in end["history"].items()})
+            end = SearchResult(**end | {"values": np.array(end["values"], dtype=float), "history": history})
+        return cls(Result.of(content["result"], "the saved result"), setup and FitSpec.from_dict(setup), end)
 
     def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
 
         return [
-            self.result.write(folder / "result.json"), write_history(folder / "history.csv", self.ended.history),
+            self.result.write(folder / "result.json"),
+            write_history(folder / "history.csv", self.search_result.history),
         ]  # fmt: skip
 
 
@@ -389,15 +390,15 @@ def identify(
         target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
-    found = None
+    end = None
     try:
-        found = setup.found(progress)
-        return Identification.of(setup, found, progress)
+        end = setup.search_end(progress)
+        return Identification.of(setup, end, progress)
     except KeyboardInterrupt as stop:
-        raise Stopped.of(stop, result=setup.so_far(found or getattr(stop, "state", None))) from None
+        raise Stopped.of(stop, result=setup.so_far(end or getattr(stop, "state", None))) from None
 
 
-def _concluded(setup: FitSpec, found: "SearchResult", progress: Progress = False) -> tuple[Result, FitDetails]:
+def _concluded(setup: FitSpec, end: "SearchResult", progress: Progress = False) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.choices import set_holding
     from tractexp.identification.adequacy import graded
@@ -405,19 +406,19 @@ def _concluded(setup: FitSpec, found: "SearchResult", progress: Progress = False
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
-    from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_nothing_found
+    from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_failed
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.yardstick import yardstick
 
     problem = setup.problem
-    refuse_nothing_found(problem, found)
-    estimated = estimate(problem, found.values)
+    refuse_failed(problem, end)
+    estimated = estimate(problem, end.values)
     uncertainty = estimated.uncertainty
     if setup.check_intervals:
         profiled = checked(uncertainty, counter("points at most on the profiles", progress))
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     result, fits = conclude(
-        problem, found, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
+        problem, end, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
     )
     result = replace(result, shown_effects=dict(setup.model.shown))
     held = active_bounds(problem, uncertainty.values, result.nuisances)
@@ -482,7 +483,7 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
         metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
     if "epsilon_i" in result.epsilons:
         metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
-    history = fit.ended.history
+    history = fit.search_result.history
     valid = history.objective < REFUSED
     best = history.objective[valid]
     curves = {

@@ -22,7 +22,7 @@ def load(path: str | Path) -> Outcome:
 
         return Identification(read_result(Path(path)))
     content = saved(path)
-    kinds = known_kinds()
+    kinds = result_kinds()
     if content["kind"] not in kinds:
         why = among(content["kind"], kinds, "Kinds")
         raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{why}")
@@ -38,7 +38,7 @@ def _bare(path: str | Path) -> bool:
     return isinstance(content, dict) and MARK not in content and "parameters" in content
 
 
-def known_kinds() -> dict[str, type[Outcome]]:
+def result_kinds() -> dict[str, type[Outcome]]:
     """The kinds of results, by name; each is known once its module is imported."""
     from tractexp import PUBLIC
 

@@ -4,14 +4,13 @@ Everything given as text is escaped. Charts carry their data and the library tha
 equations are typeset into SVG; nothing is loaded from elsewhere.
 """
 
-import functools
 import io
 import itertools
 import re
 from collections.abc import Sequence
 from typing import Any
 
-from tractexp import files, quoting
+from tractexp import files, quoting, store
 from tractexp.blocks.block import (
     Block,
     ChartBlock,
@@ -148,24 +147,28 @@ def _displayed(latex: str) -> str:
     return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
 
 
-@functools.cache
-def _typeset(latex: str) -> str | None:
-    """SVG of an equation, or None for LaTeX beyond mathtext."""
+def _typeset(latex: str) -> str:
+    """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
+    key = store.key(store.version("matplotlib"), latex)
+    return store.DRAWINGS.get(key, lambda: _drawing(_displayed(latex))).decode()
+
+
+def _drawing(latex: str) -> bytes:
+    """An SVG document, of no bytes where mathtext refuses the LaTeX."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure
     from matplotlib.font_manager import FontProperties
     from matplotlib.mathtext import MathTextParser
 
-    latex = _displayed(latex)
     settings: Any = {"svg.fonttype": "path", "mathtext.fontset": "cm", "svg.hashsalt": "tractexp"}
     with rc_context(settings):
         font = FontProperties(size=13)
         try:
             width, height, depth, *_ = MathTextParser("path").parse(f"${latex}$", dpi=72, prop=font)
         except ValueError:
-            return None
+            return b""
         figure = Figure(figsize=((width + 4) / 72, (height + 4) / 72))
         figure.text(2 / (width + 4), (depth + 2) / (height + 4), f"${latex}$", fontproperties=font)
         drawn = io.BytesIO()
         figure.savefig(drawn, format="svg", transparent=True, metadata={"Date": None})
-    return drawn.getvalue().decode()
+    return drawn.getvalue()

@@ -30,10 +30,10 @@ def again(arguments: list[str]) -> list[str]:
     folder = Path(chosen.folder).absolute()
     if odd := [text for text in chosen.settings if "=" not in text]:
         raise UserError(f"{odd[0]} is no setting; give KEY=VALUE, as task=discrepancy")
-    whole, told = _stored(folder)
+    whole, lines = _stored(folder)
     _enter(Path(whole["runtime"]["cwd"]))
     search = [s["path"] for s in whole["runtime"]["config_sources"] if s["provider"] == "command-line"]
-    result = [*(part for path in search for part in ("--config-dir", path)), *repeated(told, chosen.settings, folder)]
+    result = [*(part for path in search for part in ("--config-dir", path)), *repeated(lines, chosen.settings, folder)]
     say(f"that is: {quoting.shell('tractexp', *result)}")
     return result
 

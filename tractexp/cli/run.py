@@ -50,7 +50,7 @@ def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | No
 
     begin()
     path = state.result.write(folder / "interrupted.json")
-    write_history(folder / "history.csv", state.ended.history)
+    write_history(folder / "history.csv", state.search_result.history)
     return (
         f"the best of {state.result.simulations} simulations so far, objective {state.result.objective:.4g} pu², is in"
         f" {path}; it is neither polished nor judged, and not logged"

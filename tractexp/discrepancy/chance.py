@@ -57,7 +57,7 @@ def chance_at(
     Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less than keeping them.
     """
     context = t.context
-    plain = plain or noise_known(context, noise)
+    plain = plain or is_noise_exact(context, noise)
 
     def draw() -> tuple[np.ndarray, ...]:
         chance = _drawn(t, own, noise, quiet, seed, plain, draws)
@@ -110,7 +110,7 @@ def _noise(t: Linearization, noise: Noise, rng: np.random.Generator, draws: int)
     return noise.draw(rng, draws, np.diff(t.context.drive.first).tolist()) * t.context.valid
 
 
-def noise_known(context: Context, noise: Noise) -> bool:
+def is_noise_exact(context: Context, noise: Noise) -> bool:
     """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
     samples = sum(part.stop - part.start for part in context.problem.quiet)
     return context.domain.noise_from_model or context.criteria.knows_noise(noise.worth(samples))

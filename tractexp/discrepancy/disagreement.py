@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.chance import Chance, chance_at, noise_known, scales
+from tractexp.discrepancy.chance import Chance, chance_at, is_noise_exact, scales
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit, refit
@@ -136,7 +136,7 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     scores = projection.scores()
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)
     result = Disagreement(fit, noise, t, projection, chance, scores)
-    plain = plain or noise_known(context, noise) or (bool(scores) and scores[0].p < PLAIN)
+    plain = plain or is_noise_exact(context, noise) or (bool(scores) and scores[0].p < PLAIN)
     if not plain and result.doubtful:
         result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
     if result.undecided:

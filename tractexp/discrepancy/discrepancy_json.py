@@ -10,7 +10,7 @@ from tractexp.discrepancy.forms import by_name, forms
 from tractexp.discrepancy.gap import Curves, GapTest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import ParameterEstimate, estimates, own_parameters
+from tractexp.discrepancy.precision import estimates, own_parameters
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
@@ -106,7 +106,7 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
         "explained_held_out": files.plain(near.held_out),
         "gap": gaps,
         "others": [{"effects": list(names), "explained": files.plain(share)} for names, share in near.others],
-        "parameters": {name: _estimate(by_name[name]) for name in own},
+        "parameters": {name: by_name[name].plain() for name in own},
     }
 
 
@@ -139,10 +139,6 @@ def contributions(investigation: Findings) -> list[dict[str, Any]]:
 
 def _error(error: ModelError) -> dict[str, Any]:
     return files.plain({"value": error.value, "interval": error.interval})
-
-
-def _estimate(estimate: ParameterEstimate) -> dict[str, Any]:
-    return files.plain({"value": estimate.value, "standard_error": estimate.error, "interval": estimate.interval})
 
 
 def write_left(investigation: Findings, path: Path) -> Path:

@@ -7,27 +7,13 @@ import numpy as np
 from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import standard_errors
+from tractexp.discrepancy.precision import ParameterEstimate, standard_errors
 from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
-from tractexp.wording import joined, with_error
+from tractexp.wording import joined
 
-CHOSEN, KEPT = "added", "tied"
+CHOSEN = "added"
 FITTED, ONE_STEP = "refitted", "one step"
-
-
-@dataclass(frozen=True)
-class EffectSize:
-    """A parameter of a candidate, in `unit`; `error` is its standard error, nan where it was not reckoned."""
-
-    name: str
-    value: float
-    error: float
-    unit: str
-
-    def __str__(self) -> str:
-        unit = "" if self.unit == "1" else f" {self.unit}"
-        return f"{self.name} {with_error(self.value, self.error)}{unit}"
 
 
 @dataclass(frozen=True)
@@ -40,13 +26,13 @@ class Evidence:
     drop: float
     how: str
     status: str
-    sizes: tuple[EffectSize, ...]
+    sizes: tuple[ParameterEstimate, ...]
     why: str
 
     @property
     def standing(self) -> int:
         """0 for what was added, 1 for what is tied with it, 2 for the rest."""
-        return {CHOSEN: 0, KEPT: 1}.get(self.status, 2)
+        return {CHOSEN: 0, TIED: 1}.get(self.status, 2)
 
 
 def evidence(findings: Findings) -> list[Evidence]:
@@ -117,7 +103,7 @@ def _of_set(findings: Findings, rival: Rival) -> Evidence:
     errors = {} if rival.tests is None else standard_errors(rival.tests)
     at = findings.context.coordinates
     own = [p for name in names for p in findings.catalogue[name].sizes]
-    sizes = tuple(EffectSize(p.name, at.value(p.name, unit), errors.get(p.name, np.nan), p.unit) for p in own)
+    sizes = tuple(ParameterEstimate(p, at.value(p.name, unit), errors.get(p.name, np.nan)) for p in own)
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
@@ -128,7 +114,7 @@ def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     if names in findings.verdict.sets:
         helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
         left = f"leaves no more than chance does{helps}"
-        return (CHOSEN, left) if names == findings.names else (KEPT, left)
+        return (CHOSEN, left) if names == findings.names else (TIED, left)
     if rival.rejected:
         names = _names(findings, findings.survivors.rivals[0])
         best = names[0] if len(names) == 1 else "the best set"
@@ -149,12 +135,12 @@ def _singles(findings: Findings) -> list[Evidence]:
     for j in judgements(findings):
         score, fit = scores.get(j.name), refits.get((j.name,))
         drop = base - fit.deviance if fit else score.drop if score else np.nan
-        sizes: list[EffectSize] = []
+        sizes: list[ParameterEstimate] = []
         for p in findings.catalogue[j.name].sizes if fit or score else ():
             if fit:
-                sizes.append(EffectSize(p.name, at.value(p.name, fit.unit), np.nan, p.unit))
+                sizes.append(ParameterEstimate(p, at.value(p.name, fit.unit), np.nan))
             elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
-                sizes.append(EffectSize(p.name, p.absent + score.size[p.name], score.deviation[p.name], p.unit))
+                sizes.append(ParameterEstimate(p, p.absent + score.size[p.name], score.deviation[p.name]))
         how = FITTED if fit else ONE_STEP if score else ""
         status = CHOSEN if j.name in findings.names else j.status
         rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))

@@ -17,7 +17,7 @@ from tractexp.noise.span import spanned
 
 REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 HELD = 1e-6  # of it: how far a parameter that rests on a wall may move
-LEAST_KEPT = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
+LEAST_VARIANCE = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,5 +158,5 @@ def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
     """
     right = spanned(t.explaining.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
-    rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_KEPT)
+    rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_VARIANCE)
     return ((flat - (flat @ right.T) @ right) / np.sqrt(rest)).reshape(residuals.shape)

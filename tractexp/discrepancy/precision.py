@@ -2,28 +2,35 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtri
 
+from tractexp import files
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.identification.information import Information
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.identification.verdict import BOUND, judge
 from tractexp.parameter import Parameter
+from tractexp.wording import with_error
 
 WIDE = float(ndtri((1 + LEVEL) / 2))  # standard errors in half of an interval: the samples are many
 
 
 @dataclass(frozen=True, eq=False)
 class ParameterEstimate:
-    """One parameter at a fit: `error` is its standard error, nan where it rests on a bound or is not told."""
+    """One parameter at a fit: `error` is its standard error, nan where it rests on a bound or is not computed."""
 
     parameter: Parameter
     value: float
     error: float
-    verdict: str
+    verdict: str = ""
+
+    def __str__(self) -> str:
+        unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
+        return f"{self.parameter.name} {with_error(self.value, self.error)}{unit}"
 
     @property
     def half(self) -> float:
@@ -35,6 +42,10 @@ class ParameterEstimate:
         """95 %, inside the bounds; nan without a standard error."""
         ends = np.clip(self.value + self.half * np.array([-1.0, 1.0]), *self.parameter.bounds)
         return float(ends[0]), float(ends[1])
+
+    def plain(self) -> dict[str, Any]:
+        """As `discrepancy.json` has it."""
+        return files.plain({"value": self.value, "standard_error": self.error, "interval": self.interval})
 
 
 def standard_errors(tests: Disagreement) -> dict[str, float]:

@@ -51,7 +51,7 @@ class Domain(ABC):
     # records
     windowed: ClassVar[bool]  # whether samples are averages over a recorder's window, which may have to be searched
     # investigation
-    calibrated: ClassVar[bool]  # whether families, a search in all events and proposals have calibrated criteria
+    calibrated: ClassVar[bool]  # whether families and a search in all events have calibrated criteria
     recordable: ClassVar[bool]  # whether a dip that nobody recorded can be made a record and fitted beside others
     # planning
     edge: ClassVar[float]  # s, fall and rise of a planned dip

@@ -76,12 +76,12 @@ class Projection:
         lower, upper = np.log(self.slowest), np.log(FASTEST * self.rate)
         bounds = np.array([[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)).T
         first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
-        found = least_squares(
+        optimum = least_squares(
             lambda x: _parts(self.linear_part(_poles(x, n)).residual), np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
             bounds=bounds, x_scale="jac", method="dogbox", max_nfev=STEPS,
         )  # fmt: skip
-        return _poles(found.x, n)
+        return _poles(optimum.x, n)
 
     def jacobian(self, poles: Complex) -> np.ndarray:
         """How what is left (2 R,) moves with the logarithms of the decays and with the frequencies."""

@@ -266,7 +266,7 @@ def conclude(
 
     Raises `UserError` where no candidate at all had a steady state.
     """
-    refuse_nothing_found(problem, end)
+    refuse_failed(problem, end)
     model = problem.model
     free = end.values if estimate is None else estimate
     fits, epsilon_p, epsilon_q = fitted(problem, free)
@@ -312,7 +312,7 @@ def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
     return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
 
 
-def refuse_nothing_found(problem: Problem, end: SearchResult) -> None:
+def refuse_failed(problem: Problem, end: SearchResult) -> None:
     """Raise `UserError` where no candidate at all had a steady state."""
     if end.objective >= REFUSED:
         why = problem.model.refusal(problem.full(end.values)[0], problem.drive) or "all diverged"

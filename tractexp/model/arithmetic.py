@@ -11,10 +11,10 @@ FUNCTIONS = SimpleNamespace(**{name: getattr(np, name, getattr(math, name)) for 
 VALUES = "at"  # what holds the numbers in such a text: at['T_m']
 
 
-def evaluated(texts: Mapping[str, str], known: Mapping[str, float]) -> dict[str, float]:
+def evaluated(texts: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, float]:
     """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE 754 has it."""
-    numbers = {name: np.float64(value) for name, value in known.items()}
+    values = {name: np.float64(value) for name, value in numbers.items()}
     with np.errstate(all="ignore"):
         for name, text in texts.items():
-            numbers[name] = np.float64(eval(text, {"math": FUNCTIONS, VALUES: numbers}))
-    return {name: float(value) for name, value in numbers.items()}
+            values[name] = np.float64(eval(text, {"math": FUNCTIONS, VALUES: values}))
+    return {name: float(value) for name, value in values.items()}

@@ -96,7 +96,7 @@ class Equations(Circuit):
         self.parameters: dict[str, Parameter] = {}
         self.definitions: dict[Symbol, sympy.Expr] = {}
         self.steps: dict[Symbol, sympy.Expr] = {}
-        self.known_before: dict[Symbol, sympy.Expr] = {}
+        self.values_before: dict[Symbol, sympy.Expr] = {}
         self.shown: dict[Symbol, sympy.Expr] = {}
         self.states: dict[Symbol, State] = {}
         self.memories: dict[Symbol, Memory] = {}
@@ -268,7 +268,7 @@ class Equations(Circuit):
         symbol = _real(name)
         self.steps[symbol] = sympy.sympify(expression)
         if before is not None:
-            self.known_before[symbol] = self.real(self.before(before))
+            self.values_before[symbol] = self.real(self.before(before))
         self.latex_names[symbol] = name
         return symbol
 
@@ -447,7 +447,7 @@ class Equations(Circuit):
         """The values before the event of inputs and computed quantities."""
         still = dict.fromkeys(map(_real, INPUTS), sympy.Integer(0)) | {self.t: sympy.Integer(LONG_AGO)}
         still |= {_real("v_d"): self.U0, _real("turn_re"): sympy.Integer(1)}
-        return still | {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | self.known_before
+        return still | {self.U: self.U0, self.omega_s: self.omega_s0, self.U2: self.U20} | self.values_before
 
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""

@@ -26,7 +26,7 @@ class _Hoister:
         self.lane, self.event, self.inputs = lane, event, inputs
         self.constants: dict[sympy.Expr, Symbol] = {}
         self.signals: dict[sympy.Expr, Symbol] = {}
-        self._made: dict[sympy.Expr, sympy.Expr] = {}  # what was rewritten already
+        self._rewrites: dict[sympy.Expr, sympy.Expr] = {}  # what was rewritten already
         self._symbols: dict[sympy.Expr, frozenset[Symbol]] = {}
 
     def symbols(self, e: sympy.Expr) -> frozenset[Symbol]:
@@ -53,9 +53,9 @@ class _Hoister:
         return self.signals.setdefault(e, Symbol(f"_s{len(self.signals)}", real=True))
 
     def __call__(self, e: sympy.Expr) -> sympy.Expr:
-        if e not in self._made:
-            self._made[e] = self._rewritten(e)
-        return self._made[e]
+        if e not in self._rewrites:
+            self._rewrites[e] = self._rewritten(e)
+        return self._rewrites[e]
 
     def _rewritten(self, e: sympy.Expr) -> sympy.Expr:
         if not isinstance(e, sympy.Expr):  # pyright: ignore[reportUnnecessaryIsInstance] # a piece, or its condition

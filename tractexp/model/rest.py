@@ -25,10 +25,10 @@ def settled(eq: Equations, start: Phase, rest: Phase, starts: Sequence[sympy.Sym
     ranges = {**{name: p.bounds for name, p in eq.parameters.items()}, **EVENTS}
     low, high = np.array([*ranges.values()]).T
     drawn = np.random.default_rng(0).uniform(low, high, (TRIES, len(ranges))).T
-    known = {sympy.Symbol(name, real=True): values for name, values in zip(ranges, drawn, strict=True)}
-    values = values_of(start, known, TRIES)
+    given = {sympy.Symbol(name, real=True): values for name, values in zip(ranges, drawn, strict=True)}
+    values = values_of(start, given, TRIES)
     first, slacks = values[: len(starts)], values[len(starts) :]
-    balances = values_of(rest, known | dict(zip(starts, first, strict=True)), TRIES)
+    balances = values_of(rest, given | dict(zip(starts, first, strict=True)), TRIES)
     finite = np.isfinite(np.array([*first, *slacks, *balances])).all(axis=0)
     admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
     points = np.flatnonzero(admissible)[:POINTS]

@@ -220,7 +220,7 @@ class Noise:
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part, event)
-        return np.stack(colored, axis=1) + np.einsum("bk,kct->bct", rng.standard_normal((count, len(shapes))), shapes)
+        return np.stack(colored, axis=1) + np.tensordot(rng.standard_normal((count, len(shapes))), shapes, axes=1)
 
 
 def _all_measured(valid: np.ndarray) -> np.ndarray:

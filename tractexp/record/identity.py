@@ -59,8 +59,8 @@ class Identity:
     @property
     def dip(self) -> str:
         """Which dip of its file; "" where the file holds one."""
-        found = DIP.search(self.source.get("file", ""))
-        return found[0].strip() if found else ""
+        match = DIP.search(self.source.get("file", ""))
+        return match[0].strip() if match else ""
 
     @property
     def voltage(self) -> float | None:

@@ -10,8 +10,8 @@ from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
-    KEPT,
     ONE_STEP,
+    TIED,
     Evidence,
     beside,
     chance_level,
@@ -22,7 +22,7 @@ from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.wording import joined
 
-COLORS = {CHOSEN: "#009E73", KEPT: "#E69F00"}
+COLORS = {CHOSEN: "#009E73", TIED: "#E69F00"}
 REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
 BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
 MOST_SETS = 12  # that are compared in a table
@@ -77,7 +77,7 @@ def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence
 
 def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
     colors = ["green: added"] * bool(findings.names)
-    colors += ["orange: tied with it"] * any(r.status == KEPT for r in rows)
+    colors += ["orange: tied with it"] * any(r.status == TIED for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
     chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"

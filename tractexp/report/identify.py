@@ -125,7 +125,7 @@ def report(fit: "Identification") -> Report:
     if together is not None:
         _events(page, uncertainty, together)
     page.heading("The search and the estimate").add(ended(fit)).text(as_sentence(fit.end_of_search))
-    page.chart(_fitness(fit.ended.history, result), "Best objective of the search; dashed: the estimate's.")
+    page.chart(_fitness(fit.search_result.history, result), "Best objective of the search; dashed: the estimate's.")
     _starts(page, details.estimation, uncertainty)
     page.heading("What the fit leaves")
     _left(page, uncertainty)

@@ -40,7 +40,8 @@ def proposed(page: Report, findings: Findings) -> None:
     _drawn(page, proposal)
     _rivals(page, proposal)
     page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
-    page.code(f"cp {PLUGIN} <your package>/effects/ && python -m tractexp 'model.effects=[proposed_effect]' ...")
+    command = f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
+    page.code(f"cp {PLUGIN} <your package>/effects/ && {command}")
     with page.folded("The plugin file"):
         page.code(proposal.source)
     _tried(page, findings.proposed.tried)
@@ -49,10 +50,10 @@ def proposed(page: Report, findings: Findings) -> None:
 def _numbers(page: Report, proposal: Proposal) -> None:
     rows = [
         [
-            k.name,
-            k.symbol.replace("\\varphi", "φ"),
-            k.about,
-            k.unit,
+            k.parameter.name,
+            k.parameter.symbol.replace("\\varphi", "φ"),
+            k.parameter.about,
+            k.parameter.unit,
             with_error(k.value, k.error),
             _interval(*k.interval),
         ]
@@ -66,7 +67,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
     page.table(
         ["event", "from t [s]", "to t [s]", "channel", "largest change [pu]"],
         [[a.event, f"{a.start:.3f}", f"{a.end:.3f}", a.channel, f"{a.most:+.3g}"] for a in proposal.acting],
-        "When it acts: where it changes the calculated power by more than a tenth of the most it does.", words=(3,),
+        "When it acts: where it changes what is calculated by more than a tenth of the most it does.", words=(3,),
     )  # fmt: skip
 
 

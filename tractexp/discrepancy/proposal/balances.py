@@ -23,7 +23,7 @@ def power(eq, g, size_P, size_Q):
 
 def whole(eq, g, size):
     """P -> P (1 + k g), Q -> Q (1 + k g)."""
-    for site in (sites.P, sites.Q):
+    for site in (sites.current,) if eq.waves else (sites.P, sites.Q):
         eq.edit(site, lambda drawn: drawn * (1 + size * g))
 
 
@@ -45,7 +45,7 @@ def static_Q(eq, g, size):
 
 def motor(eq, g, size):
     """P_d -> P_d (1 + k g), Q_d -> Q_d (1 + k g)."""
-    for site in (sites.P_motor, sites.Q_motor):
+    for site in (sites.motor_current,) if eq.waves else (sites.P_motor, sites.Q_motor):
         eq.edit(site, lambda drawn: drawn * (1 + size * g))
 
 

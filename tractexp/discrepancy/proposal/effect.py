@@ -66,7 +66,7 @@ class Library(Effect):
                 total += parameters[self.pick(signal.name)] * signal.build(eq, **clock, **own)
         g = eq.define(f"{self.name}_signal", total, "g")
         for balance in self.balances:
-            if all(site in eq for site in balance.places):
+            if all(site in eq for site in balance.places_in(eq)):
                 own = {s.name: parameters[self.size(balance, s.name)] for s in balance.sizes}
                 balance.build(eq, g, **own)
 

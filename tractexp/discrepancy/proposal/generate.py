@@ -83,17 +83,13 @@ def _copied(function: Callable[..., object], name: str) -> str:
 
 
 def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
-    parameters = [
-        s.parameter(s.name, f"size in {s.where or term.balance.words}", values[s.name]) for s in term.balance.sizes
-    ]
-    parameters += [s.parameter(s.name, values[s.name]) for s in term.signal.shapes]
     lines = []
-    for p in parameters:
+    for p in term.parameters(values, PREFIX):
         null = "" if p.null is None else f", null={p.null}"
         null += f", power_exponent={p.power_exponent}" if p.power_exponent else ""
         unit, about, symbol = map(quoting.python, (p.unit, p.about, p.symbol))
         text = f'"{unit}", "{about}", SOURCE, "{symbol}"{null}'
-        lines.append(f"    {PREFIX}{p.name} = Parameter({p.default!r}, {p.bounds!r}, {text})")
+        lines.append(f"    {p.name} = Parameter({p.default!r}, {p.bounds!r}, {text})")
     return lines
 
 

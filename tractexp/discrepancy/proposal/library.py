@@ -5,12 +5,13 @@ Instants, levels, times and frequencies stand on grids that know nothing of any 
 
 import functools
 import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from tractexp.discrepancy.proposal import balances, shapes
 from tractexp.model import sites
+from tractexp.model.equations import Equations
 from tractexp.parameter import Parameter
 
 SOURCE = "a term proposed by the data; see docs/missing-effects.md"
@@ -103,12 +104,17 @@ class Balance:
     latex: str
     sizes: tuple[Size, ...]
     places: tuple[sites.Site, ...] = ()
+    in_waves: tuple[sites.Site, ...] | None = None  # where they are others
     kinds: tuple[str, ...] = (ANSWER,)
     without: tuple[str, ...] = ("constant", "relay", "below")  # signals that make no sense here: a flux is not switched
 
     @property
     def build(self) -> Callable[..., Any]:
         return getattr(balances, self.name)
+
+    def places_in(self, eq: Equations) -> tuple[sites.Site, ...]:
+        """The sites it edits in equations of phasors or of waves."""
+        return self.places if self.in_waves is None or not eq.waves else self.in_waves
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,14 @@ class Term:
         return ":".join(
             (self.signal.kind, self.balance.name, self.signal.name, *([self.clock.name] if self.clock else []))
         )
+
+    def parameters(self, values: Mapping[str, float], prefix: str = "") -> list[Parameter]:
+        """Its sizes and those of its signal, with these defaults; names begin with `prefix`."""
+        where = self.balance.words
+        sizes = [
+            s.parameter(prefix + s.name, f"size in {s.where or where}", values[s.name]) for s in self.balance.sizes
+        ]
+        return sizes + [s.parameter(prefix + s.name, values[s.name]) for s in self.signal.shapes]
 
     @property
     def exogenous(self) -> bool:
@@ -244,7 +258,7 @@ BALANCES = (
             (sites.Q_static,), without=_SWITCHED),
     Balance("motor", "the motors' power by one share",
             r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})", (_SHARE,),
-            (sites.P_motor, sites.Q_motor), without=_SWITCHED),
+            (sites.P_motor, sites.Q_motor), (sites.motor_current,), without=_SWITCHED),
     Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}",
             (Size("size", 20.0, "pu", 0.05, power_exponent=1),), (sites.load_torque,), without=_SWITCHED),
     Balance("coupling", "the coupling of rotor and stator", r"c \rightarrow c\,(1 + k\,{g})",

@@ -2,16 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from tractexp import files
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.precision import WIDE
+from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
 from tractexp.discrepancy.proposal.judge import Before, Weighed, tied, weighed
@@ -28,25 +26,8 @@ LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
 
 @dataclass(frozen=True)
-class TermEstimate:
-    """One number of a term: its value, and half of its 95 % interval (nan where nothing is known)."""
-
-    name: str
-    value: float
-    error: float
-    unit: str
-    about: str
-    symbol: str
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 %."""
-        return self.value - WIDE * self.error, self.value + WIDE * self.error
-
-
-@dataclass(frozen=True)
 class Acting:
-    """When a term acts in one event: the times of the record [s] between which it changes the power, and how much."""
+    """When a term acts in one event: the times of the record [s] between which it changes the load, and how much."""
 
     event: str
     start: float
@@ -60,7 +41,7 @@ class Proposal:
     """A term that held-out events confirm."""
 
     term: Term
-    estimates: tuple[TermEstimate, ...]
+    estimates: tuple[ParameterEstimate, ...]
     train: Before
     validate: Before
     p: float
@@ -72,7 +53,7 @@ class Proposal:
 
     @property
     def values(self) -> dict[str, float]:
-        return {k.name: k.value for k in self.estimates}
+        return {k.parameter.name: k.value for k in self.estimates}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +74,6 @@ def propose(
     `among` are the terms that are tried, by default the whole library.
     """
     context = base.context
-    if not context.domain.calibrated:
-        return Proposed(why="proposals are of phasors: what waveforms lack is told by where and what is left")
     if not validate:
         return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
     under = context_of_terms(context)
@@ -120,9 +99,7 @@ def _proposal(result: Fitted, first: Disagreement, standing: Sequence[Weighed], 
     chosen, *others = standing
     term, values = result.term(chosen.fit), result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)
-    declared = {s.name: (s.unit, f"size in {s.where or term.balance.words}", s.latex) for s in term.balance.sizes}
-    declared |= {s.name: (s.unit, s.about, s.latex) for s in term.signal.shapes}
-    estimates = tuple(TermEstimate(n, v, errors[n], *declared[n]) for n, v in values.items())
+    estimates = tuple(ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values))
     records = joined([e.record.name for e in result.context.events])
     alternatives = tied(result, chosen, others)
     return Proposal(
@@ -143,14 +120,14 @@ def _next_event(result: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
 
 
 def change(result: Fitted, fit: Refit) -> np.ndarray:
-    """What a term adds to the calculated power (C, N) [pu], all else as it was fitted with it."""
+    """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
     without = result.context.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))})
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 
 
 def _acting(result: Fitted, fit: Refit) -> list[Acting]:
-    """Where in each event a term changes the power by more than a tenth of the most it does."""
+    """Where in each event a term changes a channel by more than a tenth of the most it does."""
     context, added, terms = result.context, change(result, fit), []
     for e, event in enumerate(context.events):
         own = added[:, context.drive.part(e)]
@@ -192,7 +169,7 @@ def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
             _named(proposal.term)
             | {
                 "function_of_voltage": not proposal.term.exogenous,
-                "parameters": {k.name: _estimate(k) for k in proposal.estimates},
+                "parameters": {k.parameter.name: k.plain() for k in proposal.estimates},
             }
         ],
         "closed": {"train": proposal.train.closed, "validate": proposal.validate.closed},
@@ -210,7 +187,3 @@ def _named(term: Term) -> dict[str, object]:
     clock = term.clock and term.clock.name
     names = {"balance": term.balance.name, "signal": term.signal.name, "clock": clock}
     return {**names, "words": term.words, "latex": term.latex}
-
-
-def _estimate(estimate: TermEstimate) -> dict[str, Any]:
-    return files.plain({"value": estimate.value, "standard_error": estimate.error, "interval": estimate.interval})
