@@ -9,7 +9,6 @@ import re
 import subprocess
 import sys
 from concurrent.futures import Future
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
@@ -200,28 +199,6 @@ def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_functi
     made = differential_evolution(valley, bounds, updating="deferred", vectorized=True, **seeded, **settings)
     assert made.nit == count > 5
     assert np.array_equal(np.hstack(stepwise), np.hstack(points[: len(stepwise)]))
-
-
-SCIPY = """
-import contextlib, sys
-from tractexp.compat.scipy_import import light
-with light() if sys.argv[1:] else contextlib.nullcontext():
-    import numpy, scipy.linalg, scipy.optimize, scipy.special
-print(sum(name.startswith("numpy.f2py.") for name in sys.modules), "Array API" in scipy.special.gammaln.__doc__)
-assert "absolute value of the gamma function" in scipy.special.gammaln.__doc__
-assert numpy.f2py.__version__  # loaded when it is used
-"""
-
-
-@pytest.mark.skipif(version("scipy") < "1.15", reason="this SciPy writes no docstring anew")
-def test_scipy_loads_what_it_does_not_need_but_for_the_door():
-    plain, light = (
-        subprocess.run([sys.executable, "-c", SCIPY, *door], capture_output=True, text=True) for door in ([], ["door"])
-    )
-    assert light.returncode == 0, CHANGED.format("scipy_import", light.stderr)
-    modules, noted = plain.stdout.split()
-    assert (int(modules) > 10, noted) == (True, "True"), MENDED.format("SciPy's import", "scipy_import")
-    assert light.stdout.split() == ["0", "False"]
 
 
 def test_mlflow_lets_in_every_page_of_this_computer_but_for_the_door():

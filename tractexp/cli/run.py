@@ -8,7 +8,6 @@ from tractexp import credentials, provenance
 from tractexp.api.task import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
-from tractexp.compat import scipy_import
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build
 
@@ -74,5 +73,4 @@ def perform(job: Job) -> None:
     check(job.config)
     task = build("task", job.config["task"])
     refuse_unread(task, job.given, task.needless())
-    with scipy_import.light():
-        task.run(job)
+    task.run(job)
