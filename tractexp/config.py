@@ -1,5 +1,6 @@
 """The door through which plugins and schemas enter Hydra's groups."""
 
+import functools
 import hashlib
 from pathlib import Path
 from typing import Any
@@ -34,7 +35,7 @@ def register() -> None:
         for name, cls in classes.items():
             if cls.chosen:
                 where = f"schema/{group}" if _configured(group, name) else group
-                store.store(group=where, name=name, node=plugin.schema(cls))
+                hydra_config_store.store_later(where, name, functools.partial(plugin.schema, cls))
     store.store(group="hydra/sweeper", name="grid", node=GridConfig)
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)

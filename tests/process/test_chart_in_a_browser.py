@@ -1,12 +1,16 @@
 """Charts in a browser: drawn without a network, at every width, on paper; zoomed in and out."""
 
+import base64
+import hashlib
 import json
 import re
+import zlib
 
 import numpy as np
 import pytest
 from browser import BROWSER, Worked, drawn
 
+from tractexp import files
 from tractexp.blocks import Report, plotly
 from tractexp.blocks.block import Markup
 from tractexp.blocks.chart import Chart, script
@@ -52,15 +56,54 @@ def test_a_chart_is_drawn_by_the_parts_of_the_library_as_by_the_whole(tmp_path, 
     chart = Chart("t [s]", ["U", "P"]).line("U", x, x**2, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1).edge(0.2)
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE)
     page, drawings = Report("charts").charts([chart, bars], "two"), []
-    for code in (plotly.code(), plotly.library().read_text(encoding="utf-8")):
-        monkeypatch.setattr(plotly, "code", lambda code=code: code)
+    whole = plotly.library().read_text(encoding="utf-8")
+    for program in (plotly.program(), plotly.packed(whole), whole):
+        monkeypatch.setattr(plotly, "program", lambda program=program: program)
         script.cache_clear()
         dom, complaints = drawn(page, tmp_path)
         assert complaints == []
         drawings.append(re.findall(r' d="([^"]+)"', re.sub(r"(?s)<script>.*?</script>", "", dom)))
     script.cache_clear()
     assert len(drawings[0]) > 20
-    assert drawings[0] == drawings[1]
+    assert drawings[0] == drawings[1] == drawings[2]
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+@pytest.mark.parametrize("strategy", [zlib.Z_DEFAULT_STRATEGY, zlib.Z_FIXED, zlib.Z_HUFFMAN_ONLY])
+@pytest.mark.parametrize("level", [0, 1, 9])
+def test_a_browser_reads_what_deflate_has_packed_in_every_kind_of_block(tmp_path, strategy, level):
+    rng = np.random.default_rng(1)
+    text = "Ψ" + "".join(map(chr, rng.integers(32, 127, 70_000))) + "abc" * 30_000 + "x"
+    deflate = zlib.compressobj(level, wbits=-zlib.MAX_WBITS, strategy=strategy)
+    packed = base64.b64encode(deflate.compress(text.encode()) + deflate.flush()).decode()
+    program = f"""{files.packaged("blocks/inflate.js")}
+    const text = inflate("{packed}", {len(text.encode())});
+    crypto.subtle.digest("SHA-256", new TextEncoder().encode(text)).then(sum =>
+      document.getElementById("told").textContent =
+        [...new Uint8Array(sum)].map(byte => byte.toString(16).padStart(2, "0")).join(""));"""
+    dom, complaints = drawn(Worked(Report("empty"), program), tmp_path, "--virtual-time-budget=3000")
+    assert complaints == []
+    assert hashlib.sha256(text.encode()).hexdigest() in dom
+
+
+@pytest.mark.skipif(BROWSER is None, reason="no browser")
+def test_charts_are_drawn_in_the_frame_in_which_mlflow_shows_an_artifact(tmp_path):
+    """A frame that may run scripts and nothing else, of an origin of its own."""
+    chart = Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE)
+    tell = "parent.postMessage(document.querySelectorAll('.js-plotly-plot').length, '*')"
+    inside = Worked(Report("charts").charts([chart, chart], "two"), tell).save(tmp_path / "inside.html")
+    content = json.dumps(inside.read_text(encoding="utf-8")).replace("</", "<\\/")
+    outside = f"""
+    addEventListener("message", event => {{
+      document.getElementById("told").textContent = `${{event.data}} charts of ${{event.origin}}`; }});
+    const frame = document.createElement("iframe");
+    frame.sandbox = "allow-scripts";
+    frame.src = URL.createObjectURL(new Blob([{content}], {{type: "text/html"}}));
+    document.body.append(frame);"""
+    together = "--disable-features=IsolateSandboxedIframes"  # in one process, for which a headless browser waits
+    dom, complaints = drawn(Worked(Report("viewer"), outside), tmp_path, together, "--virtual-time-budget=5000")
+    assert complaints == []
+    assert "2 charts of null" in dom
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")

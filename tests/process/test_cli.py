@@ -64,6 +64,7 @@ def test_the_main_job_writes_the_contracted_result(main_job):
     assert {p.name for p in (folder / "run").iterdir()} == {
         ".hydra", "history.csv", "mlflow.json", "result.json", "report.html",
     }  # fmt: skip
+    assert (folder / "run" / "report.html").stat().st_size < 1e6
     rows = np.genfromtxt(folder / "run" / "history.csv", delimiter=",", names=True)
     assert rows["objective"][-1] == result["search"]["objective"]
     assert rows["simulations"][-1] == result["simulations"]
@@ -102,6 +103,9 @@ def test_the_main_job_is_logged_as_contracted(main_job):
     assert metrics["objective"] == result["objective"]
     assert metrics["search_objective"] == result["search"]["objective"]
     assert metrics["train_1_epsilon_p"] == result["epsilon_p"]
+    assert (
+        metrics["model_error_over_linear_network"] == result["linear_network"]["ratio"] == pytest.approx(0.25, abs=0.01)
+    )
     assert curves["fitness"] == 301
     assert 20 < curves["fitness_by_simulations"] < 301  # at steps that all runs share
     assert {tags[key] for key in ("optimizer", "data", "model", "seed")} == {

@@ -196,8 +196,8 @@ def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error
     state = viewed(uri, "TABLE")
     assert state["groupBy"] is None
     assert state["orderByKey"] == "metrics.`model_error`"
-    assert [column.split("`")[1] for column in state["selectedColumns"]][:4] == [
-        "model_error", "model_error_held_out", "epsilon_p", "epsilon_q",
+    assert [column.split("`")[1] for column in state["selectedColumns"]][:5] == [
+        "model_error", "model_error_held_out", "model_error_over_linear_network", "epsilon_p", "epsilon_q",
     ]  # fmt: skip
     assert "tags.`load`" in state["selectedColumns"]
 

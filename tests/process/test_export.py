@@ -199,6 +199,18 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
         ),
         ("andes", ("voltage", "exponential"), "cannot represent the motor 'voltage'"),
         ("psse_dyr", ("voltage", "zip"), "format 'psse_dyr' cannot represent the motor 'voltage'"),
+        (
+            "powerfactory",
+            ("double_cage", "zip"),
+            "cannot represent the motor 'double_cage': no open reader of DGS names the columns of a second cage; it"
+            " can represent electromechanical, none, stator_flux; task.format=andes, modelica or psse_dyr can represent"
+            " 'double_cage'",
+        ),
+        (
+            "powerfactory",
+            ("electromechanical", "zip", ("time_skew",)),
+            "cannot represent the effect 'time_skew'; it can represent stator_resistance",
+        ),
         ("psse_dyr", ("none", "exponential_frequency"), "cannot represent the static load 'exponential_frequency'"),
         (
             "andes",

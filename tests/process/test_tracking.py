@@ -1,8 +1,10 @@
 """What a run leaves in MLflow, read back through MLflow's own public client."""
 
+import importlib
 import json
 import logging
 import os
+import pickle
 import re
 import signal
 import socket
@@ -19,7 +21,7 @@ from command_line import free_port, run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
-from tractexp.tracking import TrackedRun, process
+from tractexp.tracking import TrackedRun, model, process
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
 from tractexp.tracking.store import sentences
@@ -355,6 +357,20 @@ def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_p
         tracking.prepare(f"sqlite:///{database}")
 
 
+def test_the_signature_of_the_model_is_what_mlflow_itself_writes(tmp_path, uri):
+    from mlflow.models import Model, ModelSignature
+    from mlflow.types import ColSpec, DataType, Schema
+
+    (tmp_path / "result.json").write_text("{}")
+    run_id = tracking.log(TrackedRun("e", "r", model=tmp_path / "result.json"), uri)
+    (logged,) = client(uri).search_logged_models([client(uri).get_run(run_id).info.experiment_id])
+    there = Path(logged.artifact_location.removeprefix("file://"))
+    columns = [ColSpec(DataType.double, name, required=name != "f") for name in "tUf"]
+    signature = ModelSignature(Schema(columns), Schema([ColSpec(DataType.double, name) for name in "PQ"]))
+    assert Model.load(str(there)).signature == signature
+    assert signature.to_dict() == model.SIGNATURE
+
+
 def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):
     number = client(uri).create_experiment("gone")
     client(uri).delete_experiment(number)
@@ -573,6 +589,28 @@ def test_to_start_the_process_imports_nothing_that_takes_time():
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_the_process_that_logs_imports_nothing_that_mlflow_does_without(uri):
+    program = (
+        "import sys; from tractexp.tracking import process;"
+        "process.log = lambda run, uri: [name for name, module in sys.modules.items() if module]; process.main()"
+    )
+    told = pickle.dumps(uri) + pickle.dumps(TrackedRun("e", "r"))
+    done = subprocess.run([sys.executable, "-c", program], input=told, capture_output=True)
+    modules, problem = pickle.loads(done.stdout)
+    assert not problem
+    assert {"mlflow.models", "mlflow.store.tracking.sqlalchemy_store"} <= {*modules}
+    assert not {name.partition(".")[0] for name in modules} & {*process.OPTIONAL}
+
+
+def test_a_package_is_absent_within_and_there_again_afterwards(monkeypatch):
+    monkeypatch.delitem(sys.modules, "colorsys", raising=False)
+    with process.absent(["colorsys", "pickle"]):
+        with pytest.raises(ImportError):
+            importlib.import_module("colorsys")
+        assert importlib.import_module("pickle") is pickle  # it was there before
+    assert importlib.import_module("colorsys").rgb_to_hsv
 
 
 def test_a_second_process_passes_its_sentence_on(tmp_path):

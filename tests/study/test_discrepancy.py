@@ -5,6 +5,7 @@ other here, so that the tests stay short. The study over the whole catalogue is 
 """
 
 import json
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -15,6 +16,7 @@ from command_line import run_command
 from scipy.special import chdtrc
 
 from hidden_effects import Case, Noise, Recorder, make, write
+from tractexp import store
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.catalogue import catalogue
@@ -95,6 +97,21 @@ def test_stays_silent_when_nothing_is_missing(silent):
     assert silent.names == ()
     assert silent.places == ()
     assert silent.train.after.chi2_per_sample == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_batch_of_descents_says_how_many_have_ended(monkeypatch):
+    @contextmanager
+    def parts(total):
+        counted.append(total)
+        yield lambda: counted.append("ended")
+
+    counted = []
+    fit = base_fit(bench(base(), events(noise=LOUD)))
+    monkeypatch.setattr(fit.context.effort, "parts", parts)
+    starts = [((name,), fit.fit.unit) for name in FEW]
+    monkeypatch.setattr(store.DESCENTS, "read", lambda key: None)  # what was fitted before is read back at once
+    refit(fit.context, fit.noise, starts)
+    assert counted == [3, "ended", "ended", "ended"]
 
 
 @pytest.mark.parametrize("effect", ["speed_dependent_torque", "undervoltage_trip"])

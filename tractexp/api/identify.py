@@ -479,6 +479,8 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
     metrics["model_error"] = result.model_error["value"]
     if result.model_error["held_out"]:
         metrics["model_error_held_out"] = result.model_error["held_out"]["value"]
+    if (ratio := result.linear_network.get("ratio")) is not None:
+        metrics["model_error_over_linear_network"] = ratio
     for k, event in enumerate(result.events, start=1):
         metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
     if "epsilon_i" in result.epsilons:

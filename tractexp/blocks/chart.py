@@ -26,6 +26,7 @@ SETTINGS = {
     "modeBarButtonsToRemove": ["select2d", "lasso2d", "autoScale2d"],
     "toImageButtonOptions": {"format": "svg"},
 }
+LICENSE = "// plotly.js, copyright Plotly, Inc., MIT license"
 PAPER = 680  # pixels, the width of a printed page
 PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its entries without the name, a letter
 GAP = 0.045  # of the height, between panels
@@ -40,7 +41,8 @@ HELD = 32767  # the greatest of 16 bits; the least stands for a gap
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = files.packaged("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
-    return f"{plotly.code()}\n{drawing.replace('PAPER', str(PAPER)).replace('SHOWN', str(SHOWN))}"
+    drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
+    return "\n".join([files.packaged("blocks/inflate.js"), LICENSE, plotly.program(), drawing])
 
 
 class Chart:

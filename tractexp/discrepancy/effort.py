@@ -78,7 +78,7 @@ class Effort:
             while not ended.wait(SILENCE / 4):
                 now = time.perf_counter()
                 if now - self._said >= SILENCE:
-                    far = [str(part) for part in self._parts[:1]]  # the outermost: the parts of parts come and go
+                    far = [str(part) for part in self._parts if part.total > 1][:1]  # parts of parts come and go
                     far += [f"{self.total} simulations"] * (self.total > counted)
                     self._said, counted = now, self.total
                     self._tell(": ".join([f"  still {self._step or 'at work'}", *[", ".join(far)] * bool(far)]))

@@ -225,7 +225,9 @@ def _descended(
 
     def descended() -> tuple[np.ndarray, ...]:
         begin = np.take_along_axis(starts, table, axis=1)
-        done = descend(rows, begin, table == at.dimension, *effort, context.apart(len(prior)))
+        apart = context.apart(len(prior))
+        with context.effort.parts(len(wanted)) as ended:
+            done = descend(rows, begin, table == at.dimension, *effort, apart, ended=ended)
         return done.unit, done.deviance, np.array(spent)
 
     wants = [(tuple(names), unit) for names, unit in wanted]

@@ -8,14 +8,15 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from tractexp.errors import UserError
+from tractexp.errors import TASK, UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.identification.result import Result, parts
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
-from tractexp.plugin import Plugin
+from tractexp.plugin import Plugin, discover
 from tractexp.record.identity import label
 from tractexp.record.own_base import scaled
+from tractexp.wording import joined
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +118,7 @@ class Format(Plugin):
     motors: ClassVar[Collection[str] | None] = None  # names it can represent; None: any
     statics: ClassVar[Collection[str] | None] = None
     effects: ClassVar[Collection[str] | None] = None
+    lacks: ClassVar[Mapping[str, str]] = {}  # {name of a part it cannot represent: why, where that is not plain}
 
     @abstractmethod
     def text(self, load: Identified) -> str:
@@ -144,15 +146,34 @@ class Format(Plugin):
         return None
 
     def check_parts(self, load: Identified) -> None:
-        """Raise `UserError` for a part of the model that this format cannot represent."""
+        """Raise `UserError` for a part of the model that this format cannot represent, with those that can."""
         model = load.result.model
-        chosen = [
-            ("motor", [model["motor"]["name"]], self.motors),
-            ("static load", [model["static"]["name"]], self.statics),
-        ]
-        chosen.append(("effect", [effect.name for effect in load.model.effects], self.effects))
-        for kind, names, can in chosen:
+        chosen = {
+            "motor": [model["motor"]["name"]],
+            "static load": [model["static"]["name"]],
+            "effect": [effect.name for effect in load.model.effects],
+        }
+        for kind, names in chosen.items():
             for name in names:
-                if can is not None and name not in can:
-                    offer = f"it can represent {', '.join(sorted(can))}" if can else "it can represent none"
-                    raise UserError(f"format '{self.name}' cannot represent the {kind} '{name}'; {offer}")
+                if not self.represents(kind, name):
+                    whole = f"format '{self.name}' cannot represent the {kind} '{name}'"
+                    raise UserError(whole + self._instead(kind, name))
+
+    @classmethod
+    def represents(cls, kind: str, name: str) -> bool:
+        """Whether this format can represent a part of the model: a "motor", a "static load" or an "effect"."""
+        names = cls._represented(kind)
+        return names is None or name in names
+
+    @classmethod
+    def _represented(cls, kind: str) -> Collection[str] | None:
+        return {"motor": cls.motors, "static load": cls.statics, "effect": cls.effects}[kind]
+
+    def _instead(self, kind: str, name: str) -> str:
+        """The end of a refusal: why a part cannot be represented, where that is said, what can be, and by which format
+        the part itself can be."""
+        why = f": {self.lacks[name]}" if name in self.lacks else ""
+        formats: Mapping[str, Any] = discover()[self.group] if kind != "effect" else {}  # which refuse some yet
+        others = joined([other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or")
+        by = f"; {TASK.format}={others} can represent '{name}'" if others else ""
+        return f"{why}; it can represent {', '.join(sorted(self._represented(kind) or ['none']))}{by}"

@@ -42,7 +42,10 @@ class SeparableColumns:
 
 def _alone(size: int, apart: Sequence[SeparableColumns]) -> np.ndarray:
     """Which of so many coordinates are in none of the groups."""
-    return np.setdiff1d(np.arange(size), np.concatenate([np.empty(0, dtype=int), *(g.coordinates for g in apart)]))
+    alone = np.ones(size, dtype=bool)
+    for group in apart:
+        alone[group.coordinates] = False
+    return np.flatnonzero(alone)
 
 
 def forward_differences(
@@ -148,6 +151,7 @@ def descend(
     apart: Sequence[SeparableColumns] = (),
     *,
     central: bool = False,
+    ended: Callable[[], None] = lambda: None,
 ) -> Descent:
     """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
 
@@ -156,7 +160,8 @@ def descend(
     box rests for that step. Source: Marquardt 1963, with several dampings per step.
 
     Forward differences are enough for an estimate, whose standard errors are far wider than what they truncate. The
-    minimum itself, to more than four digits, takes `central` ones.
+    minimum itself, to more than four digits, takes `central` ones. `ended` is called at the end of each lane that comes
+    to one.
 
     Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
@@ -189,7 +194,10 @@ def descend(
         deviance[won] = outcome[pick, best][better]
         damping[lanes] = np.clip(np.where(better, tried[pick, best], tried[:, -1] * 10), LEAST_DAMPING, MOST_DAMPING)
         hopeless = ~better & (damping[lanes] >= MOST_DAMPING)
-        active[lanes] = ~((better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance)))
+        done = (better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance))
+        active[lanes] = ~done
+        for _ in lanes[done]:
+            ended()
     return Descent(unit, deviance, spent)
 
 

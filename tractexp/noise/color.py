@@ -46,7 +46,7 @@ class Autoregression:
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
         """
         if self.white:
-            return np.where(valid, rows, 0.0) / self.deviation[0]
+            return (rows if valid.all() else np.where(valid, rows, 0.0)) / self.deviation[0]
         history = np.minimum(_run_lengths(valid), self.order)
         white = np.zeros_like(rows)
         for k in range(self.order + 1):

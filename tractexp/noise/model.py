@@ -81,13 +81,14 @@ class Noise:
     def whiten(self, residuals: np.ndarray, drive: Drive, valid: np.ndarray) -> np.ndarray:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C, N) are 0."""
         valid = self._together(valid, drive)
-        rows = np.empty_like(residuals)
+        events = []
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
             for e in range(drive.events):
                 part = drive.part(e)
                 white = self._fast(mixed[:, :, part], valid[:, part], e)
-                rows[:, :, part] = self._without_shapes(white, valid[:, part], part, e)
+                events.append(self._without_shapes(white, valid[:, part], part, e))
+        rows = events[0] if len(events) == 1 else np.concatenate(events, axis=2)
         return rows.reshape(len(rows), -1)
 
     def prepare(self, drive: Drive, valid: np.ndarray) -> None:
@@ -172,12 +173,13 @@ class Noise:
 
     def _fast(self, mixed: np.ndarray, valid: np.ndarray, event: int) -> np.ndarray:
         """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
-        pair, rows = self.pair(event), []
+        pair, rows, alone = self.pair(event), np.empty(mixed.shape), 0
         if self.vector:
             white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], valid[0])
-            rows = [np.real(white), np.imag(white)]
-        rows += [channel.whiten(mixed[:, c], valid[c]) for c, channel in enumerate(pair) if c >= len(rows)]
-        return np.stack(rows, axis=1)
+            rows[:, 0], rows[:, 1], alone = np.real(white), np.imag(white), 2
+        for c, channel in enumerate(pair[alone:], alone):
+            rows[:, c] = channel.whiten(mixed[:, c], valid[c])
+        return rows
 
     def _without_shapes(self, white: np.ndarray, valid: np.ndarray, part: slice, event: int) -> np.ndarray:
         """Whitened rows (n, C, samples) of an event without the excess variance of its shapes.

@@ -97,10 +97,11 @@ def _missed(before: Before, e: int) -> Chart:
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
     more = before.with_it.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
-    chart = Chart(f"t [s], {event.record.name}", [f"{c} [pu]" for c in bench.drive.names])
-    for c in range(len(base)):
-        chart.line("measured less base model", t, missed[c], MISSED, c, width=1.0)
-        chart.line("with the term less base model", t, more[c], TERM, c)
+    measured = [c for c in range(len(base)) if bench.valid[c, part].any()]  # a delta winding has no zero sequence
+    chart = Chart(f"t [s], {event.record.name}", [f"{bench.drive.names[c]} [pu]" for c in measured])
+    for row, c in enumerate(measured):
+        chart.line("measured less base model", t, missed[c], MISSED, row, width=1.0)
+        chart.line("with the term less base model", t, more[c], TERM, row)
     return chart
 
 

@@ -3,6 +3,7 @@
 What is stored is the result file, the name of this module and the versions it needs: data, no pickled code.
 """
 
+import json
 import sys
 import tempfile
 from importlib.metadata import entry_points
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.tracking.store import light_import
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,19 +19,19 @@ if TYPE_CHECKING:
 RESULT = "result.json"
 
 
-def import_pyfunc() -> None:
-    """Import what a model is logged with."""
-    with light_import():
-        import mlflow.models
-        import mlflow.pyfunc
-        import mlflow.types  # noqa: F401
+def _columns(*names: str, optional: str = "") -> str:
+    """Columns of numbers as MLflow's format of models lists them."""
+    return json.dumps([{"type": "double", "name": name, "required": name != optional} for name in names])
+
+
+SIGNATURE = {"inputs": _columns("t", "U", "f", optional="f"), "outputs": _columns("P", "Q"), "params": None}
 
 
 def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> str:
     """Log the model of the file `result` under a run, with an open `MlflowClient`, and return the model id.
 
-    `mlflow.pyfunc.log_model` is not used: it lists every file of every installed package (0.4 s) to find
-    requirements that this module has at hand.
+    `mlflow.pyfunc.log_model` is not used: it imports pandas, and lists every file of every installed package (0.4 s)
+    to find requirements that this module has at hand.
     """
     from mlflow.entities import LoggedModelOutput
 
@@ -47,28 +47,22 @@ def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> st
 
 def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
     """Write the folder MLflow calls a model: its description, the data, and the environment it needs."""
-    import_pyfunc()
-    import mlflow.pyfunc
-    from mlflow.models import Model, ModelSignature
-    from mlflow.types import ColSpec, DataType, Schema
-
-    def schema(names: str, optional: str = "") -> Schema:
-        return Schema([ColSpec(DataType.double, name, required=name not in optional) for name in names + optional])
+    import mlflow
+    import yaml
+    from mlflow.models import Model
 
     model = Model(
-        artifact_path=logged.artifact_location,
-        run_id=run_id,
-        model_id=logged.model_id,
-        model_uuid=logged.model_id,
-        signature=ModelSignature(schema("tU", optional="f"), schema("PQ")),
+        artifact_path=logged.artifact_location, run_id=run_id, model_id=logged.model_id, model_uuid=logged.model_id
     )
+    python = ".".join(map(str, sys.version_info[:3]))
     environment = "python_env.yaml"
-    mlflow.pyfunc.add_to_model(model, loader_module=__name__, data=RESULT, python_env=environment)
-    files.write(folder / "MLmodel", model.to_yaml())
+    model.add_flavor(
+        "python_function", loader_module=__name__, python_version=python, data=RESULT, env={"virtualenv": environment}
+    )
+    files.write(folder / "MLmodel", yaml.safe_dump(model.to_dict() | {"signature": SIGNATURE}))
     files.copy(result, folder / RESULT)
     packages = {f"{p.dist.name}=={p.dist.version}" for p in entry_points(group="tractexp.plugins") if p.dist}
     files.write(folder / "requirements.txt", "\n".join([f"mlflow=={mlflow.__version__}", *sorted(packages)]))
-    python = ".".join(map(str, sys.version_info[:3]))
     files.write(folder / environment, f"python: {python}\ndependencies:\n- -r requirements.txt\n")
 
 

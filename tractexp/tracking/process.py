@@ -13,14 +13,15 @@ import pickle
 import signal
 import subprocess
 import sys
+from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.tracking.model import import_pyfunc
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, prepare
 
+OPTIONAL = ("pandas", "polars", "pyarrow", "scipy", "IPython", "pygments")  # what MLflow imports and logs without
 _ahead: "list[Logger]" = []
 
 
@@ -101,6 +102,18 @@ class Logger:
         self.close()
 
 
+@contextlib.contextmanager
+def absent(names: Iterable[str]) -> Iterator[None]:
+    """Let imports of these packages fail as where they are not installed; what was imported before stays."""
+    modules: dict[str, Any] = dict.fromkeys(name for name in names if name not in sys.modules)
+    sys.modules.update(modules)  # None in the place of a module refuses its import
+    try:
+        yield
+    finally:
+        for name in modules:
+            del sys.modules[name]
+
+
 def main() -> None:
     """Get ready, wait for an address and a run on standard input, log the run, answer on standard output.
 
@@ -108,11 +121,11 @@ def main() -> None:
     finishes the run that it has.
     """
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
-    import_mlflow()
     run_id = problem = ""
     try:
-        prepare(uri := pickle.load(sys.stdin.buffer))
-        import_pyfunc()
+        with absent(OPTIONAL):
+            import_mlflow()
+            prepare(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except (EOFError, pickle.UnpicklingError):
         os._exit(0)  # nothing to log, and perhaps nobody listens

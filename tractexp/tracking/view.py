@@ -18,6 +18,7 @@ TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
 LOAD = "load"  # a tag of runs on the records of a station: these are compared load by load, not by optimizer
+ERRORS = ("model_error", "model_error_held_out", "model_error_over_linear_network")  # the first columns
 GROUPS = ("variant", "optimizer")  # tags to group by: early runs have only the second
 STATE = {
     "searchFilter": RUNS,
@@ -62,8 +63,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
     bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
     section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
     columns = (
-        "model_error", "model_error_held_out", "objective", "epsilon_p", "epsilon_q", "search_objective",
-        "search_simulations",
+        *ERRORS, "objective", "epsilon_p", "epsilon_q", "search_objective", "search_simulations",
     )  # fmt: skip
     return STATE | {
         "groupBy": {
@@ -78,7 +78,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
 
 def _of_loads() -> dict[str, Any]:
     """The table of a station's runs, the best model of each load first to be found: columns that sort."""
-    metrics = ("model_error", "model_error_held_out", "epsilon_p", "epsilon_q", "epsilon_i", "objective")
+    metrics = (*ERRORS, "epsilon_p", "epsilon_q", "epsilon_i", "objective")
     tags = (LOAD, "model", "optimizer", "seed")
     return {
         "groupBy": None, "useGroupedValuesInCharts": False, "compareRunsMode": "TABLE",
