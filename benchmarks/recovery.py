@@ -133,13 +133,17 @@ CASES = (
 )  # fmt: skip
 
 
-def recovered(case: Case) -> dict[str, float]:
-    """The relative error of each parameter, or ratio of two, that a case says is recovered."""
+def identified(case: Case) -> dict[str, float]:
+    """The values that come back from the records of a case, in the base of its truth."""
     model = tractexp.compose(**case.model, bounds=dict(case.bounds))
     fit = tractexp.identify(
         case.records(), model, optimizer="multistart_least_squares", seed=1, check_intervals=False, progress=False
     )
-    values = {name: estimate.value for name, estimate in fit.on_given_base.items()}
+    return {name: estimate.value for name, estimate in fit.on_given_base.items()}
+
+
+def errors(case: Case, values: Mapping[str, float]) -> dict[str, float]:
+    """The relative error of each parameter, or ratio of two, that a case says is recovered."""
     return {name: abs(ratio(values, name) / ratio(case.truth, name) - 1) for name in case.within}
 
 
@@ -160,7 +164,7 @@ def main() -> None:
         if case.interpreter is None:
             print(f"     {case.simulator} is not installed")
             continue
-        for name, error in recovered(case).items():
+        for name, error in errors(case, identified(case)).items():
             print(f"     {name:<12} off by {error:.1e}, within {case.within[name]:.0e}")
 
 

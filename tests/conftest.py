@@ -9,12 +9,12 @@ import pytest
 import tractexp  # before NumPy: it keeps BLAS to one thread, as every command does
 
 LONG = (
-    "process/test_tutorial.py", "study/test_families.py", "process/test_sweep.py", "study/test_discrepancy.py",
-    "study/test_orders.py", "study/test_proposals.py", "process/test_commands.py", "process/test_hostile.py",
-    "study/test_prediction.py", "study/test_recorder_window.py", "process/test_tracking.py", "study/test_docs_run.py",
-    "process/test_compare_tracking.py", "process/test_survey.py", "process/test_ten_minutes.py",
-    "study/test_waves_evidence.py", "process/test_lost.py", "study/test_discrepancy_page.py", "study/test_recovery.py",
-    "oracle/test_hidden_effects_generator.py", "study/test_faults.py", "study/test_paper.py",
+    "process/test_tutorial.py", "study/test_families.py", "process/test_sweep.py", "study/test_recovery.py",
+    "study/test_discrepancy.py", "study/test_prediction.py", "study/test_docs_run.py", "process/test_ten_minutes.py",
+    "study/test_proposals.py", "process/test_tracking.py", "process/test_hostile.py", "study/test_paper.py",
+    "study/test_orders.py", "process/test_commands.py", "process/test_compare_tracking.py", "process/test_signals.py",
+    "process/test_survey.py", "process/test_lost.py", "study/test_waves_evidence.py", "study/test_discrepancy_page.py",
+    "oracle/test_hidden_effects_generator.py", "study/test_recorder_window.py", "study/test_faults.py",
     "model/test_uncertainty.py", "process/test_cli.py", "process/test_export.py",
 )  # fmt: skip
 MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}

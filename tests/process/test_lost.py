@@ -417,7 +417,7 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
 
 @pytest.mark.skipif(os.name == "nt", reason="ends a run by a signal")
 @pytest.mark.parametrize(("way", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
-def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_path):
+def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_path, uri):
     command = [sys.executable, "-m", "tractexp", "optimizer=pso", "optimizer.iterations=10000000", "hydra.run.dir=run"]
     job = subprocess.Popen(
         command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

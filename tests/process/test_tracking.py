@@ -154,13 +154,13 @@ run = tracking.TrackedRun("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
 tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     jobs = [
         subprocess.Popen([sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True)
-        for i in range(4)
+        for i in range(2)
     ]
     said = [job.communicate(timeout=120) for job in jobs]
-    assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [(0, "", "")] * 4
+    assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [(0, "", "")] * 2
     uri = tracking.default_uri(tmp_path)
     runs = client(uri).search_runs([client(uri).get_experiment_by_name("sweep").experiment_id])
-    assert sorted(run.info.run_name for run in runs) == [f"job-{i}" for i in range(4)]
+    assert sorted(run.info.run_name for run in runs) == [f"job-{i}" for i in range(2)]
     assert sorted(p.name for p in (tmp_path / "outputs").iterdir()) == ["mlflow.db", "mlflow.db.lock"]
 
 

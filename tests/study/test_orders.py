@@ -8,6 +8,7 @@ import pytest
 from command_line import run_command
 from test_shipped_data import DATA
 
+import tractexp
 from tractexp.choices import set_holding
 from tractexp.discrepancy.investigate import investigate
 from tractexp.model.drive import Drive, Excitation
@@ -176,11 +177,16 @@ def test_what_it_does_comes_from_another_simulator_s_law():
     assert not set(effect) & {p.name for p in get("effect", effect["name"])().parameters}
 
 
-@pytest.mark.parametrize("stated", [[], ["data.estimator=one_cycle"]], ids=["window searched", "window stated"])
-def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(stated, tmp_path):
+def test_a_table_says_the_window_that_is_stated_of_it():
+    """An investigation then tries no other (test_recorder_window)."""
+    [event] = tractexp.read("tibet_50pct", estimator="one_cycle")
+    assert (event.record.window.name, event.record.window.length) == ("one_cycle", pytest.approx(0.02))
+
+
+def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(tmp_path):
     only = "task.effects=[stator_transients,stator_resistance,dc_link_lag]"
     done = run_command(
-        "data=tibet", "task=discrepancy", only, *stated, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+        "data=tibet", "task=discrepancy", only, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
     )
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())

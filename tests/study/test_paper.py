@@ -28,9 +28,13 @@ EXPERIMENTS = [
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    """All parts with one seed and few simulations: (folder, what was printed)."""
+    """All parts with one seed, few simulations and few random points: (folder, what was printed)."""
     folder = tmp_path_factory.mktemp("paper")
-    done = run_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("tractexp.studies.paper.study.RANDOM", 30)
+        patch.setattr("tractexp.studies.paper.figure_sections.RANDOM", 30)
+        patch.setattr("tractexp.studies.paper.orders.REPEATS", 5)
+        done = run_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 

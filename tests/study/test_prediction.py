@@ -133,7 +133,7 @@ def dips(depths=(0.5, 0.35, 0.6)):
 @pytest.fixture(scope="module")
 def investigation():
     """A trip of a quarter of the load, and beside it a swing of 1 % that no effect has, fifty times the noise."""
-    only = ("undervoltage_trip", "stator_resistance", "exponential_recovery", "dc_link_lag")
+    only = ("undervoltage_trip", "stator_resistance", "dc_link_lag")
     events = dips()
     return tractexp.investigate(events[:2], validate=events[2:], effects=only, progress=False)
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_discrepancy import LOUD, base, bench, events
+from test_discrepancy import FAST, LOUD, base, bench, events
 
 from tractexp.discrepancy import fitting
 from tractexp.discrepancy.base_fit import base_fit
@@ -15,7 +15,7 @@ TRIP = ("undervoltage_trip",)
 @pytest.fixture(scope="module")
 def planted():
     """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's grid."""
-    at = bench(base(), events("undervoltage_trip", 0.5, 800012, noise=LOUD), TRIP)
+    at = bench(base(), events("undervoltage_trip", 0.5, 800012, noise=LOUD, recorder=FAST), TRIP)
     first = disagreement(base_fit(at), 0)
     settings = at.catalogue["undervoltage_trip"].settings
     units = np.array([at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings])

@@ -12,7 +12,7 @@ import pytest
 from nasty import NASTY
 
 import tractexp
-from hidden_effects import EFFECTS, Case, Noise, make
+from hidden_effects import EFFECTS, Case, Noise, Recorder, make
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.context import Context
@@ -35,6 +35,8 @@ from tractexp.record import Record, detect
 
 pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
+SLOW, FAST = Recorder(rate=250.0, samples=500), Recorder()
+
 STEP, TRIP = "timed:power:step:of_return", "answer:static:relay"
 FEW = tuple(
     term(n)
@@ -47,8 +49,8 @@ def base(*effects):
     return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(), effects)
 
 
-def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003):
-    records = make(Case(effect, size, events=count, noise=Noise(noise)), seed)
+def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003, recorder=SLOW):
+    records = make(Case(effect, size, events=count, noise=Noise(noise), recorder=recorder), seed)
     return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
 
 
@@ -69,7 +71,7 @@ def searched(made, held, among=FEW, seed=0):
 
 @pytest.fixture(scope="module")
 def ground():
-    fit = fitted_base(events(count=2))
+    fit = fitted_base(events(count=2, recorder=FAST))
     bench = context_of_terms(fit.context)
     return Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
 
@@ -197,7 +199,7 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
 def test_what_a_right_term_closes_does_not_hang_on_the_level_of_the_noise(seed, measured):
     """Of the deviance in excess of the noise, `measured` on the held-out event, the same step closes too little once,
     and once four times what there is."""
-    made = events("load_step", 0.2, seed=seed)
+    made = events("load_step", 0.2, seed=seed, recorder=FAST)
     found = searched(made[:2], made[2:])
     held = found.proposal.validate
     gained = held.without.deviance - held.with_it.deviance
@@ -206,9 +208,8 @@ def test_what_a_right_term_closes_does_not_hang_on_the_level_of_the_noise(seed, 
     assert found.proposal.term.name == STEP
 
 
-@pytest.mark.parametrize("seed", [800003, 800004])
-def test_nothing_is_proposed_where_nothing_is_missing(seed):
-    made = events(seed=seed, count=3)
+def test_nothing_is_proposed_where_nothing_is_missing():
+    made = events(seed=800003, count=3)
     found = searched(made[:2], made[2:])
     assert found.proposal is None
     assert found.why

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from test_discrepancy import base, events
+from test_discrepancy import FAST, base, events
 
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
@@ -41,7 +41,7 @@ def test_a_straight_line_is_its_own_average():
 
 @pytest.mark.parametrize("cycles", [1, 2, 4])
 def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
-    (event,) = events(count=1)
+    (event,) = events(count=1, recorder=FAST)
     step, window = event.record.step, 0.02 * cycles
     shown = replace(event, record=replace(event.record, U=mean(event.record.U, window / step)))
     back = RecorderWindow(window).sharpened(shown).record.U

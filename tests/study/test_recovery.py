@@ -1,6 +1,7 @@
 """Parameters that others' simulators were run with come back from their records (table: benchmarks/recovery.py)."""
 
 from dataclasses import replace
+from functools import cache
 
 import motulator_check
 import pytest
@@ -13,10 +14,16 @@ def skip_without(simulator):
         pytest.skip(f"{simulator} is not installed; install the extra 'crosscheck' or name a Python in {variable}")
 
 
+@cache
+def identified(number):
+    """The values of a case, searched once for all tests."""
+    return recovery.identified(recovery.CASES[number - 1])
+
+
 @pytest.mark.parametrize("case", recovery.CASES, ids=lambda case: f"{case.number:04d}")
 def test_the_parameters_of_a_case_are_recovered(case):
     skip_without(case.simulator)
-    errors = recovery.recovered(case)
+    errors = recovery.errors(case, identified(case.number))
     assert {name: error for name, error in errors.items() if not error <= case.within[name]} == {}
 
 
@@ -29,7 +36,8 @@ def test_cases_are_numbered_and_ask_for_what_their_loads_have():
 def test_a_truth_off_by_a_thousandth_is_not_recovered():
     (case,) = [case for case in recovery.CASES if case.simulator == "motulator"]
     skip_without("motulator")
-    errors = recovery.recovered(replace(case, truth={**case.truth, "M": 1.001 * case.truth["M"]}))
+    off = replace(case, truth={**case.truth, "M": 1.001 * case.truth["M"]})
+    errors = recovery.errors(off, identified(case.number))
     assert [name for name, error in errors.items() if error > case.within[name]] == ["M"]
 
 

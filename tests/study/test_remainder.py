@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from test_discrepancy import events
+from test_discrepancy import FAST, events
 
 from tractexp.discrepancy.remainder import MOST, remainders
 from tractexp.noise import Autoregression, Noise
@@ -12,7 +12,7 @@ LEVEL = 0.002
 
 @pytest.fixture(scope="module")
 def made():
-    return events(count=2)
+    return events(count=2, recorder=FAST)
 
 
 def noise_of(made, seed=0):

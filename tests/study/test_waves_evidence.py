@@ -177,24 +177,19 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
 
 
 @pytest.fixture(scope="module")
-def fits():
-    made = []
-    for seed in (3, 5):
-        case, events = waves.drawn_events([1, seed])
-        made.append((case, study.identified(events[0])))
-    return made
+def row():
+    case, events = waves.drawn_events([1, 3])
+    return study.judged(study.identified(events[0]), case.site.truth())
 
 
-def test_parameters_lie_within_their_intervals_and_the_model_is_adequate(fits):
-    rows = [study.judged(fit, case.site.truth()) for case, fit in fits]
-    inside = [inside for row in rows for inside in row["inside"].values()]
-    assert sum(inside) >= len(inside) - 1
-    for row in rows:
-        assert row["grade"] == "adequate"
-        assert row["p"] > 0.01
-        assert max(abs(z) for z in row["z"].values()) < 3.5
-        assert row["epsilon_i"] < 0.01
-        assert abs(row["off"]["X_prime"]) < 0.02
+def test_parameters_lie_within_their_intervals_and_the_model_is_adequate(row):
+    """How many of many loads do stands in benchmarks/waves.json."""
+    assert all(row["inside"].values())
+    assert row["grade"] == "adequate"
+    assert row["p"] > 0.01
+    assert max(abs(z) for z in row["z"].values()) < 3.5
+    assert row["epsilon_i"] < 0.01
+    assert abs(row["off"]["X_prime"]) < 0.02
 
 
 def test_without_noise_little_but_interpolation_is_left():
