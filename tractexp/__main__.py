@@ -1,6 +1,5 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
-import contextlib
 import gc
 import importlib
 import os
@@ -119,16 +118,6 @@ def terminated(*_: object) -> None:
     raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
 
 
-def asks_for_one_job(arguments: Sequence[str]) -> bool:
-    """Whether nothing that is chosen can set `hydra.mode`: neither an option, nor an experiment, nor a setting of
-    Hydra's own but the folder, nor the configuration of another package."""
-    from tractexp.choices import configuration_folders
-
-    keys = [argument.lstrip("+~").partition("=")[0] for argument in arguments]
-    others = [key for key in keys if key.startswith(("-", "experiment", "hydra")) and key != "hydra.run.dir"]
-    return not others and not configuration_folders()
-
-
 def _run(arguments: list[str]) -> int:
     signal.signal(signal.SIGTERM, terminated)
     if not any(argument.startswith(UNLOGGED) for argument in arguments):
@@ -138,7 +127,6 @@ def _run(arguments: list[str]) -> int:
     import hydra
 
     from tractexp.choices import CONF
-    from tractexp.compat import hydra_mode
     from tractexp.config import register
     from tractexp.overrides import overrides
     from tractexp.provenance import started
@@ -165,7 +153,7 @@ def _run(arguments: list[str]) -> int:
         except Exception as error:  # raised again below, beyond what Hydra would print about it
             ended.append(error)
 
-    with explained(), hydra_mode.one_job() if asks_for_one_job(arguments) else contextlib.nullcontext():
+    with explained():
         job()
     for error in ended:
         raise error

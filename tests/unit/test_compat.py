@@ -2,22 +2,16 @@
 
 import ast
 import asyncio
-import contextlib
 import copy
 import inspect
-import re
 import sys
 from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
-from command_line import run_command
 
 import tractexp
-from tractexp import choices
-from tractexp.__main__ import asks_for_one_job
-from tractexp.choices import CONF
-from tractexp.compat import hydra_config_store, hydra_mode, hydra_plugins
+from tractexp.compat import hydra_config_store, hydra_plugins
 from tractexp.compat.scipy_differential_evolution import generations
 
 HERE = Path(tractexp.__file__).parent
@@ -131,50 +125,6 @@ def test_hydra_makes_every_schema_at_once_and_the_door_makes_one_when_it_is_read
     assert nodes[0].node._metadata.object_type is nodes[2].node._metadata.object_type is Settings
     assert (nodes[0].group, nodes[0].name) == ("compat_test", "eager.yaml")
     assert (nodes[2].group, nodes[2].name) == ("compat_test", "later.yaml")
-
-
-def test_hydra_composes_a_configuration_twice_but_for_the_door(monkeypatch, tmp_path):
-    from hydra._internal.hydra import Hydra
-
-    def composing(*arguments, **settings):
-        composed.append(settings.get("config_name"))
-        return compose(*arguments, **settings)
-
-    composed, compose, door = [], Hydra.compose_config, hydra_mode.one_job
-    monkeypatch.setattr(Hydra, "compose_config", composing)
-    monkeypatch.setattr(hydra_mode, "one_job", contextlib.nullcontext)
-    assert run_command("optimizer=pso,ssa", cwd=tmp_path).returncode == 2  # a sweep, which needs -m
-    assert len(composed) == 2, MENDED.format("Hydra", "hydra_mode")
-    monkeypatch.setattr(hydra_mode, "one_job", door)
-    assert "Multiple values" not in run_command("optimizer=pso,ssa", cwd=tmp_path).stdout
-    assert len(composed) == 3, CHANGED.format("hydra_mode", "Hydra asks elsewhere for its mode")
-
-
-@pytest.mark.parametrize(
-    ("arguments", "one"),
-    [
-        ([], True),
-        (["optimizer=pso", "hydra.run.dir=there", "seed=3"], True),
-        (["-m", "seed=1,2"], False),
-        (["hydra.mode=MULTIRUN", "seed=1,2"], False),
-        (["++hydra.mode=MULTIRUN"], False),
-        (["experiment=ablation"], False),
-        (["+experiment=ablation"], False),
-        (["--config-dir", "there"], False),
-    ],
-)
-def test_the_mode_is_asked_for_where_something_may_set_it(arguments, one):
-    assert asks_for_one_job(arguments) is one
-
-
-def test_no_configuration_of_ours_but_experiments_sets_a_mode():
-    setting = {p.relative_to(CONF).parts[0] for p in CONF.rglob("*.yaml") if re.search(r"(?m)^\s*mode:", p.read_text())}
-    assert setting <= {"experiment"}
-
-
-def test_the_mode_is_asked_for_where_another_package_has_configurations(monkeypatch, tmp_path):
-    monkeypatch.setattr(choices, "configuration_folders", lambda: [tmp_path])
-    assert not asks_for_one_job([])
 
 
 def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_function_goes_in_one():
