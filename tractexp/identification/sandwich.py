@@ -86,9 +86,10 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
     means."""
     drive, changes = likelihood.problem.drive, list[tuple[int, np.ndarray]]()
     width = likelihood.width[likelihood.free :].reshape(drive.events, 2)
+    means = likelihood.problem.steady or [slice(0, 0)] * drive.events  # of waves there are none
     for block in blocks:
         e = int(np.searchsorted(drive.first, block.start, "right")) - 1
-        steady, change = likelihood.problem.steady[e], np.zeros(2)
+        steady, change = means[e], np.zeros(2)
         a, z, n = max(block.start, steady.start), min(block.stop, steady.stop), steady.stop - steady.start
         if 0 < z - a < n:
             off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
