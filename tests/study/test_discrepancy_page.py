@@ -114,7 +114,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     assert rows[0].status == CHOSEN
     assert rows[0].drop == pytest.approx(named.survivors.rivals[0].lowered)
     (size,) = rows[0].sizes
-    assert size.name == "R_s"
+    assert size.parameter.name == "R_s"
     assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
     drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
     assert drops == sorted(drops, reverse=True)

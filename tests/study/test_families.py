@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
-from test_discrepancy import FAST, LOUD, SLOW, base, bench, events
+from test_discrepancy import FAST, LOUD, base, bench, events
 
 from tractexp.discrepancy import families, fitting, held_out, survivors
 from tractexp.discrepancy.all_events import JointFit
@@ -36,8 +36,8 @@ NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"
 MEMBERS = sorted(name for name, cls in discover()["effect"].items() if cls.family)
 
 
-def found(effect, size, seed, only, recorder=SLOW):
-    made = events(effect, size=size, seed=seed, count=3, recorder=recorder)
+def found(effect, size, seed, only):
+    made = events(effect, size=size, seed=seed, count=3, recorder=FAST)
     return investigate(base(), made[:2], made[2:], {}, {}, only=only)
 
 
@@ -108,20 +108,20 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
 
 
 @pytest.mark.parametrize(
-    ("hidden", "size", "seed", "member", "recorder"),
+    ("hidden", "size", "seed", "member"),
     [
-        ("delayed_power_limit", 1.5, 820036, "power_limit_curve", SLOW),
-        ("ramped_return", 2.0, 820034, "ramped_current", SLOW),
-        ("rectified_power", 1.5, 820043, "rectifier", SLOW),
-        ("thermostat_recovery", 2.0, 820061, "thermostatic_load", SLOW),
-        ("switched_capacitors", 2.0, 820064, "switched_banks", FAST),
-        ("staged_power_limit", 0.25, 820073, "staged_power_limit", SLOW),
-        ("link_voltage_control", 1.0, 820070, "limited_link", SLOW),
+        ("delayed_power_limit", 1.5, 820035, "power_limit_curve"),
+        ("ramped_return", 2.0, 820034, "ramped_current"),
+        ("rectified_power", 1.5, 820043, "rectifier"),
+        ("thermostat_recovery", 2.0, 820061, "thermostatic_load"),
+        ("switched_capacitors", 2.0, 820064, "switched_banks"),
+        ("staged_power_limit", 0.25, 820073, "staged_power_limit"),
+        ("link_voltage_control", 1.0, 820070, "limited_link"),
     ],
 )
-def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member, recorder):
+def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, seed, member):
     textbook = get("effect", member).family
-    made = found(hidden, size, seed, (textbook,), recorder)
+    made = found(hidden, size, seed, (textbook,))
     assert made.verdict.word == "named"
     (form,) = forms(made)
     assert (form.name, form.effect.name) == (textbook, member)
@@ -130,7 +130,7 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
 
 def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
     """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.9 here."""
-    made = events("froelich_saturation", size=1.8, seed=820081, count=4, noise=LOUD)
+    made = events("froelich_saturation", size=1.8, seed=820081, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
     (form,) = forms(told)
     assert form.effect.name == "saturation_curve"
@@ -311,7 +311,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
 
 def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_dips():
     """The fitted dips show hardly anything of how much the second opens; a fit to all events tells."""
-    made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD)
+    made = events("trip_in_two_stages", 1.5, 820023, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=(TRIPS[0], CORE[0]))
     assert told.explanations.chosen.names == ("undervoltage_trip",)  # which leaves nothing of the fitted ones
     assert not told.held_out.assessments["undervoltage_trip",].helps
