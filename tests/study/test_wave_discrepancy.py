@@ -108,6 +108,7 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     assert after < before
 
 
+@pytest.mark.usefixtures("registry_as_it_was")
 def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_path):
     steps, few = planted.steps, ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip")
     among = [term(f"answer:{name}") for name in few]
