@@ -5,13 +5,12 @@ Deriving a large model takes half a second, reading it back milliseconds.
 
 import functools
 import hashlib
-import importlib.metadata
 import re
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
-from tractexp.store import TEXTS
+from tractexp.store import TEXTS, version
 
 CODE = tuple(Path(__file__).parent / folder for folder in ("kernel", "model"))  # whose files make texts of parts
 ADDRESS = re.compile(r" at 0x[0-9a-f]+>", re.IGNORECASE)  # in the `repr` of what has none of its own
@@ -46,7 +45,7 @@ def _key(modules: Sequence[str], settings: str, what: str) -> str:
     written = [getattr(sys.modules.get(module), "__file__", None) for module in modules]
     if None in written or ADDRESS.search(settings):
         return ""
-    digest = hashlib.sha256(f"{what} {importlib.metadata.version('sympy')} {modules} {settings}".encode())
+    digest = hashlib.sha256(f"{what} {version('sympy')} {modules} {settings}".encode())
     for folder in sorted({*CODE, *(Path(file or "").parent for file in written)}):
         digest.update(_code(folder))
     return digest.hexdigest()

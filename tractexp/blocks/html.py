@@ -4,6 +4,7 @@ Everything given as text is escaped. Charts carry their data and the library tha
 equations are typeset into SVG; nothing is loaded from elsewhere.
 """
 
+import functools
 import io
 import itertools
 import re
@@ -147,6 +148,7 @@ def _displayed(latex: str) -> str:
     return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
 
 
+@functools.cache
 def _typeset(latex: str) -> str:
     """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
     key = store.key(store.version("matplotlib"), latex)

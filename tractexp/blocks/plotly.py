@@ -5,7 +5,6 @@ module at its first call; the last one registers the kinds of traces. Where that
 what nothing calls any more is left out. A file that is made otherwise is taken whole.
 """
 
-import functools
 import hashlib
 import importlib.util
 import re
@@ -34,7 +33,6 @@ def code() -> str:
     return needed(library().read_text(encoding="utf-8"))
 
 
-@functools.cache
 def digest() -> str:
     """SHA-256 of all that `code` hangs on."""
     return hashlib.sha256(library().read_bytes() + Path(__file__).read_bytes()).hexdigest()

@@ -99,21 +99,21 @@ def surprise(
     drawn /= _level(likelihood, observed, rng)[:, None, None]
     basis, split = J.basis(), of_each_event(J, steady)
 
-    def left(rows: np.ndarray) -> dict[str, np.ndarray]:
-        rest = basis.without(rows)
-        by_test = surprises.statistics(rest.reshape(len(rows), observed.drive.channels, -1), observed.problem)
+    def left(rest: np.ndarray) -> dict[str, np.ndarray]:
+        by_test = surprises.statistics(rest.reshape(len(rest), observed.drive.channels, -1), observed.problem)
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
     excess = squares and Excess.of(squares, unit, J, least)
-    parts = [left(rows[None]) | ({APART: excess.of_records} if excess else {})]
+    own = basis.without(rows[None])
+    parts = [left(own) | ({APART: excess.of_records} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
     for some in np.split(drawn, range(together, DRAWS, together)):
         white = likelihood.whiten(some)
-        parts.append(left(white) | ({APART: excess.of_draws(white, some)} if excess else {}))
+        parts.append(left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {}))
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     p_values = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
     loudest = min(p_values, key=p_values.__getitem__)
-    ratio, where = loudest_stretch(basis.without(rows[None]).reshape(observed.drive.channels, -1), observed.problem)
+    ratio, where = loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
     return Surprise(min(1.0, max(len(p_values) * p_values[loudest], SMALLEST_P)), loudest, ratio, where)
 
 
@@ -128,15 +128,15 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
 class Excess:
     """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and of draws of noise.
 
-    `J` are whitened sensitivities to the coordinates inside, `plain` those of Eq. (8) to all of them; `squares` is
-    what least squares reach.
+    `J` are whitened sensitivities to the coordinates inside, `inside` and `plain` those of Eq. (8) to the same and to
+    all; `squares` is what least squares reach.
     """
 
     of_records: np.ndarray
     likelihood: Likelihood
     J: Sensitivities
     plain: Sensitivities
-    inside: np.ndarray
+    inside: Sensitivities
     squares: SeparableBasis
 
     @classmethod
@@ -146,12 +146,12 @@ class Excess:
         rows, plain = likelihood.jacobian(unit)
         inside, of_records = _inside(unit), np.array([rows @ rows / max(least, 1e-300)])
         free = plain.only(inside & (np.arange(len(inside)) < plain.k))
-        return cls(of_records, likelihood, J, plain, inside, free.basis())
+        return cls(of_records, likelihood, J, plain, plain.only(inside), free.basis())
 
     def of_draws(self, white: np.ndarray, drawn: np.ndarray) -> np.ndarray:
         """Of draws (b, C, N), whitened (b, R): (b,)."""
         raw, k = self.likelihood.whiten(drawn), self.plain.k
-        likely = raw - self.plain.only(self.inside).times(self.J.fit(white))
+        likely = raw - self.inside.times(self.J.fit(white))
         shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
         rest = self.squares.without(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)

@@ -40,10 +40,11 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
         return Information(uncertainty.names, uncertainty.values, width, triangle).standard_errors
 
     others, whole = without_each([own[rows] for rows in J.rows])
+    together = errors(whole)
     gains: dict[str, dict[str, float]] = {}
     for event, triangle in zip(likelihood.problem.events, others, strict=True):
         with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
-            ratio = errors(triangle) / errors(whole)
+            ratio = errors(triangle) / together
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
     odd, notes = disagreeing(uncertainty)
     return EventAgreement(gains, odd, notes)

@@ -11,7 +11,6 @@ from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
     ONE_STEP,
-    TIED,
     Evidence,
     beside,
     chance_level,
@@ -20,6 +19,7 @@ from tractexp.discrepancy.evidence import (
 )
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.verdict import TIED
 from tractexp.wording import joined
 
 COLORS = {CHOSEN: "#009E73", TIED: "#E69F00"}
