@@ -50,9 +50,6 @@ class Function:
         self.allocations.append(f"  {name} = alloca {kind}, align {alignment}")
         return name
 
-    def intrinsic(self, name: str, declaration: str) -> None:
-        self.intrinsics[name] = declaration
-
     def remark(self, text: str) -> None:
         """A line for those who read the IR."""
         self.lines.append(f"  ; {text}")

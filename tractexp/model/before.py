@@ -1,10 +1,10 @@
-"""What stands before an event, as names and texts of arithmetic (`arithmetic.evaluated`)."""
+"""What stands before an event, as texts of arithmetic (`arithmetic.evaluated`)."""
 
 from sympy import Symbol
 from sympy.printing.pycode import PythonCodePrinter
 
 from tractexp.model.arithmetic import VALUES
-from tractexp.model.equations import Equations, phasor_parts, start_symbol
+from tractexp.model.equations import Equations
 
 
 class _Printer(PythonCodePrinter):
@@ -12,12 +12,6 @@ class _Printer(PythonCodePrinter):
 
     def _print_Symbol(self, expr: Symbol) -> str:
         return f"{VALUES}[{expr.name!r}]"
-
-
-def starts(eq: Equations) -> list[str]:
-    """Names of the states and memories before the event, as the kernel lists them: phasors by their parts."""
-    symbols = [start_symbol(symbol) for symbol in (*eq.states, *eq.memories)]
-    return [part.name for s in symbols for part in ((s,) if s.is_real else phasor_parts(s))]
 
 
 def stated(eq: Equations) -> dict[str, str]:

@@ -62,11 +62,6 @@ class Equations(Circuit):
     A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
 
-    waves: bool
-    v: Any
-    v_rate: Any
-    omega_s: Symbol
-    omega_n: Symbol
     U_rate: Symbol
     U2: Symbol
     U20: Symbol
@@ -464,6 +459,11 @@ class Equations(Circuit):
             rows.extend(zip(own, self.parts(state.derivative), self.parts(state.initial), strict=False))
         return rows
 
+    def real_starts(self) -> list[Symbol]:
+        """What states and memories start from, in the order of the kernel, phasors split in two."""
+        starts = map(start_symbol, (*self.states, *self.memories))
+        return [part for s in starts for part in ((s,) if s.is_real else phasor_parts(s))]
+
     def real_balances(self) -> list[sympy.Expr]:
         """What vanishes in the steady state before the event, one for each real state."""
         rows: list[sympy.Expr] = []
@@ -550,6 +550,3 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
     chosen: Any = min(plain, expanded, key=operations)
     return chosen.xreplace({symbol: part for part, symbol in hidden.items()})
-
-
-__all__ = ["Equations", "I", "Memory", "Requirement", "State", "phasor_parts", "start_symbol", "sympy"]

@@ -11,8 +11,9 @@ import numpy as np
 
 from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
-from tractexp.kernel.kernel import NOTHING, Kernel, width
+from tractexp.kernel.kernel import NOTHING, Kernel
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
+from tractexp.kernel.target import width
 from tractexp.model.arithmetic import evaluated
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
@@ -257,14 +258,14 @@ class Model:
             if not short.all():
                 coarse = self.simulate(drive, values, chosen)
 
-    def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
-        """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
+    def refusal(self, values: np.ndarray, drive: Drive) -> str | None:
+        """Why these values (d,) have no steady state before the event, as a sentence; None where they have one."""
         _, miss = self._run(drive, self._candidates(drive, values), 1)
-        if miss[event, 0] == 0:
+        if miss[0, 0] == 0:
             return None  # the kernel found one; the sentence takes the symbols, which take a second to load
         eq = self.equations
         numbers = dict(zip(self.names, map(float, values), strict=True))
-        numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
+        numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[0], *drive.before[0]), strict=True))
 
         def number(expression: Any) -> float:
             whole = eq.expand(expression)
@@ -286,9 +287,10 @@ class Model:
         return evaluated(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
-        from tractexp.model.before import starts, stated
+        from tractexp.model.before import stated
 
-        return json.dumps({"starts": starts(self.equations), "quantities": stated(self.equations)})
+        starts = [symbol.name for symbol in self.equations.real_starts()]
+        return json.dumps({"starts": starts, "quantities": stated(self.equations)})
 
     def latex(self) -> list[str]:
         """The model's equations, one a line."""
