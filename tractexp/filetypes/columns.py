@@ -143,16 +143,13 @@ def role(name: str, unit: str = "") -> Role | None:
     kind = (meaning(unit) or ("",))[0]
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}")
-    if key in ("U", "I") and (kind == "angle" or _tells_angle(words)):
+    angle = kind == "angle" or ANGLE & set(words) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
+    if key in ("U", "I") and angle:
         return Role(f"{key}{phase}_angle", unit)
     if key not in ("U", "I", "P", "Q"):
         return Role(key, unit)
     line = True if LINE & set(words) or len(phase) == 2 else False if phase or GROUND & set(words) else None
     return Role(key + phase, unit, line if key == "U" else None)
-
-
-def _tells_angle(words: Sequence[str]) -> bool:
-    return bool(ANGLE & set(words)) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
 
 
 def _words(name: str) -> list[str]:

@@ -43,7 +43,7 @@ class TextTable(TableFile):
         header = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
-        self.decimal = form.decimal or _decimal(self.sample, self.delimiter)
+        self.decimal = form.decimal or _decimal(self.sample)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
@@ -67,16 +67,13 @@ class TextTable(TableFile):
         """Refuse rows of more cells than names, for cells and names cannot be matched."""
         named = len([name for name in self.heading.names if name])
         spare = [cell for cell in self.sample[0][len(self.heading.names) :] if cell]
-        if self.heading.line is not None and (spare or self._split_decimals(named)):
+        split = self.width > named + 1 and self.width >= 1.5 * named  # at decimal commas, as it seems
+        if self.heading.line is not None and (spare or split):
             raise UserError(
                 f"{self.source}: line {self.line} has {self.width} cells where the header line names {named} columns"
                 + ("; if the decimal mark is a comma, save the file with another delimiter, such as a semicolon"
                    if self.delimiter == "," else "")
             )  # fmt: skip
-
-    def _split_decimals(self, named: int) -> bool:
-        """Whether values seem cut at decimal commas: far more cells than names."""
-        return self.width > named + 1 and self.width >= 1.5 * named
 
     def place(self, row: int) -> str:
         if self._lines is not None and row < len(self._lines):
@@ -236,12 +233,12 @@ def _delimiter(lines: Sequence[str]) -> str:
     return best if alike(best)[0] > 0 else ","
 
 
-def _decimal(sample: Sequence[Sequence[str]], delimiter: str) -> str:
-    """The decimal mark: a comma where cells have one and none has a point."""
+def _decimal(sample: Sequence[Sequence[str]]) -> str:
+    """The decimal mark: a comma where more cells have one than a point."""
     cells = [cell for row in sample for cell in row]
     commas = sum(is_number(cell, ",") and "," in cell for cell in cells)
     points = sum(is_number(cell) and "." in cell for cell in cells)
-    return "," if commas > points and delimiter != "," else "." if commas <= points else ","
+    return "," if commas > points else "."
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

@@ -92,14 +92,14 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     runs: list[tuple[int, int]] = []
     taken = 0
     for k, (a, b) in enumerate(pairwise(edges)):
-        if b - a == 1 and len(edges) > 2 and _gap(steps, edges, k):
+        if b - a == 1 and len(edges) > 2 and _gap(edges, k):
             continue  # between two segments
         runs.append((max(a, taken), b + 1))
         taken = b + 1
     return runs
 
 
-def _gap(steps: np.ndarray, edges: list[int], k: int) -> bool:
+def _gap(edges: list[int], k: int) -> bool:
     """A single step between longer runs."""
     before = edges[k] - edges[k - 1] if k else 0
     after = edges[k + 2] - edges[k + 1] if k + 2 < len(edges) else 0
