@@ -12,10 +12,6 @@ from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
-KINDS = (
-    "dip", "swell", "interruption", "step", "ramp", "open pole", "dead line", "pole slip", "inrush",
-    "blown fuse", "load loss", "load step",
-)  # fmt: skip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
 SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
@@ -42,7 +38,7 @@ CARRIES = 0.05  # of the record's greatest current: what is less is no load
 class Happening:
     """One event of a feeder. Voltages relative to that before it, powers in MW and Mvar."""
 
-    kind: str  # of `KINDS`
+    kind: str  # dip, or one of `NO_FIT`
     start: float  # s
     end: float  # s
     depth: float  # 1 - residual voltage over that before: negative for a swell
@@ -80,7 +76,8 @@ def _happenings(trace: Trace) -> list[Happening]:
     spans += _open_alone(trace, spans)
     spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
     changes = _own_changes(trace, [e for _, e in spans])
-    spans += [(_load_kind(c), _beside(trace, c.first + 1, c.stop)) for c in changes if abs(c.ratio - 1) > LISTED]
+    listed = (c for c in changes if abs(c.ratio - 1) > LISTED)
+    spans += [("load loss" if c.ratio < SMALL else "load step", _beside(trace, c.first + 1, c.stop)) for c in listed]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
     return [_describe(trace, kind, e, bounds) for kind, e in _merged(spans)]
@@ -103,10 +100,6 @@ def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
     """The steps of the load beside what happens to the voltage."""
     changes, near = load_changes(trace.U, trace.P, trace.Q, trace.cycle / trace.step), round(trace.cycle / trace.step)
     return [c for c in changes if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)]
-
-
-def _load_kind(change: Change) -> str:
-    return "load loss" if change.ratio < SMALL else "load step"
 
 
 def _no_system(trace: Trace) -> bool:
@@ -305,17 +298,14 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     inside = slice(e.start, max(e.end, e.start + 1))
     edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
-    depth = -e.worst if e.new_level or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
+    extreme = np.max if e.worst > 0 else np.min
+    depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, (before, after))
     return Happening(
         kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
         float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
     )  # fmt: skip
-
-
-def _extreme(U: np.ndarray, side: float) -> float:
-    return float(U.max() if side > 0 else U.min())
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
