@@ -7,6 +7,7 @@ from typing import Any
 from tractexp.extend import DATA, Base, Events, Reader, Record, UserError, check_range, plugin
 from tractexp.extend.files import (
     DECLARATION,
+    ENDINGS,
     LOAD,
     PACKAGE,
     SIZES,
@@ -47,21 +48,7 @@ class CSV(Tabular, Reader):
     Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (
-        ".csv",
-        ".txt",
-        ".tsv",
-        ".parquet",
-        ".pq",
-        ".xlsx",
-        ".xls",
-        ".xlsb",
-        ".ods",
-        ".out",
-        ".pqd",
-        ".pqdif",
-        ".cev",
-    )
+    endings = (*ENDINGS, ".pqd", ".pqdif", ".cev")
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number

@@ -20,6 +20,7 @@ from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
+ENDINGS = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
 MOST = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
