@@ -186,7 +186,10 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     for line, row in _joined(body):
         if line > HEAD and not report.columns:
             break
-        cells = _cells(row)
+        try:
+            cells = next(csv.reader([row], strict=False), [])
+        except csv.Error:  # a cell without end
+            cells = [row]
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
                 remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
@@ -225,13 +228,6 @@ def _joined(body: str) -> list[tuple[int, str]]:
             rows.append((start, held.strip()))
         held = ""
     return rows if not held.strip() else [*rows, (start, held.strip())]
-
-
-def _cells(row: str) -> list[str]:
-    try:
-        return next(csv.reader([row], strict=False), [])
-    except csv.Error:  # a cell without end
-        return [row]
 
 
 def _samples(path: Path, report: EventReport, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:

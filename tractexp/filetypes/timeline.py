@@ -70,9 +70,7 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
             f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the sample before, and "
             "the sampling rate is declared as 0, so that the time stamps must be valid; write the rate into the .cfg"
         )
-    stretches = [
-        _stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1 or len(t) == 1
-    ]
+    stretches = [_stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1]
     if not stretches:
         raise UserError(f"{where}: time stamps without order: no two steps between samples are alike")
     return stretches

@@ -149,12 +149,8 @@ class Model:
     @functools.cached_property
     def source(self) -> str:
         """The kernel's text: LLVM IR for the vectors of this machine."""
-        return text_of((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
-
-    @property
-    def _text_in_cache(self) -> str:
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return self._in_cache(f"{name}_of_{width()}")
+        return text_of((self.motor, self.static, *self.effects), self._written, self._in_cache(f"{name}_of_{width()}"))
 
     def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
@@ -210,16 +206,12 @@ class Model:
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
         if self.measurements or drive.windows:
-            return self._errors_of(self.simulate(drive, values, substeps), drive)
+            response = self.simulate(drive, values, substeps)  # the measurement stands between kernel and sums
+            square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+            stored = np.add.reduceat(square, drive.first[:-1], axis=2)
+            return Errors(np.moveaxis(stored, 2, 0), response.miss.sum(axis=0))
         sums, miss = self._run(drive, self._candidates(drive, values), substeps)
         return Errors(sums, miss.sum(axis=0))
-
-    @staticmethod
-    def _errors_of(response: ModelResponse, drive: Drive) -> Errors:
-        """Squared errors of stored responses: where the measurement stands between kernel and sums."""
-        square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
-        sums = np.add.reduceat(square, drive.first[:-1], axis=2)
-        return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
     def substeps(
         self,
@@ -287,7 +279,7 @@ class Model:
         return evaluated(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
-        from tractexp.model.before import stated
+        from tractexp.model.printed import stated
 
         starts = [symbol.name for symbol in self.equations.real_starts()]
         return json.dumps({"starts": starts, "quantities": stated(self.equations)})

@@ -119,7 +119,8 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     """The kind of an excursion; two parts of a fault that leaves a pole open."""
     if (fuse := _fuse(trace, e)) is not None:
         return [("blown fuse", fuse)]
-    if e.dead or _all_dead(trace, e):
+    until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)  # with the level that it leads to
+    if e.dead or _dead(trace, e)[e.start : until].any():
         return [("interruption", e)] if e.returned and not e.dead else [("dead line", _until_alive(trace, e))]
     opened = _open(trace, e)
     if opened is not None:
@@ -132,11 +133,6 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if not e.returned and e.new_level and e.worst > 0:
         return [("step", e)]
     return [("dip" if e.worst < 0 else "swell", e)]
-
-
-def _all_dead(trace: Trace, e: Excursion) -> bool:
-    """Whether every phase is gone at some time of the excursion, or at the new level that it leads to."""
-    return bool(_dead(trace, e)[e.start : e.end + 2 * e.new_level * round(trace.cycle / trace.step)].any())
 
 
 def _until_alive(trace: Trace, e: Excursion) -> Excursion:
