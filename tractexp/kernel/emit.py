@@ -18,7 +18,7 @@ from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.graph import Symbol
 from tractexp.kernel.kernel import PREFIX, Room
-from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH
+from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, WIDTH
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers
 
@@ -32,7 +32,7 @@ Values = Mapping[Symbol, str]
 Samples = Callable[[str], str]  # an input by its name as a vector of the samples from one on
 
 
-def text(lowered: Lowered, title: str, integration: str, width: int) -> str:
+def text(lowered: Lowered, title: str, integration: str, width: int = WIDTH) -> str:
     """The kernel's IR, for vectors of `width` doubles. The same equations give the same text.
 
     Its second line tells the room that a call needs.

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.kernel import objects, target
+from tractexp.kernel import objects
 from tractexp.kernel.kernel import NUMBERS, WHOLE
+from tractexp.kernel.layout import WIDTH
 from tractexp.texts import text_in
 
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, *[ctypes.c_int64] * 3)
@@ -39,7 +40,7 @@ class Stencil:
 
     @functools.cached_property
     def _ir(self) -> tuple[str, int, int]:
-        settings = repr((self.expression.__qualname__, self.rows, self.shared, self.numbers, target.width()))
+        settings = repr((self.expression.__qualname__, self.rows, self.shared, self.numbers))
         description = text_in(self.expression.__module__, settings, lambda: "\n".join(map(str, ir_of(self))), "stencil")
         first, last, text = description.split("\n", 2)
         return text, int(first), int(last)
@@ -100,7 +101,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     arrays = {name: functools.partial(element, name) for name in (*stencil.rows, *stencil.shared)}
     expression = stencil.expression(**arrays, **single)
     f = Function()
-    lanes, scalars = Numbers(f, target.width()), Numbers(f, 1)
+    lanes, scalars = Numbers(f, WIDTH), Numbers(f, 1)
     addresses = (f.value(f"getelementptr ptr, ptr %places, i64 {k}") for k in itertools.count())
     names = (*stencil.rows, *stencil.shared, *stencil.numbers)
     places = {name: f.value(f"load ptr, ptr {a}, align 8") for name, a in zip(names, addresses, strict=False)}

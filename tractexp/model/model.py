@@ -13,7 +13,6 @@ from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
-from tractexp.kernel.target import width
 from tractexp.model.arithmetic import evaluated
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
@@ -148,9 +147,9 @@ class Model:
 
     @functools.cached_property
     def source(self) -> str:
-        """The kernel's text: LLVM IR for the vectors of this machine."""
+        """The kernel's text: LLVM IR, the same on every machine."""
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return text_of((self.motor, self.static, *self.effects), self._written, self._in_cache(f"{name}_of_{width()}"))
+        return text_of((self.motor, self.static, *self.effects), self._written, self._in_cache(name))
 
     def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
@@ -160,7 +159,7 @@ class Model:
         from tractexp.kernel.emit import text
         from tractexp.model.lowering import lower
 
-        return text(lower(self.equations), self.title, self.integration, width())
+        return text(lower(self.equations), self.title, self.integration)
 
     @functools.cached_property
     def kernel(self) -> Kernel:
@@ -308,7 +307,7 @@ class Model:
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
-        lanes = LANES * max(1, int(LONGEST / (LANES * max(np.diff(drive.first) @ steps, 1))))
+        lanes = LANES * max(1, int(LONGEST / (LANES * max(drive.samples * int(steps.max()), 1))))
         if n > lanes:
             for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
                 some = np.ascontiguousarray(candidates[..., part])
