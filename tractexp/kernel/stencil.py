@@ -27,11 +27,6 @@ class Stencil:
     samples further, and with the symbol of each number; it returns a SymPy expression.
     """
 
-    expression: Callable[..., Any]
-    rows: tuple[str, ...]
-    shared: tuple[str, ...]
-    numbers: tuple[str, ...]
-
     def __init__(
         self, expression: Callable[..., Any], rows: Sequence[str], shared: Sequence[str] = (),
         numbers: Sequence[str] = (),

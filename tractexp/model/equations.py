@@ -64,21 +64,6 @@ class Equations:
     A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
 
-    U_rate: Symbol
-    U2: Symbol
-    U20: Symbol
-    t: Symbol
-    step: Symbol
-    omega_s0: Symbol
-    v_zero: Symbol
-    v_zero_rate: Symbol
-    turn: Any
-    recorded_voltage: Any
-    P0: Symbol
-    Q0: Symbol
-    P_s0: Symbol
-    Q_s0: Symbol
-
     def __init__(self, domain: str = PHASORS) -> None:
         self.waves = domain == WAVES
         self.U, self.omega_s, self.U_rate, self.U2, self.t, *waves = map(_real, INPUTS)

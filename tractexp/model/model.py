@@ -75,14 +75,6 @@ class Model:
     Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
     """
 
-    motor: Motor
-    static: Static
-    effects: tuple[Effect, ...]
-    measurements: tuple[Measurement, ...]
-    integration: str
-    domain: str
-    title: str
-
     def __init__(
         self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL,
         domain: str = PHASORS,
