@@ -8,6 +8,7 @@ from tractexp.extend import DATA, UserError, check_choice
 
 PHASES = "abc"
 PAIRS = ("ab", "bc", "ca", "ba", "cb", "ac")
+TWO = tuple(sorted(PAIRS))  # of phases, whose currents are measured
 
 
 def line(pair: str) -> np.ndarray:
@@ -38,8 +39,3 @@ def from_lines(pairs: Sequence[str]) -> np.ndarray:
 def from_two(phases: str) -> np.ndarray:
     """(3, 2): three currents of no zero sequence from those of two phases."""
     return np.array([[float(p == phase) if phase in phases else -1.0 for p in phases] for phase in PHASES])
-
-
-def check_two(where: str, phases: str) -> None:
-    """Raise `UserError` for what are not two phases."""
-    check_choice(where, phases, ("ab", "ac", "ba", "bc", "ca", "cb"))

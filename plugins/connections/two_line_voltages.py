@@ -4,9 +4,9 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import Connection, plugin
+from tractexp.extend import Connection, check_choice, plugin
 
-from ._phases import check_pairs, check_two, from_lines, from_two
+from ._phases import TWO, check_pairs, from_lines, from_two
 
 
 @plugin
@@ -30,7 +30,7 @@ class TwoLineVoltages(Connection):
     def check(self) -> None:
         check_pairs(self.pairs, 2, "e.g. [ab, bc]")
         if self.phases != "abc":
-            check_two("data.connection.phases", self.phases)
+            check_choice("data.connection.phases", self.phases, TWO)
 
     def voltage(self) -> np.ndarray:
         return from_lines(self.pairs)
