@@ -25,10 +25,7 @@ import numpy as np
 import rivals
 
 from tractexp.exchange.format import Identified
-from tractexp.kernel import emit, target
-from tractexp.kernel.kernel import Kernel
 from tractexp.model.drive import Drive, Excitation
-from tractexp.model.lowering import lower
 from tractexp.model.model import Model, compose
 from tractexp.plugin import build, get
 
@@ -84,13 +81,8 @@ def ours(model: Model, drive: Drive, substeps: int = 1) -> Callable[[np.ndarray]
     return lambda values: model.errors(drive, values, substeps).sums.sum(axis=(0, 1))
 
 
-def base(width: int | None = None) -> Model:
-    """The base model, its kernel as it is used here, or for vectors of so many doubles."""
-    model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    if width is not None:
-        text = emit.text(lower(model.equations), model.title, "classical", width)
-        model.__dict__ |= {"source": text, "kernel": Kernel(text)}
-    return model
+def base() -> Model:
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
 
 
 def loosest(make: Callable[[float], Callable], most: float) -> tuple[Callable, float] | None:
@@ -156,29 +148,24 @@ def andes_row() -> dict[str, float] | None:
     return {"nanoseconds_per_step": seconds / (len(voltage) - 1) * 1e9, "error": float(error)}
 
 
-def kernels(drive: Drive) -> dict[tuple[int, int, int], Way]:
-    """Our public batch call by width [doubles], number of candidates and substeps."""
-    found = {}
-    for width in sorted({min(4, target.width()), target.width()}):
-        model = base(width)
-        for n, substeps in ((CANDIDATES, 1), (CANDIDATES, 2), (POPULATION, 1), (FEW, 1)):
-            label = f"tractexp, vectors of {64 * width} bits"
-            found[width, n, substeps] = Way(label, ours(model, drive, substeps), n, substeps)
-    return found
+def kernels(drive: Drive) -> dict[tuple[int, int], Way]:
+    """Our public batch call by number of candidates and substeps."""
+    calls = ((CANDIDATES, 1), (CANDIDATES, 2), (POPULATION, 1), (FEW, 1))
+    return {(n, substeps): Way("tractexp", ours(base(), drive, substeps), n, substeps) for n, substeps in calls}
 
 
-def limits(ways: dict[tuple[int, int, int], Way], rounds: int) -> list[dict]:
+def limits(ways: dict[tuple[int, int], Way], rounds: int) -> list[dict]:
     """What each kernel's arithmetic alone would take, and the share of that reached."""
     rows, least = [], {}
-    for (width, n, substeps), way in ways.items():
-        row = {"bits": 64 * width, "candidates": n, "substeps": substeps, "nanoseconds_per_step": way.nanoseconds}
+    for (n, substeps), way in ways.items():
+        row = {"candidates": n, "substeps": substeps, "nanoseconds_per_step": way.nanoseconds}
         try:
-            if (width, substeps) not in least:
-                least[width, substeps] = arithmetic.limit(base(width).source, substeps, rounds)
+            if substeps not in least:
+                least[substeps] = arithmetic.limit(base().source, substeps, rounds)
         except ValueError as reason:
             rows.append(row | {"no_limit": str(reason)})
             continue
-        found = least[width, substeps]
+        found = least[substeps]
         row |= {"operations_per_step": found.step.all, "operations_per_sample": found.sample.all}
         row |= {"vector_operations_per_nanosecond": found.rate, "limit": found.nanoseconds}
         rows.append(row | {"share": found.nanoseconds / way.nanoseconds})
@@ -194,12 +181,12 @@ def measure(rounds: int) -> dict:
     halved = Way("tractexp, two steps a sample", ours(model, drive, 2), CANDIDATES)
     error = own.error()
     others = rival_ways(rivals.Record(record), 1.01 * error)
-    widths = kernels(drive)
+    called = kernels(drive)
     everything = {"": own, "two_substeps": halved, **others}
     errors = {key: way.error() for key, way in everything.items()}
-    for way in widths.values():
+    for way in called.values():
         way.error()  # compiles
-    race([*everything.values(), *widths.values()], rounds)
+    race([*everything.values(), *called.values()], rounds)
     per_sample = {key: way.nanoseconds * way.substeps for key, way in everything.items()}
     values = candidates(CANDIDATES)
     difference = np.abs(own.call(values) - others["numpy"].call(values)).max() / SAMPLES
@@ -213,7 +200,7 @@ def measure(rounds: int) -> dict:
             }
             for key, way in everything.items()
         ],
-        "kernel": limits(widths, rounds),
+        "kernel": limits(called, rounds),
         "andes": andes_row(),
         "nanoseconds_per_step": own.nanoseconds,
     }
@@ -221,8 +208,7 @@ def measure(rounds: int) -> dict:
     figures |= {f"ratio_to_{key}": per_sample[key] / own.nanoseconds for key in others}
     return figures | {
         "simulations_per_second": CANDIDATES / own.seconds, "largest_difference_to_numpy": float(difference),
-        "vector_bits": 64 * target.width(), "candidates": CANDIDATES, "samples": SAMPLES,
-        "machine": platform.processor() or platform.machine(),
+        "candidates": CANDIDATES, "samples": SAMPLES, "machine": platform.processor() or platform.machine(),
     }  # fmt: skip
 
 
@@ -238,14 +224,14 @@ def tell(figures: dict) -> None:
         print(f"{row['error']:>12.1e} pu, without an objective")
     print("\nkernel, public batch call; ns per Runge-Kutta step and candidate; floating-point operations per step and")
     print("vector; limit: these alone, at the rate that operations in registers reach in this run\n")
-    print(f"{'bits':>5}{'candidates':>12}{'substeps':>10}{'ns':>8}{'operations':>12}{'limit':>8}{'share':>7}")
+    print(f"{'candidates':>12}{'substeps':>10}{'ns':>8}{'operations':>12}{'limit':>8}{'share':>7}")
     for row in figures["kernel"]:
-        line = f"{row['bits'] or '-':>5}{row['candidates']:>12}{row['substeps']:>10}{row['nanoseconds_per_step']:>8.2f}"
+        line = f"{row['candidates']:>12}{row['substeps']:>10}{row['nanoseconds_per_step']:>8.2f}"
         if "limit" in row:
             operations = row["operations_per_step"] + row["operations_per_sample"] / row["substeps"]
             line += f"{operations:>12.1f}{row['limit']:>8.2f}{row['share']:>7.0%}"
         print(line + row.get("no_limit", ""))
-    print(f"\nwidth here: {figures['vector_bits']} bits\n")
+    print()
 
 
 def main():
