@@ -120,11 +120,8 @@ def schema(cls: type[Plugin]) -> type:
         fields: list[Any] = [("name", str, dataclasses.field(default=cls.name))]
         types = get_type_hints(cls)
         for item in dataclasses.fields(cls):  # type: ignore[arg-type]
-            if item.default_factory is not dataclasses.MISSING:
-                default: Any = dataclasses.field(default_factory=item.default_factory)
-            else:
-                default = dataclasses.field(default=item.default)
-            fields.append((item.name, types[item.name], default))
+            default: Any = {"default": item.default, "default_factory": item.default_factory}
+            fields.append((item.name, types[item.name], dataclasses.field(**default)))
         _schemas[cls] = dataclasses.make_dataclass(f"{cls.__name__}Config", fields)
     return _schemas[cls]
 
@@ -235,8 +232,6 @@ def _import_error(what: str) -> Iterator[None]:
 
 def _place(error: Exception) -> str:
     """File and line of an error in what was imported, not in a library it called; "" where nothing was imported."""
-    import traceback
-
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: "
     frames = traceback.extract_tb(error.__traceback__)

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from tractexp.progress import FIRST_LINE, NEXT_LINES, console, say
+from tractexp.progress import Pace, console, say
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.status import FAILED, Status, search_objective
 
@@ -15,19 +15,12 @@ SHOWN = 3  # variants named in a line of a log file
 class Tally:
     """Counts the ends of a sweep's jobs."""
 
-    total: int
-    done: int
-    failed: int
-    common: set[str]
-    started: float
-    first: float
-
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0
         self.common = shared(jobs)
         self.jobs: dict[str, int] = {}  # done, by variant
         self.best: dict[str, float] = {}
-        self.started = self.first = time.perf_counter()
+        self.first = time.perf_counter()
 
     def add(self, job: SweepJob, end: Status) -> None:
         variant = job.variant(self.common)
@@ -69,14 +62,11 @@ def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], 
         with _live(tally) as callback:
             yield callback
         return
-    due = FIRST_LINE
+    pace = Pace()
 
     def note(job: SweepJob, end: Status) -> None:
-        nonlocal due
         tally.add(job, end)
-        spent = time.perf_counter() - tally.started
-        if spent >= due and tally.done < tally.total:
-            due = spent + NEXT_LINES
+        if pace() and tally.done < tally.total:
             say(tally.line())
 
     yield note

@@ -16,7 +16,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
-from tractexp.progress import NEXT_LINES, say, telling
+from tractexp.progress import NEXT_LINES, Pace, say, telling
 
 if TYPE_CHECKING:
     from tractexp.studies.paper.claims import Claim
@@ -162,13 +162,10 @@ def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "
 
 def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
     """A counter of the searches that have ended, which reports now and then."""
-    last = time.perf_counter()
+    pace = Pace(NEXT_LINES)
 
     def count(done: int, total: int) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        if done == total or now - last > NEXT_LINES:
-            last = now
+        if pace() or done == total:
             tell(f"  {done} of {total} searches")
 
     return count
