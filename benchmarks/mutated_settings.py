@@ -198,7 +198,7 @@ def perform(arguments, folder):
 
             asked = {key: job.config[key] for key in ("budget", "time_limit", "target")}
             setup = Setup.of(
-                job.events.train, job.config["model"], job.events.validate, job.config["objective"], {}, **asked
+                job.events.train, job.config["model"], job.events.validate, job.config["objective"], **asked
             )
             optimizer = Choice.of("optimizer", job.config["optimizer"]).build("optimizer")
             search(setup.problem, optimizer, job.seed, Limits(60, 5.0, job.config["target"]))

@@ -257,7 +257,6 @@ class Investigation(Written):
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
-    """A parameter of an effect as one line."""
     error = float("nan") if at["standard_error"] is None else at["standard_error"]
     return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
 
@@ -307,7 +306,6 @@ def investigate(
 
 
 def _steps(question: Question, progress: Progress) -> "Steps":
-    """The investigation."""
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import investigate as findings_of
 
@@ -356,13 +354,12 @@ class Discrepancy(Task, call=investigate):
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 
     def perform(self, job: Job, **instead: Any) -> Investigation:
-        events = job.events_of_fit
-        for line in recorded(events.train, events.validate, "hold out"):
+        train, held = job.events_of_fit
+        for line in recorded(train, held, "hold out"):
             say(line)
         job.prepare_log()
-        return super().perform(
-            job, records=events.train, validate=events.validate, progress=lambda line: say(f"  {line}"), **instead
-        )
+        told: dict[str, Any] = {"records": train, "validate": held, "progress": lambda line: say(f"  {line}")}
+        return super().perform(job, **told, **instead)
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""

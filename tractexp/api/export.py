@@ -72,9 +72,9 @@ def export(
     from tractexp.exchange.playback import played
     from tractexp.record.identity import described
 
-    for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
-        if value is not None:
-            check_range(f"task.{name}", value, least)
+    check_range("task.bus", bus, 1)
+    check_range("task.power", power, 1e-6)
+    check_range("task.voltage", voltage, 1e-6)
     check_choice("task.base", base, BASES)
     if fit.doubts and not doubtful:
         raise UserError(

@@ -381,13 +381,9 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
-    model_settings = {
-        "bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain,
-        "priors": priors,
-    }  # fmt: skip
     setup = FitSpec.of(
-        records, model, validate, objective, model_settings, seed=seed, budget=budget, time_limit=time_limit,
-        target=target,
+        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
+        domain=domain, priors=priors, seed=seed, budget=budget, time_limit=time_limit, target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
     end = None

@@ -121,17 +121,14 @@ def plan(
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
     rivals = rivals if isinstance(rivals, str) else [*rivals]
-    if rivals:
-        model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-        return recommended(Setup.of(records, model, (), None, model_settings), rivals, progress)
-    check_range("task.within", within, 1e-6, 10.0)
-    check_range("task.least", least, 0.0, 1.0)
-    if events is not None:
+    if not rivals:
+        check_range("task.within", within, 1e-6, 10.0)
+        check_range("task.least", least, 0.0, 1.0)
         check_range("task.events", events, 1)
-    if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
-    model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-    setup = Setup.of(records, model, (), None, model_settings)
+    setup = Setup.of(records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain)
+    if rivals:
+        return recommended(setup, rivals, progress)
     if isinstance(values, Identification):
         values = values.result.on_base_of(setup.train[0].record)
     asked = {

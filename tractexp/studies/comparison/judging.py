@@ -131,7 +131,7 @@ def _problem(run: "SearchRun") -> "Problem":
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
         records = build("data", config["data"]).read()
     train = [detect(record) for record in records.train]
-    return Setup.of(train, config["model"], (), config.get("objective"), {}).problem
+    return Setup.of(train, config["model"], objective=config.get("objective")).problem
 
 
 def plain() -> dict[str, str]:
