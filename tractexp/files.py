@@ -4,6 +4,7 @@ Nothing else in the package opens a file to write. What a job prints, which grow
 """
 
 import contextlib
+import dataclasses
 import errno
 import importlib.resources
 import io
@@ -277,7 +278,7 @@ def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path
 
 
 def plain(content: Any) -> Any:
-    """Content as JSON knows it: NumPy's numbers and arrays, tuples and paths turned into plain ones, nan into None."""
+    """Content as JSON knows it: dataclasses, NumPy's arrays, tuples and paths turned into plain ones, nan into None."""
     if isinstance(content, dict):
         return {str(key): plain(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
@@ -286,6 +287,8 @@ def plain(content: Any) -> Any:
         return plain(content.tolist())
     if isinstance(content, float):
         return content if math.isfinite(content) else None
+    if dataclasses.is_dataclass(content) and not isinstance(content, type):
+        return plain(dataclasses.asdict(content))
     return content if isinstance(content, int | bool | None) else encoded(str(content)).decode()
 
 

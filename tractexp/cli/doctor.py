@@ -117,10 +117,7 @@ def caches() -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if gone:
         yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
-    yield (
-        SOUND,
-        f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels",
-    )
+    yield SOUND, f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels"
 
 
 def leavings(folder: Path) -> Iterator[Finding]:
@@ -152,7 +149,7 @@ def store(uri: str) -> Iterator[Finding]:
         files.move(database, aside)
         yield HEALED, f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}"
     try:
-        tracking.prepare(uri)
+        tracking.open_store(uri)
     except UserError as error:
         yield WRONG, str(error)
         return

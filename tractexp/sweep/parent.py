@@ -61,7 +61,6 @@ def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
 
 
 def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
-    """Close the parent run."""
     from tractexp import tracking
     from tractexp.tracking.runfile import save
 
@@ -84,7 +83,6 @@ def _send(folder: Path, uri: str) -> None:
 
 
 def metrics(jobs: list[Any]) -> dict[str, float]:
-    """The figures of a sweep as a whole."""
     ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
     best = [f for _, folder in ends if (f := objective(folder)) is not None]
     counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}

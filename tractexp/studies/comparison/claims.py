@@ -7,6 +7,7 @@ from tractexp.studies.comparison.comparison import Comparison, VariantPair, seed
 from tractexp.studies.comparison.floor import AT_FLOOR
 from tractexp.studies.comparison.statistics import ALPHA
 from tractexp.studies.comparison.summary import Spread
+from tractexp.wording import joined
 
 MORE = 1.2  # times the simulations of another variant are worth a word
 
@@ -105,10 +106,7 @@ def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[Varian
 
 
 def _listed(names: list[str]) -> str:
-    names = sorted(names)
-    if len(names) > 6:
-        return f"{len(names)} other variants"
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return joined(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
 
 
 def of_pair(comparison: Comparison, pair: VariantPair) -> str:

@@ -203,10 +203,6 @@ def motor_reactive(value: Mapping[str, float], U0: float) -> float:
 class Sphere:
     """The sum of squares about an optimum, in the box [-5, 5]^d: a problem for the search loop."""
 
-    optimum: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
-
     def __init__(self, optimum: np.ndarray):
         self.optimum = optimum
         self.lower, self.upper = np.full(len(optimum), -5.0), np.full(len(optimum), 5.0)

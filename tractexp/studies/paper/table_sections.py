@@ -133,7 +133,7 @@ def _spent(study: Study, name: str) -> list[str]:
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         label(name), middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
-        "-" if literal else f"{study.floor_share(ends):.0%}",
+        "-" if literal else f"{np.mean(ends <= AT_FLOOR * study.floor):.0%}",
         "-" if literal else middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
