@@ -23,9 +23,11 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
-from tractexp.identification.result import Result
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import Result, conclude
+from tractexp.identification.search import History, SearchResult
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
+from tractexp.plugin import get, plugin
 from tractexp.progress import Progress, console, say, telling
 from tractexp.wording import joined, shown_in_words, with_error
 
@@ -168,8 +170,6 @@ class Investigation(Written):
 
     @staticmethod
     def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        from tractexp.plugin import get
-
         own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
         return [_size(p.name, parameters[p.name], p.unit) for p in own]
 
@@ -330,9 +330,6 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The extended model's parameters as a result, which predicts and is logged as a model."""
     from tractexp.discrepancy.recommended import adequacy
-    from tractexp.identification.problem import Problem
-    from tractexp.identification.result import conclude
-    from tractexp.identification.search import History, SearchResult
 
     base, bench, unit = question.model, steps.context, steps.extended.unit
     model = base.with_(effects=sorted({*base.effects, *steps.names}))

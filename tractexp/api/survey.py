@@ -17,7 +17,9 @@ from tractexp.outcome import Written
 from tractexp.overrides import typed
 from tractexp.plugin import discover, get, plugin
 from tractexp.progress import Progress, counting, staged
+from tractexp.record import detect
 from tractexp.recording import archive
+from tractexp.report import survey as shown
 from tractexp.report.survey import UNREAD
 from tractexp.store import Store
 
@@ -76,19 +78,13 @@ class Surveyed(Written):
         return self.rows.to_frame()
 
     def table(self) -> Table:
-        from tractexp.report import survey
-
-        return survey.kinds(self.content)
+        return shown.kinds(self.content)
 
     def summary(self) -> Report:
-        from tractexp.report import survey
-
-        return survey.summary(self.content)
+        return shown.summary(self.content)
 
     def report(self) -> Report:
-        from tractexp.report import survey
-
-        return survey.report(self.content)
+        return shown.report(self.content)
 
     def write_results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
@@ -167,7 +163,6 @@ def _best(
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
     from tractexp.api.plan import chosen_events
     from tractexp.api.setup import Setup
-    from tractexp.record import detect
 
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")

@@ -14,7 +14,7 @@ from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
-from tractexp.plugin import Plugin, build
+from tractexp.plugin import Plugin, build, get
 from tractexp.progress import console, say
 
 if TYPE_CHECKING:
@@ -260,7 +260,6 @@ class Job:
 
         [] for tasks without records, and for data that have a name of their own, as the shipped ones.
         """
-        from tractexp.plugin import get
         from tractexp.record.identity import Identity
 
         named = self.choices["data"] != self.config["data"]["name"]

@@ -9,6 +9,7 @@ from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.recommended import held
+from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
 from tractexp.wording import joined, with_error
 
@@ -75,7 +76,6 @@ def parameters(page: Report, findings: Findings) -> None:
 
 def equations(page: Report, findings: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
-    from tractexp.model.model import compose
     from tractexp.model.printed import changed
 
     page.heading("The extended model")
