@@ -16,7 +16,7 @@ import importlib
 import inspect
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -164,23 +164,19 @@ def import_all(packages: Iterable[ModuleType]) -> None:
 
 def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
     """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
-    refused, imported = {}, []
-    for point in entry_points():
+    refused: dict[str, str] = {}
+
+    def tried(name: str, function: Callable[[Any], Any], given: Any) -> list[Any]:
         try:
-            package = _package(point)
+            return [function(given)]
         except UserError as error:
-            refused[point.module] = str(error)
-            continue
-        for name in modules(package.__name__, package.__path__):
-            try:
-                imported.append(_module(name))
-            except UserError as error:
-                refused[name] = str(error)
-    for module in imported:
-        try:
-            _check_decorated(module)
-        except UserError as error:
-            refused[module.__name__] = str(error)
+            refused[name] = str(error)
+            return []
+
+    found = [package for point in entry_points() for package in tried(point.module, _package, point)]
+    names = [name for package in found for name in modules(package.__name__, package.__path__)]
+    for module in [module for name in names for module in tried(name, _module, name)]:
+        tried(module.__name__, _check_decorated, module)
     return _registry, refused
 
 

@@ -279,7 +279,6 @@ class Chart:
         return {"data": data, "layout": layout, "cursor": self._cursor}
 
     def element(self, label: str) -> str:
-        """The chart as an element of a page."""
         data = quoting.script(self.plain())
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'

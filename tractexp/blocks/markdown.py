@@ -8,7 +8,6 @@ from tractexp.blocks import block as blocks
 
 
 def markdown(report: Report) -> str:
-    """The whole report."""
     parts = [f"# {quoting.markdown(report.title)}"] + [quoting.markdown(report.lead)] * bool(report.lead)
     return "\n\n".join([*parts, *(part for block in report.blocks for part in _parts(block))]) + "\n"
 

@@ -85,7 +85,6 @@ def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
 
 
 def _closest(drawn: PosteriorSample) -> tuple[int, int]:
-    """The two parameters whose draws correlate most."""
     r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
     np.fill_diagonal(r, -1.0)
     a, b = np.unravel_index(r.argmax(), r.shape)

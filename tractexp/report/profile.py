@@ -131,7 +131,6 @@ def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
 
 
 def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
-    """Which parameters are not identified."""
     poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 

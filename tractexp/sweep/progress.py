@@ -45,7 +45,6 @@ class Tally:
         return f"about {spent * (self.total - self.done) / (self.done - 1):.0f} s left"
 
     def line(self) -> str:
-        """The state in one line."""
         parts = [f"{self.done} of {self.total} jobs"]
         if self.failed:
             parts.append(f"{self.failed} failed")

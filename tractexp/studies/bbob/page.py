@@ -13,7 +13,6 @@ from tractexp.wording import counted
 
 
 def scale(benchmark: BbobRuns) -> str:
-    """What was run, in words."""
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (

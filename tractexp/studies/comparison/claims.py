@@ -82,7 +82,6 @@ def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], 
 
 
 def headline(comparison: Comparison) -> str:
-    """How the best variant stands to the others."""
     if not comparison.pairs:
         return "No difference between variants was tested."
     best, *others = comparison.leaders
@@ -164,7 +163,6 @@ def of_speed(comparison: Comparison) -> str:
 
 
 def of_floor(comparison: Comparison) -> str:
-    """How often the noise floor was reached."""
     shares = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
     return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {shares}."
@@ -186,7 +184,6 @@ def _ranked(rows: list[tuple[float, int, str]]) -> str:
 
 
 def of_effect(effect: SwitchEffect) -> str:
-    """A switch's own effect."""
     (switch,) = effect.switches
     verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
     return (

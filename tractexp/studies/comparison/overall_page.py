@@ -95,7 +95,6 @@ def effects(overall: Overall) -> Chart:
 
 
 def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
-    """Main effects with sizes and costs, and interactions."""
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
     columns += ["simulations per iteration"] if cost else []

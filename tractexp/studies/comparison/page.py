@@ -43,12 +43,10 @@ def report(comparison: Comparison, source: str) -> Report:
 
 
 def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
-    """Best, lower quartile, median, upper quartile, worst."""
     return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
 
 
 def quality(page: Report, comparison: Comparison) -> None:
-    """Where the runs ended: every run, and quartiles."""
     page.heading("Where the runs ended")
     drawn = charts.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
@@ -168,7 +166,6 @@ def _pairs(page: Report, pairs: list[VariantPair]) -> None:
 
 
 def switches(page: Report, ablation: Ablation) -> None:
-    """The effects of the switches on one problem."""
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]

@@ -158,7 +158,6 @@ def _methods() -> list[Check]:
 
 
 def _rankings() -> list[Check]:
-    """What the text says of the tables."""
     results = []
     tables = {"epsilon_p": printed.EPSILON_P, "epsilon_q": printed.EPSILON_Q, "Obj.E": printed.OBJECTIVE}
     for said, table in tables.items():

@@ -89,7 +89,6 @@ class Study:
 
     @functools.cached_property
     def orders(self) -> dict[str, orders.Order]:
-        """Table 1."""
         self.tell("Table 1: fitting three orders of the motor")
         return {m: orders.fit(self.node, m, self.train, self.held_out, self.seed) for m in printed.TABLE_1}
 
