@@ -4,6 +4,7 @@ from tractexp.files import PACKAGE, located
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.table import ENDINGS
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.filetypes.tabulated_waves import recording
 from tractexp.filetypes.tidy import restored
@@ -15,7 +16,7 @@ from tractexp.recording.estimator import estimator_of
 from tractexp.wording import counted
 
 __all__ = [
-    "DECLARATION", "LOAD", "PACKAGE", "QUANTITIES", "SIZES", "FileDip", "Powers", "Sidecar", "Tabular", "beside", "cev",
-    "check_load", "check_numbers", "chosen", "comtrade", "counted", "estimator_of", "kind_of", "level", "located",
-    "numbered", "powers", "pqdif", "recording", "records", "restored", "signs", "survey_of", "tidy",
+    "DECLARATION", "ENDINGS", "LOAD", "PACKAGE", "QUANTITIES", "SIZES", "FileDip", "Powers", "Sidecar", "Tabular",
+    "beside", "cev", "check_load", "check_numbers", "chosen", "comtrade", "counted", "estimator_of", "kind_of", "level",
+    "located", "numbered", "powers", "pqdif", "recording", "records", "restored", "signs", "survey_of", "tidy",
 ]  # fmt: skip
