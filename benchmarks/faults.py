@@ -272,7 +272,7 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     from tractexp.tracking.runfile import save
 
     empty = made(work / "empty")
-    forked(lambda: tracking.prepare(tracking.default_uri(empty)))
+    forked(lambda: tracking.open_store(tracking.default_uri(empty)))
 
     def logs(folder: Path, n: int | None) -> Callable[[], None]:
         def act() -> None:
@@ -283,7 +283,7 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
             run = TrackedRun("e", "job", {"a": 1}, {"x": 1.0}, {"c": (steps, steps)},
                       artifacts=[folder / "result.json"], children=[child])  # fmt: skip
             kept = save(folder / "job", run, uri)
-            tracking.prepare(uri)
+            tracking.open_store(uri)
             count = counting_statements(n)
             kept.logged(tracking.log(kept.run, uri))
             print("statements", count[0])

@@ -404,11 +404,12 @@ def run(count, seed):
         return {"files": count, "seed": seed, "counts": counts, "worst": worst, "bad": bad}
 
 
-def main():
-    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+def command(run, about, place):
+    """The exit code of a benchmark's command: `run(count, seed)` damages, and its counts go to a file beside it."""
+    asked = argparse.ArgumentParser(description=about.splitlines()[0])
     asked.add_argument("--count", type=int, default=10_000)
     asked.add_argument("--seed", type=int, default=1)
-    asked.add_argument("--json", type=Path, default=Path(__file__).with_suffix(".json"))
+    asked.add_argument("--json", type=Path, default=Path(place).with_suffix(".json"))
     told = asked.parse_args()
     found = run(told.count, told.seed)
     files.write_json(told.json, found)
@@ -419,4 +420,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command(run, __doc__, __file__))

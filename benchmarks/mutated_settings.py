@@ -9,7 +9,6 @@ warning, words of Python in what a user reads, more than 10 s of processor time.
 exit code says whether all held.
 """
 
-import argparse
 import copy
 import json
 import os
@@ -27,7 +26,7 @@ import tractexp  # before NumPy: it keeps BLAS to one thread
 tractexp.__version__  # noqa: B018
 
 import numpy as np  # noqa: E402
-from mutated_files import DAMAGE, LEAKS, NASTY  # noqa: E402
+from mutated_files import DAMAGE, LEAKS, NASTY, command  # noqa: E402
 
 from tractexp import files  # noqa: E402
 from tractexp.choices import CONF  # noqa: E402
@@ -198,7 +197,7 @@ def perform(arguments, folder):
 
             asked = {key: job.config[key] for key in ("budget", "time_limit", "target")}
             setup = Setup.of(
-                job.events.train, job.config["model"], job.events.validate, job.config["objective"], {}, **asked
+                job.events.train, job.config["model"], job.events.validate, job.config["objective"], **asked
             )
             optimizer = Choice.of("optimizer", job.config["optimizer"]).build("optimizer")
             search(setup.problem, optimizer, job.seed, Limits(60, 5.0, job.config["target"]))
@@ -307,7 +306,7 @@ def prepared():
     return GlobalHydra.instance().clear
 
 
-def run(count, seed, tell=lambda *_: None):
+def run(count, seed):
     counts = {"configuration": {}, "sidecar": {}}
     bad, worst = [], 0.0
     end = prepared()
@@ -327,24 +326,11 @@ def run(count, seed, tell=lambda *_: None):
                         else Path(given[0]).with_suffix(".json").read_bytes().decode(errors="replace")
                     )
                     bad.append({"number": k, "what": what, "kind": kind, "given": str(shown)[:600], "words": words})
-                    tell(bad[-1])
         finally:
             os.chdir(here)
             end()
     return {"mutants": count, "seed": seed, "counts": counts, "slowest": round(worst, 1), "bad": bad}
 
 
-def main():
-    asked = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    asked.add_argument("--count", type=int, default=10_000)
-    asked.add_argument("--seed", type=int, default=1)
-    asked.add_argument("--json", type=Path, default=Path(__file__).with_suffix(".json"))
-    told = asked.parse_args()
-    found = run(told.count, told.seed, lambda one: print(one, flush=True))
-    files.write_json(told.json, found)
-    print(json.dumps(found["counts"], indent=1))
-    return len(found["bad"]) > 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(command(run, __doc__, __file__))

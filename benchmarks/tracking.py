@@ -39,7 +39,7 @@ if compute:
 else:
     store.import_mlflow(sql=True)
     lap("import_mlflow")
-    tracking.prepare(uri)
+    tracking.open_store(uri)
     lap("open_store")
 steps, fitness = np.arange(300), np.geomspace(1, 1e-5, 300)
 result = folder / "result.json"

@@ -97,7 +97,7 @@ def empty_store(tmp_path_factory) -> Path:
 
     side_by_side = "PYTEST_XDIST_WORKER" in os.environ
     folder = tmp_path_factory.getbasetemp().parent / "store" if side_by_side else tmp_path_factory.mktemp("store")
-    tracking.prepare(tracking.default_uri(folder))
+    tracking.open_store(tracking.default_uri(folder))
     return folder / "outputs" / "mlflow.db"
 
 

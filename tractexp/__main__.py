@@ -17,13 +17,8 @@ from tractexp.errors import Stopped, UserError  # noqa: E402
 from tractexp.output import outlet  # noqa: E402
 from tractexp.wording import one_line  # noqa: E402
 
-UNLOGGED = (
-    "-",
-    "tracking.enabled=",
-    "task=export",
-    "experiment=",
-    "hydra.mode=",
-)  # no single job that is logged: maybe
+# what no single job that is logged has: maybe
+UNLOGGED = ("-", "tracking.enabled=", "task=export", "experiment=", "hydra.mode=")
 SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
 COMMANDS = {  # beside the tasks: where each is
     "ui": "tractexp.cli.ui:ui", "look": "tractexp.cli.look:look", "sync": "tractexp.cli.sync:sync",

@@ -64,6 +64,15 @@ def leaves(node: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any
             yield f"{prefix}{key}", value
 
 
+def texts(content: Any) -> Iterator[str]:
+    """Every text in a configuration."""
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, Mapping | list | tuple):
+        for inner in content.values() if isinstance(content, Mapping) else content:
+            yield from texts(inner)
+
+
 def choices(group: str, *, files: bool = False) -> list[str]:
     """The names one may choose in a group, or those among them that have a file."""
     named = {file.stem for folder in folders() for file in (folder / group).glob("*.yaml")}

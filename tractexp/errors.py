@@ -114,8 +114,8 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
             raise UserError(f"{setting(where)} names {value} twice; name each once")
 
 
-def check_range(where: str, value: float, low: float = float("-inf"), high: float = float("inf")) -> None:
-    """Raise `UserError` unless low <= value <= high and it is finite; `where` is the setting's full key."""
-    if not low <= value <= high or math.isinf(value):
+def check_range(where: str, value: float | None, low: float = float("-inf"), high: float = float("inf")) -> None:
+    """Raise `UserError` unless low <= value <= high and it is finite, or None; `where` is the setting's full key."""
+    if value is not None and (not low <= value <= high or math.isinf(value)):
         limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
         raise UserError(f"{setting(where)}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")

@@ -4,6 +4,7 @@ Nothing else in the package opens a file to write. What a job prints, which grow
 """
 
 import contextlib
+import dataclasses
 import errno
 import importlib.resources
 import io
@@ -104,22 +105,16 @@ def read_json(path: Path | str) -> Any:
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
 
 
-def write(
-    path: Path | str, content: str | bytes, *, lasting: bool = True, modified: float | None = None,
-    private: bool = False,
-) -> Path:  # fmt: skip
+def write(path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False) -> Path:
     """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
 
     What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache or a log need not
-    wait for that. `modified` [s since 1970] is a time stamp to give it. What is `private` nobody else can read.
-    Raises `UserError` where the folder or the file cannot be written.
+    wait for that. What is `private` nobody else can read. Raises `UserError` where the folder or the file cannot be
+    written.
     """
     path = Path(path)
-    data = encoded(content)
     with _as_user_error(path), _beside(path) as temporary:
-        _fill(temporary, data, lasting, private)
-        if modified is not None:
-            os.utime(temporary, (modified, modified))
+        _fill(temporary, encoded(content), lasting, private)
         os.replace(temporary, path)
         if lasting:
             _settle(path.parent)
@@ -129,21 +124,6 @@ def write(
 def encoded(content: str | bytes) -> bytes:
     """Text as UTF-8; half a character, as in a name that is no text, becomes its escape."""
     return content.encode(errors="backslashreplace") if isinstance(content, str) else content
-
-
-def offer(path: Path | str, content: str | bytes) -> None:
-    """As `write`, but a file that is there already stays: of several processes the first one's stands."""
-    path = Path(path)
-    data = encoded(content)
-    with _as_user_error(path), _beside(path) as temporary:
-        _fill(temporary, data, lasting=False)
-        try:
-            os.link(temporary, path)  # fails where the file exists, unlike os.replace
-        except FileExistsError:
-            pass
-        except OSError:  # a file system without links
-            if not path.exists():
-                os.replace(temporary, path)
 
 
 def copy(source: Path | str, target: Path | str) -> Path:
@@ -234,14 +214,14 @@ def inside(path: Path, folder: Path) -> bool:
         return False
 
 
-def leftovers(folder: Path, older: float = 3600.0) -> list[Path]:
-    """Partial files of killed processes of ours in `folder` and below, at least `older` seconds old."""
+def leftovers(folder: Path) -> list[Path]:
+    """Partial files of killed processes of ours in `folder` and below, those of the last hour apart."""
     now = time.time()
     halves = []
     for path in folder.rglob(f"*{PART}"):
         with contextlib.suppress(OSError):
             ours = OWN.fullmatch(path.name) and path.is_file() and not path.is_symlink()
-            if ours and now - path.stat().st_mtime > older:
+            if ours and now - path.stat().st_mtime > 3600:
                 halves.append(path)
     return halves
 
@@ -267,7 +247,7 @@ def _beside(path: Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def _fill(temporary: Path, data: bytes, lasting: bool, private: bool = False) -> None:
+def _fill(temporary: Path, data: bytes, lasting: bool, private: bool) -> None:
     with temporary.open("wb") as file:
         file.write(data)
         file.flush()
@@ -298,7 +278,7 @@ def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path
 
 
 def plain(content: Any) -> Any:
-    """Content as JSON knows it: NumPy's numbers and arrays, tuples and paths turned into plain ones, nan into None."""
+    """Content as JSON knows it: dataclasses, NumPy's arrays, tuples and paths turned into plain ones, nan into None."""
     if isinstance(content, dict):
         return {str(key): plain(value) for key, value in content.items()}
     if isinstance(content, list | tuple):
@@ -307,6 +287,8 @@ def plain(content: Any) -> Any:
         return plain(content.tolist())
     if isinstance(content, float):
         return content if math.isfinite(content) else None
+    if dataclasses.is_dataclass(content) and not isinstance(content, type):
+        return plain(dataclasses.asdict(content))
     return content if isinstance(content, int | bool | None) else encoded(str(content)).decode()
 
 

@@ -12,12 +12,8 @@ WORDS: Mapping[Any, str] = {
     int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
 }  # fmt: skip
 GIVEN: Mapping[Any, str] = {
-    bool: "a truth value",
-    type(None): "nothing",
-    dict: "a mapping",
-    list: "a list",
-    tuple: "a list",
-}
+    bool: "a truth value", type(None): "nothing", dict: "a mapping", list: "a list", tuple: "a list",
+}  # fmt: skip
 
 
 def check_kind(name: str, value: Any, annotation: Any) -> None:

@@ -16,7 +16,7 @@ import importlib
 import inspect
 import sys
 import traceback
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -120,11 +120,8 @@ def schema(cls: type[Plugin]) -> type:
         fields: list[Any] = [("name", str, dataclasses.field(default=cls.name))]
         types = get_type_hints(cls)
         for item in dataclasses.fields(cls):  # type: ignore[arg-type]
-            if item.default_factory is not dataclasses.MISSING:
-                default: Any = dataclasses.field(default_factory=item.default_factory)
-            else:
-                default = dataclasses.field(default=item.default)
-            fields.append((item.name, types[item.name], default))
+            default: Any = {"default": item.default, "default_factory": item.default_factory}
+            fields.append((item.name, types[item.name], dataclasses.field(**default)))
         _schemas[cls] = dataclasses.make_dataclass(f"{cls.__name__}Config", fields)
     return _schemas[cls]
 
@@ -167,23 +164,19 @@ def import_all(packages: Iterable[ModuleType]) -> None:
 
 def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
     """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
-    refused, imported = {}, []
-    for point in entry_points():
+    refused: dict[str, str] = {}
+
+    def tried(name: str, function: Callable[[Any], Any], given: Any) -> list[Any]:
         try:
-            package = _package(point)
+            return [function(given)]
         except UserError as error:
-            refused[point.module] = str(error)
-            continue
-        for name in modules(package.__name__, package.__path__):
-            try:
-                imported.append(_module(name))
-            except UserError as error:
-                refused[name] = str(error)
-    for module in imported:
-        try:
-            _check_decorated(module)
-        except UserError as error:
-            refused[module.__name__] = str(error)
+            refused[name] = str(error)
+            return []
+
+    found = [package for point in entry_points() for package in tried(point.module, _package, point)]
+    names = [name for package in found for name in modules(package.__name__, package.__path__)]
+    for module in [module for name in names for module in tried(name, _module, name)]:
+        tried(module.__name__, _check_decorated, module)
     return _registry, refused
 
 
@@ -235,8 +228,6 @@ def _import_error(what: str) -> Iterator[None]:
 
 def _place(error: Exception) -> str:
     """File and line of an error in what was imported, not in a library it called; "" where nothing was imported."""
-    import traceback
-
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: "
     frames = traceback.extract_tb(error.__traceback__)

@@ -53,7 +53,15 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
         yield None
         return
     if not _lively():
-        yield _Lines(iterations, budget)
+        pace = Pace()
+
+        def line(iteration: int, best: float, simulations: int) -> None:
+            if spent := pace():
+                rest = remaining(spent, share(iteration, simulations, iterations, budget))
+                say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
+                sys.stdout.flush()
+
+        yield line
         return
     columns = [
         TextColumn("  searching"),
@@ -91,14 +99,12 @@ def counting(what: str, total: int, progress: Progress = None) -> Iterator[Calla
         with _live(columns, total) as update:
             yield lambda: update(advance=1)
         return
-    started, due, done = time.perf_counter(), FIRST_LINE, 0
+    pace, done = Pace(), 0
 
     def count() -> None:
-        nonlocal due, done
+        nonlocal done
         done += 1
-        spent = time.perf_counter() - started
-        if spent >= due and done < total:
-            due = spent + NEXT_LINES
+        if (spent := pace()) and done < total:
             rate, rest = done / spent, spent * (total - done) / done
             say(f"  {done} of {total} {what}, {rate:.2g} a second, about {rest:.0f} s left")
             sys.stdout.flush()
@@ -155,20 +161,18 @@ def remaining(spent: float, done: float | None) -> str:
     return f", about {spent / done - spent:.0f} s left" if done and done < 1 else ""
 
 
-class _Lines:
-    def __init__(self, iterations: int | None, budget: int | None):
-        self.iterations, self.budget = iterations, budget
-        self.started = time.perf_counter()
-        self.due = FIRST_LINE
+class Pace:
+    """When a log file gets its lines: each call gives the seconds since the start where one is due, else 0."""
 
-    def __call__(self, iteration: int, best: float, simulations: int) -> None:
+    def __init__(self, first: float | None = None):
+        self.started, self.due = time.perf_counter(), FIRST_LINE if first is None else first
+
+    def __call__(self) -> float:
         spent = time.perf_counter() - self.started
         if spent < self.due:
-            return
+            return 0.0
         self.due = spent + NEXT_LINES
-        rest = remaining(spent, share(iteration, simulations, self.iterations, self.budget))
-        say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
-        sys.stdout.flush()
+        return spent
 
 
 def _lively() -> bool:

@@ -7,6 +7,8 @@ from typing import Any
 
 from tractexp.errors import UserError, among, check_range
 
+LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}  # of numbers
+
 
 @dataclass
 class ModelConfig:
@@ -64,6 +66,5 @@ def check(config: Mapping[str, Any]) -> None:
         for key in keys:
             if key not in part:
                 raise UserError(f"{where}{key} is taken out, and every run needs it; leave it as it is")
-    for key, least in {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}.items():
-        if config[key] is not None:
-            check_range(key, config[key], least)
+    for key, least in LEAST.items():
+        check_range(key, config[key], least)

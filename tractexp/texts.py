@@ -23,7 +23,8 @@ def text_of(parts: Iterable[object], generate: Callable[[], str], what: str) -> 
     makes texts, and SymPy's version. Of a part that stands in no file, such as one typed into a notebook, or whose
     `repr` shows an address instead of its settings, nothing is stored: another object may stand at that address later.
     """
-    return _stored(_key_of(parts, what), generate)
+    parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
+    return _stored(_key([type(part).__module__ for part in parts], repr(parts), what), generate)
 
 
 def text_in(module: str, settings: str, generate: Callable[[], str], what: str) -> str:
@@ -33,11 +34,6 @@ def text_in(module: str, settings: str, generate: Callable[[], str], what: str) 
 
 def _stored(key: str, generate: Callable[[], str]) -> str:
     return TEXTS.get(key, lambda: generate().encode()).decode()
-
-
-def _key_of(parts: Iterable[object], what: str) -> str:
-    parts = tuple(one for part in parts for one in (part, *getattr(part, "members", ())))
-    return _key([type(part).__module__ for part in parts], repr(parts), what)
 
 
 def _key(modules: Sequence[str], settings: str, what: str) -> str:

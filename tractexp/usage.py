@@ -66,7 +66,6 @@ Values are changed by KEY=VALUE
 
 
 def usage() -> str:
-    """The text of `--help`."""
     options = choices()
     tasks = {name: re.split("[:;] ", options["task"][name].about)[0] for name in _sorted("task", options["task"])}
     groups = {group: _summary(group, options[group]) for group in _ordered(options) if group not in LATER}

@@ -20,8 +20,7 @@ class Huber(Loss):
     def check(self) -> None:
         super().check()
         check_range("objective.tuning", self.tuning, 1e-3)
-        if self.scale is not None:
-            check_range("objective.scale", self.scale, 1e-9)
+        check_range("objective.scale", self.scale, 1e-9)
 
     def rho(self, z: np.ndarray) -> np.ndarray:
         return np.where(z <= self.tuning**2, z, 2 * self.tuning * np.sqrt(z) - self.tuning**2)

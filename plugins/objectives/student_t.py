@@ -20,8 +20,7 @@ class StudentT(Loss):
     def check(self) -> None:
         super().check()
         check_range("objective.freedom", self.freedom, 0.5)
-        if self.scale is not None:
-            check_range("objective.scale", self.scale, 1e-9)
+        check_range("objective.scale", self.scale, 1e-9)
 
     def rho(self, z: np.ndarray) -> np.ndarray:
         return self.freedom * np.log1p(z / self.freedom)

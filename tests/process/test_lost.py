@@ -187,7 +187,7 @@ def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(
     else:
         other.execute("BEGIN EXCLUSIVE")
     with contextlib.closing(other), pytest.raises(UserError, match=f"cannot be used: .*{reason}"):
-        tracking.prepare(uri)
+        tracking.open_store(uri)
 
 
 # Folders of others

@@ -468,12 +468,12 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
 
 
 def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
-    from tractexp.sweep.status import objective, search_objective
+    from tractexp.sweep.status import objective
 
     for told, ended in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
         (tmp_path / "result.json").write_text(json.dumps(told))
-        assert (objective(tmp_path), search_objective(tmp_path)) == (1.0, ended)
-    assert search_objective(tmp_path / "nowhere") is None
+        assert (objective(tmp_path), objective(tmp_path, of_search=True)) == (1.0, ended)
+    assert objective(tmp_path / "nowhere", of_search=True) is None
 
 
 def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):

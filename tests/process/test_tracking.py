@@ -168,10 +168,10 @@ def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_pat
     script = """
 import os, sys; from pathlib import Path; from tractexp import provenance, tracking
 os.replace = lambda *_: os._exit(9)
-tracking.prepare(tracking.default_uri(Path(sys.argv[1])))"""
+tracking.open_store(tracking.default_uri(Path(sys.argv[1])))"""
     assert python(script, str(tmp_path)).returncode == 9
     assert not (tmp_path / "outputs" / "mlflow.db").exists()
-    tracking.prepare(tracking.default_uri(tmp_path))
+    tracking.open_store(tracking.default_uri(tmp_path))
     assert (tmp_path / "outputs" / "mlflow.db").is_file()
 
 
@@ -272,17 +272,17 @@ def test_a_run_that_is_not_right_is_refused_before_a_store_is_made(tmp_path, run
 def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_store):
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(UserError, match=r"file/outputs/mlflow\.db cannot be used: .*File exists|Not a directory"):
-        tracking.prepare(tracking.default_uri(tmp_path / "file"))
+        tracking.open_store(tracking.default_uri(tmp_path / "file"))
     (tmp_path / "junk.db").write_bytes(b"not a database " * 100)
     with pytest.raises(UserError, match=r"junk\.db cannot be used: .*not a database"):
-        tracking.prepare(f"sqlite:///{tmp_path / 'junk.db'}")
+        tracking.open_store(f"sqlite:///{tmp_path / 'junk.db'}")
     (tmp_path / "folder.db").mkdir()
     with pytest.raises(UserError, match=r"folder\.db cannot be used: .*unable to open"):
-        tracking.prepare(f"sqlite:///{tmp_path / 'folder.db'}")
+        tracking.open_store(f"sqlite:///{tmp_path / 'folder.db'}")
     with pytest.raises(UserError, match="address of the MLflow store is empty"):
-        tracking.prepare(" ")
+        tracking.open_store(" ")
     with pytest.raises(UserError, match="foo://x cannot be used"):
-        tracking.prepare("foo://x")
+        tracking.open_store("foo://x")
 
 
 def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence(monkeypatch):
@@ -343,7 +343,7 @@ def test_a_server_that_does_not_answer_is_reported_at_once():
         taken.bind(("127.0.0.1", 0))
         address = f"http://127.0.0.1:{taken.getsockname()[1]}"
         with pytest.raises(UserError, match=rf"{address} cannot be used: .*refused"):
-            tracking.prepare(address)
+            tracking.open_store(address)
 
 
 def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_path, empty_store):
@@ -354,7 +354,7 @@ def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_p
     connection.commit()
     connection.close()
     with pytest.raises(UserError, match=r"another version of MLflow: 'mlflow db upgrade sqlite:.*newer\.db'"):
-        tracking.prepare(f"sqlite:///{database}")
+        tracking.open_store(f"sqlite:///{database}")
 
 
 def test_the_signature_of_the_model_is_what_mlflow_itself_writes(tmp_path, uri):

@@ -423,7 +423,7 @@ def problem():
     from tractexp.record import detect
 
     (record,) = build("data", {"name": "csv", "train": SHIPPED["data.train"]}).read().train
-    return Setup.of([detect(record)], NODE, (), None, {}).problem
+    return Setup.of([detect(record)], NODE).problem
 
 
 def ended_at(problem, optimizer, seed, values, **more):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tractexp.progress import FIRST_LINE
 from tractexp.sweep import launcher, progress
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.output import printing_to
@@ -82,7 +83,7 @@ def test_a_log_file_gets_a_line_now_and_then(jobs, monkeypatch, capsys):
     clock = [0.0]
     monkeypatch.setattr(progress.time, "perf_counter", lambda: clock[0])
     with progress.progress(jobs) as note:
-        for one, at in zip(jobs, (progress.FIRST_LINE, progress.FIRST_LINE + 0.1, 1e3, 2e3), strict=True):
+        for one, at in zip(jobs, (FIRST_LINE, FIRST_LINE + 0.1, 1e3, 2e3), strict=True):
             clock[0] = at
             note(one, ended(one, value=1.0))
     told = capsys.readouterr().out.splitlines()

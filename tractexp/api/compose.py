@@ -14,6 +14,7 @@ from tractexp.choices import choices, defaults, replaced
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_choice, setting
 from tractexp.outcome import Plain, Tabulated
+from tractexp.plugin import discover, get
 
 if TYPE_CHECKING:
     from tractexp.model.model import Model
@@ -150,7 +151,6 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     """{effect: how one of the events shows it}, of those that the model takes and does not have."""
     from tractexp.domain import domain_of
     from tractexp.model.parts import Effect
-    from tractexp.plugin import discover, get
 
     names = discover()["effect"].keys() - {effect.name for effect in model.effects}
     showing = [cls() for cls in (get("effect", name) for name in sorted(names)) if cls.shown is not Effect.shown]

@@ -23,9 +23,11 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
-from tractexp.identification.result import Result
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import Result, conclude
+from tractexp.identification.search import History, SearchResult
 from tractexp.outcome import Written
-from tractexp.plugin import plugin
+from tractexp.plugin import get, plugin
 from tractexp.progress import Progress, console, say, telling
 from tractexp.wording import joined, shown_in_words, with_error
 
@@ -168,8 +170,6 @@ class Investigation(Written):
 
     @staticmethod
     def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        from tractexp.plugin import get
-
         own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
         return [_size(p.name, parameters[p.name], p.unit) for p in own]
 
@@ -257,7 +257,6 @@ class Investigation(Written):
 
 
 def _size(name: str, at: Mapping[str, Any], unit: str) -> str:
-    """A parameter of an effect as one line."""
     error = float("nan") if at["standard_error"] is None else at["standard_error"]
     return f"{name} = {with_error(at['value'], error)}{'' if unit == '1' else f' {unit}'}"
 
@@ -307,7 +306,6 @@ def investigate(
 
 
 def _steps(question: Question, progress: Progress) -> "Steps":
-    """The investigation."""
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.investigate import investigate as findings_of
 
@@ -332,9 +330,6 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The extended model's parameters as a result, which predicts and is logged as a model."""
     from tractexp.discrepancy.recommended import adequacy
-    from tractexp.identification.problem import Problem
-    from tractexp.identification.result import conclude
-    from tractexp.identification.search import History, SearchResult
 
     base, bench, unit = question.model, steps.context, steps.extended.unit
     model = base.with_(effects=sorted({*base.effects, *steps.names}))
@@ -356,13 +351,12 @@ class Discrepancy(Task, call=investigate):
     instead = {"model.per_event": "its parameters are shared by all events, so leave it out"}
 
     def perform(self, job: Job, **instead: Any) -> Investigation:
-        events = job.events_of_fit
-        for line in recorded(events.train, events.validate, "hold out"):
+        train, held = job.events_of_fit
+        for line in recorded(train, held, "hold out"):
             say(line)
         job.prepare_log()
-        return super().perform(
-            job, records=events.train, validate=events.validate, progress=lambda line: say(f"  {line}"), **instead
-        )
+        told: dict[str, Any] = {"records": train, "validate": held, "progress": lambda line: say(f"  {line}")}
+        return super().perform(job, **told, **instead)
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""

@@ -10,9 +10,11 @@ from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import TASK, UserError, check_choice, check_range
+from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.plugin import build, plugin
 from tractexp.progress import say
+from tractexp.record.identity import described
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -70,11 +72,10 @@ def export(
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import played
-    from tractexp.record.identity import described
 
-    for name, value, least in (("bus", bus, 1), ("power", power, 1e-6), ("voltage", voltage, 1e-6)):
-        if value is not None:
-            check_range(f"task.{name}", value, least)
+    check_range("task.bus", bus, 1)
+    check_range("task.power", power, 1e-6)
+    check_range("task.voltage", voltage, 1e-6)
     check_choice("task.base", base, BASES)
     if fit.doubts and not doubtful:
         raise UserError(
@@ -130,8 +131,6 @@ class Export(Task, call=export, given=("fit",)):
     format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
 
     def run(self, job: Job) -> None:
-        from tractexp.identification.result import load
-
         if self.parameters is None:
             raise UserError(
                 f"{TASK.parameters} is not given; it is the path of a result.json, which task=identify writes"

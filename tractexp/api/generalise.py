@@ -108,9 +108,10 @@ def generalise(
     Raises `UserError` for wrong names or values, and where no dip is held out.
     """
     check_range("task.seeds", seeds, 1)
-    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
-    limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
+    setup = Setup.of(
+        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
+        seed=seed, budget=budget, time_limit=time_limit, target=target,
+    )  # fmt: skip
     if not setup.validate:
         raise UserError(
             f"{setting('task=generalise')} needs dips that are not fitted: name them in {DATA.validate}, a milder one "
@@ -142,7 +143,6 @@ def _searched(
 
 
 def _generalised(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
-    """The searches as plain data."""
     from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)

@@ -15,22 +15,25 @@ from tractexp.api.response import Response, respond_to
 from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.choices import set_holding
 from tractexp.errors import Stopped, UserError
-from tractexp.identification.result import Result, by_event
+from tractexp.identification.adequacy import Adequacy, graded
+from tractexp.identification.model_error import ModelError
+from tractexp.identification.prior import departures
+from tractexp.identification.problem import Problem
+from tractexp.identification.result import Result, active_bounds, by_event, conclude, errors_of, refuse_failed
+from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
+from tractexp.provenance import again
 from tractexp.wording import epsilon, joined
 
 if TYPE_CHECKING:
     from tractexp.exchange.operating_point import OperatingPoint
-    from tractexp.identification.adequacy import Adequacy
     from tractexp.identification.agreement import EventAgreement
     from tractexp.identification.estimate import EstimationResult
-    from tractexp.identification.model_error import ModelError
-    from tractexp.identification.problem import Problem
     from tractexp.identification.result import Fit
-    from tractexp.identification.search import SearchResult
     from tractexp.identification.uncertainty import Uncertainty
 
 FIXED = "fixed"
@@ -45,16 +48,13 @@ class FitSpec(Setup):
     optimizer: Choice
     check_intervals: bool = True
 
-    def search_end(self, progress: Progress) -> "SearchResult":
+    def search_end(self, progress: Progress) -> SearchResult:
         """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
 
-    def so_far(self, end: "SearchResult | None") -> "Identification | None":
+    def so_far(self, end: SearchResult | None) -> "Identification | None":
         """Where a search was when it was stopped, as an identification that nothing is judged of."""
-        from tractexp.identification.result import conclude
-        from tractexp.identification.search import REFUSED
-
         if end is None or not end.objective < REFUSED:
             return None
         node, name = self.model.node, self.optimizer.name
@@ -106,7 +106,7 @@ class FitDetails(NamedTuple):
     estimation: "EstimationResult"
     uncertainty: "Uncertainty"  # with the intervals that profiles gave
     agreement: "EventAgreement | None"
-    adequacy: "Adequacy"
+    adequacy: Adequacy
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,7 +122,7 @@ class Identification(Written):
     behind: "FitDetails | None" = None  # None where it was loaded
 
     @classmethod
-    def of(cls, setup: FitSpec, end: "SearchResult", progress: Progress = False) -> "Identification":
+    def of(cls, setup: FitSpec, end: SearchResult, progress: Progress = False) -> "Identification":
         """Judge what a search found."""
         result, details = _concluded(setup, end, progress)
         return cls(result, setup, end, details)
@@ -143,7 +143,7 @@ class Identification(Written):
         return self.setup
 
     @property
-    def search_result(self) -> "SearchResult":
+    def search_result(self) -> SearchResult:
         """Where the search ended."""
         _ = self.spec
         assert self.end is not None
@@ -210,20 +210,18 @@ class Identification(Written):
         return self.grade == "adequate"
 
     @functools.cached_property
-    def model_error(self) -> "ModelError":
+    def model_error(self) -> ModelError:
         """What the model leaves of the response of the fitted dips."""
         return self._error(self.result.model_error)
 
     @functools.cached_property
-    def model_error_held_out(self) -> "ModelError | None":
+    def model_error_held_out(self) -> ModelError | None:
         """What it leaves of the held-out ones; None where there are none."""
         held_out = self.result.model_error.get("held_out")
         return held_out and self._error(held_out)
 
     @staticmethod
-    def _error(content: Mapping[str, Any]) -> "ModelError":
-        from tractexp.identification.model_error import ModelError
-
+    def _error(content: Mapping[str, Any]) -> ModelError:
         if not content:
             raise UserError("this result.json has no model_error: it is of an earlier version; identify again")
         return ModelError.of(content)
@@ -325,8 +323,6 @@ class Identification(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        from tractexp.identification.search import History, SearchResult
-
         setup, end = content["setup"], content["found"]
         if end is not None:
             history = History(**{key: np.array(v, dtype=float) for key, v in end["history"].items()})
@@ -381,13 +377,9 @@ def identify(
     Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
     simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
     """
-    model_settings = {
-        "bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps, "domain": domain,
-        "priors": priors,
-    }  # fmt: skip
     setup = FitSpec.of(
-        records, model, validate, objective, model_settings, seed=seed, budget=budget, time_limit=time_limit,
-        target=target,
+        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
+        domain=domain, priors=priors, seed=seed, budget=budget, time_limit=time_limit, target=target,
         optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
     )  # fmt: skip
     end = None
@@ -398,15 +390,12 @@ def identify(
         raise Stopped.of(stop, result=setup.so_far(end or getattr(stop, "state", None))) from None
 
 
-def _concluded(setup: FitSpec, end: "SearchResult", progress: Progress = False) -> tuple[Result, FitDetails]:
+def _concluded(setup: FitSpec, end: SearchResult, progress: Progress = False) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
-    from tractexp.choices import set_holding
-    from tractexp.identification.adequacy import graded
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.estimate import estimate
     from tractexp.identification.profile import checked
-    from tractexp.identification.result import active_bounds, conclude, errors_of, refuse_failed
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.yardstick import yardstick
 
@@ -442,11 +431,9 @@ def _concluded(setup: FitSpec, end: "SearchResult", progress: Progress = False) 
     return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
 
 
-def _with_priors(problem: "Problem", result: Result) -> list[str]:
+def _with_priors(problem: Problem, result: Result) -> list[str]:
     """The command that holds a motor that no load has to what machines usually are; [] where it is one, or is held."""
     from tractexp.exchange.operating_point import OperatingPoint
-    from tractexp.identification.prior import departures
-    from tractexp.provenance import again
 
     point = OperatingPoint.of(result)
     if problem.priors or not (point and point.doubt) or not departures(problem, problem.defaults[None]).size:
@@ -471,7 +458,6 @@ class Identify(Task, call=identify):
 
 def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, Any]:
     """What is logged of an identification: metrics, the fitness curve and, as a predictor, the model."""
-    from tractexp.identification.search import REFUSED
     from tractexp.tracking import at_common_steps
 
     result, of_search = fit.result, ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")

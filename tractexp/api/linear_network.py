@@ -110,8 +110,7 @@ def linear_network(
     """
     domain = domain or defaults()[DOMAIN]
     check_choice("domain", domain, sorted(choices()[DOMAIN]))
-    if poles is not None:
-        check_range("task.poles", poles, 0, MOST)
+    check_range("task.poles", poles, 0, MOST)
     train, held_out = dips_together(records, validate)
     request = NetworkFit(train, held_out, domain, poles, {})
     tell(progress, recorded(train, held_out))

@@ -86,25 +86,24 @@ class Look(Written):
     @property
     def feeders(self) -> Listed:
         """One row for each load: its channels, voltage and power before anything happened, the command that fits."""
-        rows = [
-            {"file": f["file"], **{k: v for k, v in feeder.items() if k != "events"}}
-            for f in self.content["files"] for feeder in f["feeders"]
-        ]  # fmt: skip
+        rows = [{"file": file, **{k: v for k, v in load.items() if k != "events"}} for file, load in self._loads]
         return Listed(rows, "loads")
 
     @property
     def events(self) -> Listed:
         """One row for each event of each load: kind, start, depth, duration, jump, U2, P and Q, worth, why."""
-        rows = [
-            {"file": f["file"], "feeder": feeder["name"], **event}
-            for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
-        ]  # fmt: skip
+        rows = [{"file": file, "feeder": load["name"], **e} for file, load in self._loads for e in load["events"]]
         return Listed(rows, "events")
 
     @property
     def commands(self) -> list[str]:
         """The commands that fit what is worth it, one for each load with such an event."""
-        return [feeder["command"] for f in self.content["files"] for feeder in f["feeders"] if feeder["command"]]
+        return [load["command"] for _, load in self._loads if load["command"]]
+
+    @property
+    def _loads(self) -> list[tuple[str, Mapping[str, Any]]]:
+        """(file, load) of each load."""
+        return [(f["file"], load) for f in self.content["files"] for load in f["feeders"]]
 
     def phasors(self, feeder: int = 0, file: int = 0) -> Any:
         """A frame of one load: t [s], f [Hz], U, U2 [kV, line to line], I1, I2 [kA], P [MW], Q [Mvar].
@@ -138,9 +137,10 @@ class Look(Written):
         columns = ["load", "dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", "P", "Q", "fit it?"]
         several = len(self.content["files"]) > 1
         rows = [
-            [f"{f['file']} {feeder['name']}" if several else feeder["name"], *event_row(event)]
-            for f in self.content["files"] for feeder in f["feeders"] for event in feeder["events"]
-        ]  # fmt: skip
+            [f"{file} {load['name']}" if several else load["name"], *event_row(event)]
+            for file, load in self._loads
+            for event in load["events"]
+        ]
         title = f"{counted(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
         return Table(columns, rows, title)
 
@@ -286,17 +286,14 @@ def _channel(view: View, number: int) -> dict[str, Any]:
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     feeder, powers = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
-    row: dict[str, Any] = {"name": shown.name}
+    row: dict[str, Any] = {
+        "name": shown.name, "connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False,
+        "why": [], "loaded": True,
+    }  # fmt: skip
     if feeder is not None:
-        row |= {
-            "connection": _name(feeder.connection), "voltages": list(feeder.voltages),
-            "currents": list(feeder.currents),
-            "channels": [names[i] for i in (*feeder.voltages, *feeder.currents)],
-            "reverse_current": feeder.reverse_current, "why": list(feeder.why), "loaded": feeder.loaded,
-        }  # fmt: skip
-    else:
-        row |= {"connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False, "why": [],
-                 "loaded": True}  # fmt: skip
+        row |= {key: getattr(feeder, key) for key in ("voltages", "currents", "reverse_current", "why", "loaded")}
+        row["connection"] = _name(feeder.connection)
+        row["channels"] = [names[i] for i in (*feeder.voltages, *feeder.currents)]
     U, P, Q = powers or (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return row | {

@@ -4,7 +4,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,15 +16,15 @@ from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import MODEL, TASK, UserError, check_range, setting
+from tractexp.identification import plan as planning
+from tractexp.identification.plan import ChosenEvent, DipShape
+from tractexp.identification.result import load
+from tractexp.noise import Noise
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.record import Event
-from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE
-
-if TYPE_CHECKING:
-    from tractexp.identification.plan import ChosenEvent, DipShape
-    from tractexp.noise import Noise
-    from tractexp.report.plan import Planned
+from tractexp.report import plan as shown
+from tractexp.report.plan import DEPTH, DURATION, JUMP, RATE, UNBALANCE, Planned, rest
 
 DURATIONS = (0.06, 0.1, 0.15, 0.2, 0.3, 0.5, 0.8)  # s
 GRIDS = {  # of what only some domains' dips have: degrees, negative sequence over the depth
@@ -48,7 +48,7 @@ class Forecasts(Written):
     behind: "Planned | None" = None  # None where it was loaded
 
     @functools.cached_property
-    def planned(self) -> "Planned":
+    def planned(self) -> Planned:
         """What stands behind the page; of a loaded result it is computed again."""
         return self.behind or _planned(self.setup, **self.asked)
 
@@ -64,19 +64,13 @@ class Forecasts(Written):
 
     def table(self) -> Table:
         """Half of the 95 % interval over the value, by depth."""
-        from tractexp.report import plan
-
-        return plan.scan(self.content, DEPTH)
+        return shown.scan(self.content, DEPTH)
 
     def summary(self) -> Report:
-        from tractexp.report import plan
-
-        return plan.summary(self.content)
+        return shown.summary(self.content)
 
     def report(self) -> Report:
-        from tractexp.report import plan
-
-        return plan.report(self.planned, self.content)
+        return shown.report(self.planned, self.content)
 
 
 @public
@@ -121,17 +115,14 @@ def plan(
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
     rivals = rivals if isinstance(rivals, str) else [*rivals]
-    if rivals:
-        model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-        return recommended(Setup.of(records, model, (), None, model_settings), rivals, progress)
-    check_range("task.within", within, 1e-6, 10.0)
-    check_range("task.least", least, 0.0, 1.0)
-    if events is not None:
+    if not rivals:
+        check_range("task.within", within, 1e-6, 10.0)
+        check_range("task.least", least, 0.0, 1.0)
         check_range("task.events", events, 1)
-    if noise is not None:
         check_range("task.noise", noise, 1e-9, 1.0)
-    model_settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps, "domain": domain}
-    setup = Setup.of(records, model, (), None, model_settings)
+    setup = Setup.of(records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain)
+    if rivals:
+        return recommended(setup, rivals, progress)
     if isinstance(values, Identification):
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
@@ -143,13 +134,10 @@ def plan(
 
 
 def _planned(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
-             **given: Any) -> "Planned":  # fmt: skip
+             **given: Any) -> Planned:  # fmt: skip
     """Everything forecast: how deep, over what, and the best events."""
-    from tractexp.identification.plan import best_events, column, depth_needed
-    from tractexp.report.plan import Planned
-
     problem, recorded = setup.problem, setup.train
-    column(problem.space.names, parameter)
+    planning.column(problem.space.names, parameter)
     if problem.per_event:
         raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
     for name in GRIDS:
@@ -161,50 +149,45 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     shape = _shape(deepest, seen=noise, **given)
     shape.check()
     scans = _scans(problem, at, shape)
-    needed = depth_needed(scans[DEPTH][1], parameter, within)
-    best = best_events(problem, at, least, events) if len(recorded) > 1 else []
+    needed = planning.depth_needed(scans[DEPTH][1], parameter, within)
+    best = planning.best_events(problem, at, least, events) if len(recorded) > 1 else []
     return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
 
 
-def chosen_events(setup: Setup, values: Any, most: int) -> "list[ChosenEvent]":
+def chosen_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
     """The events of a setup that tell most about its model together, at most `most`; `values` are those of `plan`.
 
     Events before which the model has no steady state at these values are left out. Raises `UserError` where that are
     all of them.
     """
-    from tractexp.identification.plan import alone, best_of
-
     if setup.problem_of(setup.train[:1]).per_event:
         raise UserError(f"events are chosen for shared parameters; leave {MODEL.per_event} empty")
     at, *_ = _guess(setup, max(setup.train, key=lambda e: e.depth), values)
     informations, refused = {}, ""
     for event in setup.train:
         try:
-            informations[event.record.name] = alone(setup.problem_of([event]), at)
+            informations[event.record.name] = planning.alone(setup.problem_of([event]), at)
         except UserError as error:
             refused = str(error)
     if not informations:
         raise UserError(refused)
-    return best_of([*informations.values()], [*informations], 0.0, most)
+    return planning.best_of([*informations.values()], [*informations], 0.0, most)
 
 
-def _shape(event: Event, noise: float | None, seen: "Noise | None" = None, **given: float | None) -> "DipShape":
+def _shape(event: Event, noise: float | None, seen: Noise | None = None, **given: float | None) -> DipShape:
     """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given replaced."""
-    from tractexp.identification.plan import DipShape
-
     shape = replace(DipShape.of(event, seen), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
     if noise is not None:
         shape = replace(shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0)
     return shape
 
 
-def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, Noise | None]":
+def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, Noise | None]:
     """Free values (d,) to plan at, where they are from, and the noise that the fit showed."""
-    from tractexp.identification.estimate import polished
-    from tractexp.identification.result import load
-
     problem = setup.problem_of([event])
     if values == FIT:
+        from tractexp.identification.estimate import polished
+
         fit = polished(problem)
         origin = f"the estimate of {event.record.name}"
         if not fit.surprise.adequate:
@@ -221,24 +204,23 @@ def _guess(setup: Setup, event: Event, values: Any) -> "tuple[np.ndarray, str, N
     return np.array([by_parameter[n] for n in problem.space.names]), origin, None
 
 
-def _scans(problem: Any, values: np.ndarray, shape: "DipShape") -> dict[str, Any]:
+def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     """{label: (x, forecasts)}: one property of the dip varied at a time."""
-    from tractexp.identification.plan import forecast, over_depth
 
     def over(key: str, grid: tuple[float, ...]) -> Any:
         shapes = [replace(shape, **{key: x}) for x in grid]
-        return grid, [forecast(problem, values, s) for s in shapes]
+        return grid, [planning.forecast(problem, values, s) for s in shapes]
 
-    by_depth = over_depth(problem, values, shape)
+    by_depth = planning.over_depth(problem, values, shape)
     P = abs(shape.P0)
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
     scans = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
     scans |= {GRIDS[name][0]: over(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
     scans[RATE] = over("rate", shape.domain.rates(shape.frequency))
-    return scans | {shape.domain.planned_noise: (NOISES, [forecast(problem, values, s) for s in loud])}
+    return scans | {shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])}
 
 
-def _described(shape: "DipShape") -> str:
+def _described(shape: DipShape) -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
     names = shape.domain.channels
@@ -247,10 +229,8 @@ def _described(shape: "DipShape") -> str:
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
 
-def _content(planned: "Planned") -> dict[str, Any]:
+def _content(planned: Planned) -> dict[str, Any]:
     """What `plan.json` holds; half intervals are shares of the value, null where there is none."""
-    from tractexp.report.plan import rest
-
     names = planned.problem.space.names
     return {
         "dip": planned.dip,

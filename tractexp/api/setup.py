@@ -1,25 +1,25 @@
 """What a call is given: records and a model, and for searches how a residual counts and when they end."""
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Self
 
 from tractexp.api.arguments import Choice
 from tractexp.api.compose import LoadModel, Portable, model_of
 from tractexp.api.read import Dips, dips_together
+from tractexp.api.task import OF_MODEL
 from tractexp.errors import check_range
 from tractexp.outcome import Plain
 from tractexp.progress import Progress, searching
 from tractexp.record import Event, describe
 from tractexp.record.identity import Identity
+from tractexp.schema import LEAST
 from tractexp.wording import shown_in_words
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
     from tractexp.identification.search import Limits, SearchResult
-
-LEAST = {"seed": 0, "budget": 1, "time_limit": 0, "target": 0}
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -42,20 +42,14 @@ class Setup(Given):
     target: float | None = None
 
     @classmethod
-    def of(cls, records: Any, model: Any, validate: Any, objective: Any, settings: Mapping[str, Any], **search: Any
-           ) -> Self:  # fmt: skip
-        """From the arguments of a call; `known` replaces keys of the model where it is not None."""
+    def of(cls, records: Any, model: Any, validate: Any = (), objective: Any = None, **given: Any) -> Self:
+        """From the arguments of a call: those of the model replace its own where they are not None."""
         for key, least in LEAST.items():
-            if search.get(key) is not None:
-                check_range(key, search[key], least)
+            check_range(key, given.get(key), least)
         train, held = dips_together(records, validate)
-        return cls(
-            train=train,
-            validate=held,
-            model=model_of(model, settings.get("domain")).with_(**settings).fitting(train),
-            objective=Choice.of("objective", objective),
-            **search,
-        )
+        of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
+        load = model_of(model, of_model.get("domain")).with_(**of_model).fitting(train)
+        return cls(train=train, validate=held, model=load, objective=Choice.of("objective", objective), **given)
 
     @functools.cached_property
     def problem(self) -> "Problem":

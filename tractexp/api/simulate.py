@@ -14,7 +14,9 @@ from tractexp.api.read import dips_of
 from tractexp.api.response import Response, respond_to
 from tractexp.api.task import LOAD, Job, Task
 from tractexp.blocks import Report, Table
+from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError, among, check_range, setting
+from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
 
@@ -160,8 +162,6 @@ def simulate(
 
 def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
     """The response to a dip made by hand, `ratio` times the power that the model draws on its own base."""
-    from tractexp.domain import domain_of
-
     t, shape = dip.voltage()
     U = before["U0"] * shape
     P, Q = domain_of(load.model).play(load.model, values, t, U, before)
@@ -213,8 +213,6 @@ class Simulate(Task, call=simulate):
         return getattr(self, "depth") is not None  # noqa: B009 # a setting that the call declares
 
     def perform(self, job: Job, **instead: Any) -> Simulation:
-        from tractexp.identification.result import load
-
         if self.parameters:
             instead["model"] = Identification(load(Path(self.parameters)))
         instead["records"] = () if self.by_hand else [*job.events.train, *job.events.validate]

@@ -17,7 +17,9 @@ from tractexp.outcome import Written
 from tractexp.overrides import typed
 from tractexp.plugin import discover, get, plugin
 from tractexp.progress import Progress, counting, staged
+from tractexp.record import detect
 from tractexp.recording import archive
+from tractexp.report import survey as shown
 from tractexp.report.survey import UNREAD
 from tractexp.store import Store
 
@@ -76,19 +78,13 @@ class Surveyed(Written):
         return self.rows.to_frame()
 
     def table(self) -> Table:
-        from tractexp.report import survey
-
-        return survey.kinds(self.content)
+        return shown.kinds(self.content)
 
     def summary(self) -> Report:
-        from tractexp.report import survey
-
-        return survey.summary(self.content)
+        return shown.summary(self.content)
 
     def report(self) -> Report:
-        from tractexp.report import survey
-
-        return survey.report(self.content)
+        return shown.report(self.content)
 
     def write_results(self, folder: Path) -> list[Path]:
         frame = self.to_frame()
@@ -124,10 +120,8 @@ def survey(
     most about `model` together (D-optimal), at `values` as `tractexp.plan` takes them. The model is as in
     `tractexp.identify`. Raises `UserError` for a folder that is not there or holds no file that can be read.
     """
-    if informative is not None:
-        check_range("task.informative", informative, 1)
-    if cores is not None:
-        check_range("task.cores", cores, 1)
+    check_range("task.informative", informative, 1)
+    check_range("task.cores", cores, 1)
     place = Path(folder)
     paths = list(archive.files(place))
     if not paths:
@@ -137,7 +131,7 @@ def survey(
     rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
     with counting("files", len(fresh), progress) as count:
-        for name, fresh_rows in looked(place, fresh, cores or _cores()):
+        for name, fresh_rows in looked(place, fresh, cores or -1):
             rows[name] = files.plain(fresh_rows)
             store.write(names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode())
             count()
@@ -163,24 +157,17 @@ def _promise(row: Mapping[str, Any]) -> float:
     return (row["depth"] or 0.0) / max(row["noise"] or 0.0, LEAST_NOISE)
 
 
-def _cores() -> int:
-    from joblib import cpu_count
-
-    return cpu_count()
-
-
 def _best(
     folder: Path, names: Sequence[str], most: int, model: Any, values: Any, settings: Mapping[str, Any]
 ) -> "list[ChosenEvent]":
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
     from tractexp.api.plan import chosen_events
     from tractexp.api.setup import Setup
-    from tractexp.record import detect
 
     if not names:
         raise UserError(f"no event in {folder} is worth fitting; the table says why")
     events = [detect(record) for record in archive.records(folder, list(names), DATA.train)]
-    return chosen_events(Setup.of(events, model, (), None, settings), values, most)
+    return chosen_events(Setup.of(events, model, **settings), values, most)
 
 
 @plugin

@@ -64,7 +64,6 @@ def _common(view: View) -> dict[str, Any]:
 
 
 def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
-    """The row of one event."""
     fields = event_row(seen)
     begun = view.recording.start if view.recording else None
     event = seen.event
@@ -97,7 +96,7 @@ def _few(values: np.ndarray) -> list[float | None]:
 
 
 def looked(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
-    """(file, its rows) of files within a folder, as they are done, on so many processes.
+    """(file, its rows) of files within a folder, as they are done, on so many processes (-1: one for each core).
 
     A file at which a process is killed is looked at again by itself; if that one is killed too, its row says so.
     """

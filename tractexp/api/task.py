@@ -14,7 +14,7 @@ from tractexp import provenance, quoting
 from tractexp.blocks.terminal import show
 from tractexp.errors import UserError
 from tractexp.outcome import Written
-from tractexp.plugin import Plugin, build
+from tractexp.plugin import Plugin, build, get
 from tractexp.progress import console, say
 
 if TYPE_CHECKING:
@@ -101,7 +101,6 @@ class Task(Plugin):
 
     @classmethod
     def takes_records(cls) -> bool:
-        """Whether its call is given records."""
         arguments = inspect.signature(cls.function).parameters if cls.function else {}
         return any("data" in SOURCES[name].reads for name in arguments if name in SOURCES)
 
@@ -140,7 +139,6 @@ class Task(Plugin):
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
-        """Log a result with what was written."""
         content = {"name": self.name, "values": {}, "artifacts": [*paths, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))
 
@@ -185,10 +183,6 @@ def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
     return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
-def _nothing() -> None:
-    """What a job begins with whose folder was emptied before."""
-
-
 @dataclass(frozen=True)
 class Job:
     """One run: its configuration as plain data, and the folder it writes to."""
@@ -198,10 +192,8 @@ class Job:
     folder: Path
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
     in_sweep: bool = False  # one of many: what only a person looks at may be left out
-    given: Mapping[str, str] = field(
-        default_factory=dict
-    )  # what the user chose, {"optimizer": "pso"}: not the defaults
-    begin: Callable[[], None] = _nothing  # before the first result is written: those of an earlier run go
+    given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
+    begin: Callable[[], None] = lambda: None  # before the first result is written: those of an earlier run go
 
     @functools.cached_property
     def events(self) -> Any:
@@ -213,13 +205,10 @@ class Job:
 
     @functools.cached_property
     def events_of_fit(self) -> Any:
-        """The events as a fit takes them: on the base of the load in the first (`Events` of `Event`)."""
-        from tractexp.record import Events, on_own_base
-        from tractexp.record.dips import around
+        """The events fitted and those held out as a fit takes them: on the base of the load in the first."""
+        from tractexp.api.read import dips_together
 
-        train, validate = self.events.train, self.events.validate
-        moved = on_own_base([around(event) for event in (*train, *validate)])
-        return Events(moved[: len(train)], moved[len(train) :])
+        return dips_together(self.events.train, self.events.validate)
 
     def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
         """The job with those files held out that belong to its choice of data, where it names none itself."""
@@ -245,7 +234,7 @@ class Job:
         """The identification problem (a `Problem`)."""
         from tractexp.api.setup import Setup
 
-        return Setup.of(self.events.train, self.config["model"], (), self.config["objective"], {}).problem
+        return Setup.of(self.events.train, self.config["model"], objective=self.config["objective"]).problem
 
     def tell(self, line: str) -> None:
         """Print a line of a call's progress. The first comes once the input is found right: then MLflow gets ready."""
@@ -271,7 +260,6 @@ class Job:
 
         [] for tasks without records, and for data that have a name of their own, as the shipped ones.
         """
-        from tractexp.plugin import get
         from tractexp.record.identity import Identity
 
         named = self.choices["data"] != self.config["data"]["name"]

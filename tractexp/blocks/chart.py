@@ -96,7 +96,7 @@ class Chart:
             axis |= {"gridcolor": "#E4E4E4", "zeroline": False, "automargin": True, "linecolor": "#444"}
             if log:
                 axis |= {"type": "log", "exponentformat": "power"}
-            axes["yaxis" + (str(k + 1) if k else "")] = axis
+            axes[_axis("yaxis", k)] = axis
             top = low - GAP
         return axes
 
@@ -142,7 +142,7 @@ class Chart:
             line = {"color": color, "width": 1.6, "shape": "hv"}
             self._add(name, panel, mode="lines", line=line, silent=True, x=t.tolist(), y=(0.7 * states - row).tolist(),
                       course=course, panel=self._panels[panel], label=name)  # fmt: skip
-        self._axes[_key(panel)]["title"] = {"text": ""}  # the traces' names stand there
+        self._axes[_axis("yaxis", panel)]["title"] = {"text": ""}  # the traces' names stand there
         self.ticks(panel, [0.35 - row for row in range(len(courses))], [_short(name) for name, *_ in courses])
         return self.limits(panel, 0.3 - len(courses), 1.0)
 
@@ -174,7 +174,7 @@ class Chart:
         hover: Sequence[str] = (),
     ) -> "Chart":  # fmt: skip
         """Horizontal bars, the first label on top."""
-        self._axes[_key(panel)] |= {"autorange": "reversed", "type": "category"}
+        self._axes[_axis("yaxis", panel)] |= {"autorange": "reversed", "type": "category"}
         trace: dict[str, Any] = {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
         return self._add(
             name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
@@ -202,11 +202,7 @@ class Chart:
             {"type": "rect", "xref": "x", "x0": start, "x1": end, **_height(panel), "fillcolor": color,
              "opacity": opacity, "line": {"width": 0}, "layer": "below"}
         )  # fmt: skip
-        if text:
-            self._notes.append(
-                {"text": quoting.html(text), "xref": "x", "x": start, "xanchor": "left", "yref": _height(panel)["yref"],
-                 "y": 1, "yanchor": "top", "showarrow": False, "font": {"size": 11}, "bgcolor": "#ffffffcc"}
-            )  # fmt: skip
+        self._note(text, _height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
         if name and name not in self._in_legend:
             square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
             self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
@@ -216,11 +212,7 @@ class Chart:
         self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None, text: str = ""
     ) -> "Chart":
         """A vertical line, in one panel or through all, with a `text` below the panel (the first)."""
-        if text:
-            self._notes.append(
-                {"text": quoting.html(text), "xref": "x", "x": x, "xanchor": "left", "y": 0, "yanchor": "top",
-                 "yref": _height(panel or 0)["yref"], "showarrow": False, "font": {"size": 11, "color": color}}
-            )  # fmt: skip
+        self._note(text, _height(panel or 0)["yref"], color, x=x, y=0)
         line = {"color": color, "width": 1, "dash": dash}
         self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
         return self
@@ -231,18 +223,21 @@ class Chart:
         self._shapes.append(
             {"type": "line", "xref": "x domain", "x0": 0, "x1": 1, "yref": axis, "y0": y, "y1": y, "line": line}
         )
-        if text:
-            log = self._axes[_key(panel)].get("type") == "log"
-            self._notes.append(
-                {"text": quoting.html(text), "xref": "x domain", "x": 1, "xanchor": "right", "yref": axis,
-                 "y": float(np.log10(y)) if log else y, "yanchor": "bottom", "showarrow": False,
-                 "font": {"size": 11, "color": color}}
-            )  # fmt: skip
+        log = self._axes[_axis("yaxis", panel)].get("type") == "log"
+        at = float(np.log10(y)) if log else y
+        self._note(text, axis, color, x=1, y=at, xref="x domain", xanchor="right", yanchor="bottom")
         return self
+
+    def _note(self, text: str, yref: str, color: str = "", **more: Any) -> None:
+        """Words at a place, beside what they belong to; none where there is no text."""
+        if text:
+            font = {"size": 11, **({"color": color} if color else {})}
+            note = {"text": quoting.html(text), "xref": "x", "xanchor": "left", "yref": yref, "yanchor": "top"}
+            self._notes.append({**note, "showarrow": False, "font": font, **more})
 
     def limits(self, panel: int | None, low: float, high: float) -> "Chart":
         """What an axis shows at first: of a panel, or of x where `panel` is None."""
-        axis = self._x if panel is None else self._axes[_key(panel)]
+        axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
         axis["range"] = np.log10([low, high]).tolist() if axis.get("type") == "log" else [low, high]
         if axis.get("type") == "log" and high < DECADE * low:
             axis.pop("dtick", None)  # powers of ten alone would leave the axis bare
@@ -252,7 +247,7 @@ class Chart:
         self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
     ) -> "Chart":  # fmt: skip
         """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
-        axis = self._x if panel is None else self._axes[_key(panel)]
+        axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
         words = [quoting.html(label) for label in labels] or [f"{v:g}" for v in at]
         axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
         if labels:
@@ -284,7 +279,6 @@ class Chart:
         return {"data": data, "layout": layout, "cursor": self._cursor}
 
     def element(self, label: str) -> str:
-        """The chart as an element of a page."""
         data = quoting.script(self.plain())
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'
@@ -316,10 +310,6 @@ def _above(names: Sequence[str]) -> dict[str, Any]:
 
 def _axis(letter: str, panel: int) -> str:
     return letter + (str(panel + 1) if panel else "")
-
-
-def _key(panel: int) -> str:
-    return "yaxis" + (str(panel + 1) if panel else "")
 
 
 def _height(panel: int | None) -> dict[str, Any]:

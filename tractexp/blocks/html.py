@@ -12,22 +12,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp import files, quoting, store
-from tractexp.blocks.block import (
-    Block,
-    ChartBlock,
-    Charts,
-    CodeBlock,
-    Equation,
-    Figure,
-    Fold,
-    Heading,
-    Items,
-    Markup,
-    Paragraphs,
-    Report,
-    Table,
-    VerdictBlock,
-)  # fmt: skip
+from tractexp.blocks import Report, Table
+from tractexp.blocks import block as blocks
 from tractexp.blocks.chart import script
 
 SHORT = 14  # letters of a word that never needs a second line
@@ -63,9 +49,9 @@ def fragment(report: Report) -> str:
     for block in report.blocks:
         if isinstance(block, Table):
             parts.append(_untypeset(_table(block.brief)))
-        elif isinstance(block, Equation):
+        elif isinstance(block, blocks.Equation):
             parts.append(f"<p>$${quoting.html(block.latex)}$$</p>")
-        elif not isinstance(block, ChartBlock | Charts | Figure | Markup | Fold):
+        elif not isinstance(block, blocks.ChartBlock | blocks.Charts | blocks.Figure | blocks.Markup | blocks.Fold):
             parts.append(_untypeset(_element(block, itertools.count(1))))
     return "\n".join(parts)
 
@@ -74,40 +60,42 @@ def _untypeset(element: str) -> str:
     return f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
 
 
-def _draws(block: Block) -> bool:
+def _draws(block: blocks.Block) -> bool:
     """Whether a block holds a chart."""
-    return isinstance(block, ChartBlock | Charts) or (isinstance(block, Fold) and any(map(_draws, block.blocks)))
+    return isinstance(block, blocks.ChartBlock | blocks.Charts) or (
+        isinstance(block, blocks.Fold) and any(map(_draws, block.blocks))
+    )
 
 
-def _element(block: Block, figures: "itertools.count[int]") -> str:
+def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
     """A block as HTML; `figures` counts the drawings of a page, whose ids differ by it."""
     match block:
-        case Heading(text, level):
+        case blocks.Heading(text, level):
             return f"<h{level}>{quoting.html(text)}</h{level}>"
-        case Paragraphs(texts):
+        case blocks.Paragraphs(texts):
             return "\n".join(f"<p>{quoting.html(text)}</p>" for text in texts)
-        case VerdictBlock(texts, kind):
-            return f'<div class="verdict {kind}">\n{_element(Paragraphs(texts), figures)}\n</div>'
-        case Items(texts):
+        case blocks.VerdictBlock(texts, kind):
+            return f'<div class="verdict {kind}">\n{_element(blocks.Paragraphs(texts), figures)}\n</div>'
+        case blocks.Items(texts):
             return "\n".join(["<ul>", *(f"<li>{quoting.html(text)}</li>" for text in texts), "</ul>"])
-        case CodeBlock(text):
+        case blocks.CodeBlock(text):
             return f"<pre>{quoting.html(text)}</pre>"  # a click selects it whole
-        case Equation(latex):
+        case blocks.Equation(latex):
             drawing = _typeset(latex)
             inside = _inline(drawing, f"f{next(figures)}-", latex) if drawing else f"<code>{quoting.html(latex)}</code>"
             return f'<div class="equation">{inside}</div>'
         case Table():
             return _table(block)
-        case ChartBlock(chart, caption):
+        case blocks.ChartBlock(chart, caption):
             return f"<figure>{chart.element(caption)}{_below(caption)}</figure>"
-        case Charts(charts):
+        case blocks.Charts(charts):
             return "\n".join(['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"])
-        case Figure(svg, caption):
+        case blocks.Figure(svg, caption):
             return f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}{_below(caption)}</figure>"
-        case Markup(markup):
+        case blocks.Markup(markup):
             return markup
-        case Fold(summary, blocks):
-            inside = (_element(inner, figures) for inner in blocks)
+        case blocks.Fold(summary, parts):
+            inside = (_element(inner, figures) for inner in parts)
             return "\n".join([f"<details><summary>{quoting.html(summary)}</summary>", *inside, "</details>"])
 
 

@@ -3,57 +3,42 @@
 from collections.abc import Iterator
 
 from tractexp import quoting
-from tractexp.blocks.block import (
-    Block,
-    ChartBlock,
-    Charts,
-    CodeBlock,
-    Equation,
-    Figure,
-    Fold,
-    Heading,
-    Items,
-    Markup,
-    Paragraphs,
-    Report,
-    Table,
-    VerdictBlock,
-)  # fmt: skip
+from tractexp.blocks import Report, Table
+from tractexp.blocks import block as blocks
 
 
 def markdown(report: Report) -> str:
-    """The whole report."""
     parts = [f"# {quoting.markdown(report.title)}"] + [quoting.markdown(report.lead)] * bool(report.lead)
     return "\n\n".join([*parts, *(part for block in report.blocks for part in _parts(block))]) + "\n"
 
 
-def _parts(block: Block) -> Iterator[str]:
+def _parts(block: blocks.Block) -> Iterator[str]:
     match block:
-        case Heading(text, level):
+        case blocks.Heading(text, level):
             yield f"{'#' * level} {quoting.markdown(text)}"
-        case Paragraphs(texts):
+        case blocks.Paragraphs(texts):
             yield from map(quoting.markdown, texts)
-        case VerdictBlock(texts):
+        case blocks.VerdictBlock(texts):
             yield "\n>\n".join(f"> {quoting.markdown(text)}" for text in texts)
-        case Items(texts):
+        case blocks.Items(texts):
             yield "\n".join(f"- {quoting.markdown(text)}" for text in texts)
-        case CodeBlock(text):
+        case blocks.CodeBlock(text):
             yield quoting.fenced(text)
-        case Equation(latex):
+        case blocks.Equation(latex):
             yield f"$$ {latex} $$"
         case Table():
             yield _table(block)
             if block.caption:
                 yield quoting.markdown(block.caption)
-        case ChartBlock(_, caption) | Figure(_, caption):
+        case blocks.ChartBlock(_, caption) | blocks.Figure(_, caption):
             yield f"*Chart of the page: {quoting.markdown(caption)}*"
-        case Markup():
+        case blocks.Markup():
             return
-        case Charts(charts):
+        case blocks.Charts(charts):
             for chart in charts:
                 yield from _parts(chart)
-        case Fold(_, blocks):
-            for inner in blocks:
+        case blocks.Fold(_, parts):
+            for inner in parts:
                 yield from _parts(inner)
 
 

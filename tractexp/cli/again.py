@@ -11,6 +11,7 @@ from tractexp import quoting
 from tractexp.cli.chosen import reads
 from tractexp.cli.configuration import FOLDER
 from tractexp.errors import UserError
+from tractexp.plugin import get
 from tractexp.progress import say
 from tractexp.provenance import group_of
 
@@ -40,8 +41,6 @@ def again(arguments: list[str]) -> list[str]:
 
 def repeated(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
     """Earlier settings that still count beside newer ones, and these."""
-    from tractexp.plugin import get
-
     settings = list(settings)
     keys = {_key(text) for text in settings}
     groups = {key for key in keys if key == group_of(key)}

@@ -5,11 +5,12 @@ run's configuration takes the place of theirs. A run that is refused or killed b
 """
 
 import shutil
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from tractexp import files
+from tractexp.composition import texts
 
 FOLDER, NEXT = ".hydra", ".hydra.next"
 KINDS = (
@@ -67,7 +68,7 @@ def _contents(config: Any) -> Mapping[str, str]:
 
 def _begun(folder: Path, config: Any) -> None:
     """Let the results of an earlier run go, but for those that this one was made from, and its configuration."""
-    read = {Path(text).absolute() for text in _texts(config)}
+    read = {Path(text).absolute() for text in texts(config)}
     if (folder / NEXT).exists() and (folder / FOLDER).exists():
         for path in (folder / name for name in RESULTS):
             if path.absolute() not in read:
@@ -79,13 +80,3 @@ def _placed(folder: Path) -> None:
     if (folder / NEXT).exists():
         shutil.rmtree(folder / FOLDER, ignore_errors=True)
         files.move(folder / NEXT, folder / FOLDER)
-
-
-def _texts(content: Any) -> Iterator[str]:
-    if isinstance(content, Mapping):
-        content = content.values()
-    if isinstance(content, str):
-        yield content
-    elif not isinstance(content, int | float | None):
-        for inner in content:
-            yield from _texts(inner)

@@ -10,10 +10,12 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from tractexp import files, quoting
+from tractexp import files, quoting, tracking
 from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
 from tractexp.progress import say
+from tractexp.tracking import owner
+from tractexp.tracking.store import database_of, open_store, sentences
 
 DOES = "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what is wrong."
 ROOM = 500e6  # bytes of a disk that is not nearly full
@@ -29,8 +31,6 @@ def doctor(arguments: list[str]) -> int:
     parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
     parser.add_argument("--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
     chosen = parser.parse_args(arguments)
-    from tractexp import tracking
-
     uri = tracking.address(chosen.uri)
     wrong = sum(map(print_findings, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
     if print_findings(store(uri)):
@@ -117,10 +117,7 @@ def caches() -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if gone:
         yield HEALED, f"{len(gone)} damaged or unfinished files of the cache {folder} are removed"
-    yield (
-        SOUND,
-        f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels",
-    )
+    yield SOUND, f"the cache {folder} holds {len(list((folder / CODE.kind).glob('*')))} kernels"
 
 
 def leavings(folder: Path) -> Iterator[Finding]:
@@ -134,9 +131,6 @@ def leavings(folder: Path) -> Iterator[Finding]:
 
 def store(uri: str) -> Iterator[Finding]:
     """Whether the store can be used; a damaged one is set aside, for the runs are kept beside their results."""
-    from tractexp import tracking
-    from tractexp.tracking.store import database_of
-
     database = database_of(uri)
     if database is not None and not database.exists():
         yield SOUND, f"there is no MLflow store {database} yet: it is made when something is logged"
@@ -152,7 +146,7 @@ def store(uri: str) -> Iterator[Finding]:
         files.move(database, aside)
         yield HEALED, f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}"
     try:
-        tracking.prepare(uri)
+        tracking.open_store(uri)
     except UserError as error:
         yield WRONG, str(error)
         return
@@ -185,9 +179,6 @@ def _unsound(database: Path) -> str:
 
 def runs(uri: str) -> Iterator[Finding]:
     """Whether runs that say they are running are; those whose process has ended are closed."""
-    from tractexp.tracking import owner
-    from tractexp.tracking.store import database_of, open_store, sentences
-
     database = database_of(uri)
     if database is not None and not database.exists():
         return

@@ -9,7 +9,7 @@ from tractexp.api.task import Job
 from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
 from tractexp.errors import Stopped, UserError
-from tractexp.plugin import build
+from tractexp.plugin import build, get
 
 TERMINATED = 143  # the exit code of a process that SIGTERM ended
 
@@ -59,8 +59,6 @@ def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | No
 
 def again(config: Any) -> str:
     """What becomes of a task that was stopped and has kept nothing in its folder."""
-    from tractexp.plugin import get
-
     if getattr(get("task", config["task"]["name"]), "resumes", False):
         return "the same command goes on where it was"
     return "nothing was logged for this run"

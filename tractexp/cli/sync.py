@@ -4,6 +4,7 @@ import argparse
 from collections import Counter
 from pathlib import Path
 
+from tractexp import tracking
 from tractexp.errors import UserError
 from tractexp.progress import say
 
@@ -26,7 +27,6 @@ def sync(arguments: list[str]) -> int:
 
 def brought(folder: Path, uri: str | None) -> Counter[str]:
     """Send what is kept below a folder and say what became of it."""
-    from tractexp import tracking
     from tractexp.tracking.sync import sync
 
     counts = sync(folder.absolute(), uri, own=tracking.address(uri), tell=lambda line: say(f"  {line}"))

@@ -37,15 +37,9 @@ class TCircuit:
 
     @classmethod
     def double(
-        cls,
-        T_prime: float,
-        X_prime: float,
-        C: float,
-        T_second: float,
-        X_second: float,
-        omega_n: float,
+        cls, T_prime: float, X_prime: float, C: float, T_second: float, X_second: float, omega_n: float,
         R_s: float = 0.0,
-    ) -> "TCircuit":
+    ) -> "TCircuit":  # fmt: skip
         """Two cages in parallel, from those and T'' [s], X'' < X'."""
         X = X_prime / (1 - C)
         equal = X * (1 - sqrt(C))

@@ -66,7 +66,6 @@ def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
 
 
 def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
-    """How much each candidate explains by itself."""
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
     chance = chance_level(findings)
@@ -88,7 +87,6 @@ def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
 
 
 def _sets(page: Report, findings: Findings) -> None:
-    """How the refitted sets of the chosen size compare."""
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
          "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",

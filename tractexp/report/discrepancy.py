@@ -21,7 +21,7 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import headlines, proposed
-from tractexp.wording import as_sentence, epsilon, joined, percent
+from tractexp.wording import as_sentence, counted, epsilon, joined, percent
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
@@ -80,8 +80,7 @@ def gap(content: Mapping[str, Any]) -> Table:
 
 def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[Identity]) -> Report:
     """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
-    events = len(findings.context.events)
-    fitted = f"{events} event{'s' * (events > 1)} fitted, {len(findings.withheld)} held out"
+    fitted = f"{counted(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held out"
     lead = "; ".join([*described(identities), f"{findings.context.model.title}, {fitted}"])
     page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
     spoken = [joined([findings.catalogue.spoken(name) for name in names]) for names in findings.verdict.sets]
@@ -170,12 +169,10 @@ def _left(page: Report, findings: Findings) -> None:
     _shapes(page, findings, shapes, whose)
     if near is not None:
         _shapes(page, findings, findings.remainder_of_base, "the base model alone")
-    if near is not None:
-        _nearest(page, findings)
+        _nearest(page, findings, near)
 
 
 def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
-    """The shapes in what one model leaves."""
     if not shapes:
         page.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
         return
@@ -195,13 +192,11 @@ def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose
     )  # fmt: skip
 
 
-def _nearest(page: Report, findings: Findings) -> None:
+def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
-    near = findings.verdict.nearest
-    assert near is not None
     assert near.rival.tests is not None
     by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
-    own = [by_name[p.name] for name in near.names for p in findings.catalogue[name].effect.parameters]
+    own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
     held = percent(near.held_out) if np.isfinite(near.held_out) else ""
     rows = [[joined(near.names), percent(near.fitted), held]]
     rows += [[joined(names), percent(share), ""] for names, share in near.others]
@@ -214,7 +209,7 @@ def _nearest(page: Report, findings: Findings) -> None:
     with page.folded(f"How large {joined(near.names)} would be"):
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
-            [[e.parameter.name, e.parameter.about, e.parameter.unit, value(e), interval(e), e.verdict] for e in own],
+            [[p.name, p.about, p.unit, value(e), interval(*e.interval), e.verdict] for e, p in own],
             "As if they were right; something else is missing, so that the intervals may miss the truth.",
             words=(1, 2, 5),
         )  # fmt: skip

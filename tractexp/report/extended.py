@@ -9,6 +9,7 @@ from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.recommended import held
+from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
 from tractexp.wording import joined, with_error
 
@@ -41,7 +42,6 @@ def laws(page: Report, findings: Findings) -> None:
 
 
 def _curve(fitted: FittedLaw) -> Chart:
-    """A law with its band, and the textbook's."""
     law = fitted.curve
     chart = Chart(law.x_label, [law.y_label], pixels=320)
     chart.band("", law.x, fitted.band[0], fitted.band[1], CURVE)
@@ -60,7 +60,7 @@ def parameters(page: Report, findings: Findings) -> None:
     for e in parameter_estimates:
         p, was = e.parameter, before.get(e.parameter.name)
         entries = [value(was) if was else "not in it"] if findings.names else []
-        rows.append([p.name, p.about, p.unit, *entries, value(e), interval(e), brief(e.verdict)])
+        rows.append([p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)])
     stages = ["before", "after"] if findings.names else ["value"]
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     page.table(
@@ -76,7 +76,6 @@ def parameters(page: Report, findings: Findings) -> None:
 
 def equations(page: Report, findings: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
-    from tractexp.model.model import compose
     from tractexp.model.printed import changed
 
     page.heading("The extended model")
@@ -108,6 +107,5 @@ def value(estimate: ParameterEstimate) -> str:
     return f"{with_error(estimate.value, estimate.error)}{bound}"
 
 
-def interval(estimate: ParameterEstimate) -> str:
-    low, high = estimate.interval
-    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else ""
+def interval(low: float, high: float) -> str:
+    return f"{low:.4g} to {high:.4g}" if np.isfinite([low, high]).all() else ""

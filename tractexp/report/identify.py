@@ -1,5 +1,6 @@
 """The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
 
+import itertools
 from collections.abc import Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
@@ -83,7 +84,6 @@ def network(fit: "Identification") -> list[str]:
 
 
 def own_verdicts(result: Any) -> dict[str, str]:
-    """The verdicts without those of nuisances."""
     return {name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances}
 
 
@@ -151,19 +151,19 @@ def headline(result: Any) -> str:
 
 
 def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
-    """The charts of each event; of many the later ones are folded away."""
-    likelihood = uncertainty.likelihood
-    waves = likelihood.problem.model.waves
-    page.text(*[IN_WAVES] * waves)
-    deviation = uncertainty.of_noise.noise.deviation(likelihood.problem.drive)
-    parts = [likelihood.problem.drive.part(e) for e in range(likelihood.problem.drive.events)]
-    page.text(CAPTION)
-    for k, fit in enumerate(fits):
-        noise = deviation[:, parts[k]] if fit.role == "train" else None
+    problem = uncertainty.likelihood.problem
+    waves, deviation = problem.model.waves, uncertainty.of_noise.noise.deviation(problem.drive)
+    page.text(*[IN_WAVES] * waves).text(CAPTION)
+    all_curves(page, fits, [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)])
+    if waves:
+        page.heading("What was done to the records", level=3).items(prepared(problem, fits))
+
+
+def all_curves(page: Report, fits: Sequence[Any], noises: Sequence[np.ndarray] = ()) -> None:
+    """The charts of each event, with the noise of those fitted, the first; of many the later ones are folded away."""
+    for fit, noise, k in itertools.zip_longest(fits, noises, range(len(fits))):
         with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
             event_curves(page, fit, noise)
-    if waves:
-        page.heading("What was done to the records", level=3).items(prepared(likelihood.problem, fits))
 
 
 def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
@@ -230,14 +230,18 @@ def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -
 
 def errors(fit: "Identification") -> Table:
     """The model's error on each event, and the errors of Eq. (20)."""
-    result = fit.result
-    columns = ["event", "role", "model error", "95 % interval", "of S", *result.epsilons]
-    unknown = {"value": None, "interval": (), "of_S": None}
+    result, unknown = fit.result, {"value": None, "interval": (), "of_S": None}
     of_events = result.model_error.get("events") or [unknown] * len(result.events)
+    return error_table(result.events, of_events, result.epsilons)
+
+
+def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Sequence[str]) -> Table:
+    """Entries of `events` and of `model_error` as `result.json` has them, a row each."""
+    columns = ["event", "role", "model error", "95 % interval", "of S", *epsilons]
     rows = [
         [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
-         in_percent(m["of_S"]), *(epsilon(e[key]) for key in result.epsilons)]
-        for e, m in zip(result.events, of_events, strict=True)
+         in_percent(m["of_S"]), *(epsilon(e[key]) for key in epsilons)]
+        for e, m in zip(events, of_events, strict=True)
     ]  # fmt: skip
     return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
 
@@ -268,7 +272,6 @@ def brief(verdict: str) -> str:
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
-    """Every interval on the range between its bounds."""
     lower, width = uncertainty.lower, uncertainty.upper - uncertainty.lower
     at, spans = (uncertainty.values - lower) / width, (uncertainty.intervals - lower[:, None]) / width[:, None]
     sentences = [

@@ -1,14 +1,13 @@
 """The page of a linear network: how good a model without physics is, and the poles of the load."""
 
-from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
 from tractexp.identification.model_error import in_percent
 from tractexp.provenance import command
 from tractexp.record.identity import title_of
-from tractexp.report.identify import MODEL_ERROR, ROLES, SHOWN, event_curves
-from tractexp.wording import as_sentence, epsilon
+from tractexp.report.identify import all_curves, error_table
+from tractexp.wording import as_sentence
 
 if TYPE_CHECKING:
     from tractexp.api.linear_network import NetworkFit
@@ -37,16 +36,8 @@ def numbers(fit: "NetworkFit") -> Table:
 
 
 def errors(fit: "NetworkFit") -> Table:
-    """The model's error on each event, and the errors of Eq. (20)."""
     keys = [key for key in fit.content["events"][0] if key.startswith("epsilon_")]
-    pairs = zip(fit.content["events"], fit.content["model_error"]["events"], strict=True)
-    rows = [
-        [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
-         in_percent(m["of_S"]), *(epsilon(e[key]) for key in keys)]
-        for e, m in pairs
-    ]  # fmt: skip
-    columns = ["event", "role", "model error", "95 % interval", "of S", *keys]
-    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
+    return error_table(fit.content["events"], fit.content["model_error"]["events"], keys)
 
 
 def summary(fit: "NetworkFit") -> Report:
@@ -62,9 +53,7 @@ def report(fit: "NetworkFit") -> Report:
     )
     page.verdict(as_sentence(fit.headline))
     page.heading("Measured and calculated")
-    for k, one in enumerate(fit.fits):
-        with page.folded(f"{one.event.record.name}, {ROLES[one.role]}") if k >= SHOWN else nullcontext():
-            event_curves(page, one, None)
+    all_curves(page, fit.fits)
     page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
     page.heading("Poles").add(poles(fit))
     page.heading("How this page was made")

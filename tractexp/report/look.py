@@ -1,6 +1,7 @@
 """The page of a look: the file, each load with what happened to it, zoomable, its command, the channels."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,6 @@ NO_LOAD = "no load here: what happens to the voltage is listed with the loads of
 
 
 def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
-    """The page."""
     files = content["files"]
     page = Report(f"A look at {', '.join(Path(f['file']).name for f in files)}", _lead(files))
     for view, entry in zip(views, files, strict=True):
@@ -113,7 +113,6 @@ def _channel(c: Mapping[str, Any]) -> list[str]:
 
 
 def _summary(entry: Mapping[str, Any]) -> list[str]:
-    """A load in one row."""
     sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
@@ -128,10 +127,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
         page.add(events(entry))
     else:
         page.text(as_sentence(quiet(entry)))
-    if folded:
-        with page.folded(f"Charts of {entry['name']}"):
-            charts(page, view, shown)
-    else:
+    with page.folded(f"Charts of {entry['name']}") if folded else nullcontext():
         charts(page, view, shown)
 
 

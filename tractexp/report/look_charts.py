@@ -44,7 +44,6 @@ CAPTION = (
 
 
 def charts(page: Report, view: View, shown: Sight) -> None:
-    """Charts to look into."""
     if shown.record is not None:
         page.chart(_of_record(shown), "As recorded. Drag to zoom, double-click for the whole.")
     elif shown.phasors and view.recording is not None:
@@ -70,10 +69,8 @@ def unassigned(page: Report, view: View) -> None:
     if not panels:
         return
     count = sum(map(len, panels.values()))
-    chart, every = (
-        Chart("t [s]", [*panels], pixels=150 + 200 * len(panels)),
-        -(-count * recording.samples // MOST_OTHERS),
-    )
+    chart = Chart("t [s]", [*panels], pixels=150 + 200 * len(panels))
+    every = -(-count * recording.samples // MOST_OTHERS)
     for panel, group in enumerate(panels.values()):
         for k, channel in enumerate(group):
             for segment in (s for s in recording.segments if s.stop > s.first + 1):
@@ -133,16 +130,8 @@ def _of_waves(
     assert shown.feeder is not None
     single = len(shown.phasors[0].V) == 1
     sequences = "|U| [kV]" if single else "U seq. [kV]"
-    panels = [
-        "u [kV]",
-        "i [kA]",
-        "U RMS [kV]",
-        "I RMS [kA]",
-        sequences,
-        "P, Q [MW]",
-        "f [Hz]",
-        *["status"] * bool(states),
-    ]
+    panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
+    panels += ["status"] * bool(states)
     heights = [*HEIGHTS, *[TRACE * len(states)] * bool(states)]
     chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
     for segment in recording.waveforms():
@@ -172,7 +161,6 @@ def _further(view: View) -> str:
 def _waves(
     chart: Chart, recording: Recording, shown: Sight, segment: Segment, every: int, span: tuple[float, float] | None
 ) -> None:
-    """The waveforms of a segment and their RMS."""
     assert shown.feeder is not None
     waves = FeederWaves.of(recording, shown.feeder, segment if span is None else segment.between(*span))
     rate, start = segment.rate, waves.segment.start

@@ -58,9 +58,7 @@ def chart(overlay: Overlay) -> Chart:
 def currents(event: WaveEvent, overlay: Overlay) -> Chart:
     """The currents of the phases, in which the noise band is that of the best of the models."""
     curves = [Drawn(*model) for model in _models(overlay)]
-    return wave_chart(
-        event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places
-    )  # fmt: skip
+    return wave_chart(event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places)
 
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:

@@ -76,12 +76,10 @@ def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
 
 
 def report(planned: Planned, content: Mapping[str, Any]) -> Report:
-    """The page."""
     needed = planned.needed
-    answer = str(needed)
     title = f"How deep a dip tells {needed.parameter}"
     page = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
-    page.verdict(as_sentence(answer), kind="bad" if needed.depth is None else "good")
+    page.verdict(as_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     page.chart(by_depth, _caption(needed))
     _asked(page, planned)

@@ -36,17 +36,11 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     page.table(
         ["parameter", "meaning", "estimate", "unit", "95 % by the fit", "95 % by the posterior"],
         [
-            [
-                name,
-                declared(uncertainty, name).about,
-                f"{value:.4g}",
-                declared(uncertainty, name).unit,
-                span(*own),
-                span(*interval),
-            ]
+            [name, p.about, f"{value:.4g}", p.unit, span(*own), span(*interval)]
             for name, value, own, interval in zip(
                 drawn.names, uncertainty.values, uncertainty.intervals, drawn.intervals, strict=True
             )
+            for p in (declared(uncertainty, name),)
         ],
         words=(1,),
     )
@@ -77,7 +71,6 @@ def _settled(drawn: PosteriorSample) -> str:
 
 
 def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
-    """The density of one parameter's draws."""
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
     density, edges = np.histogram(draws, BINS, density=True)
@@ -92,7 +85,6 @@ def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
 
 
 def _closest(drawn: PosteriorSample) -> tuple[int, int]:
-    """The two parameters whose draws correlate most."""
     r = np.abs(np.atleast_2d(np.corrcoef(drawn.draws.T)))
     np.fill_diagonal(r, -1.0)
     a, b = np.unravel_index(r.argmax(), r.shape)
@@ -100,7 +92,6 @@ def _closest(drawn: PosteriorSample) -> tuple[int, int]:
 
 
 def _pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
-    """Draws of two parameters against each other."""
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
     chart = Chart(axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420)
     chart.points("draws", some[:, a], some[:, b], PALETTE[5], size=3)

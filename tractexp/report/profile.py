@@ -69,7 +69,6 @@ def report(scan: Profiles, grade: str = "") -> Report:
 
 
 def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
-    """A line of the table of intervals."""
     value, half = _curvature(scan, profile.name)
     about = declared(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
@@ -132,7 +131,6 @@ def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
 
 
 def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
-    """Which parameters are not identified."""
     poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
@@ -148,10 +146,7 @@ def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
     value, half = _curvature(scan, profile.name)
     top = ABOVE * scan.threshold
     x, y = _smooth(profile)
-    chart = Chart(
-        axis(scan.uncertainty, profile.name), ["deviance"], pixels=290,
-        title=title, legend=False,
-    )  # fmt: skip
+    chart = Chart(axis(scan.uncertainty, profile.name), ["deviance"], pixels=290, title=title, legend=False)
     chart.shade(*profile.interval, SHADE, opacity=0.25)
     if np.isfinite(half):
         parabola = scan.threshold * ((x - value) / half) ** 2
@@ -187,5 +182,4 @@ def axis(uncertainty: Uncertainty, name: str) -> str:
 
 
 def span(low: float, high: float) -> str:
-    """An interval as text."""
     return f"{low:.4g} .. {high:.4g}"

@@ -12,6 +12,7 @@ from tractexp.discrepancy.proposal.judge import Before, Weighed
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
+from tractexp.report.extended import interval
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
@@ -50,14 +51,15 @@ def proposed(page: Report, findings: Findings) -> None:
 def _numbers(page: Report, proposal: Proposal) -> None:
     rows = [
         [
-            k.parameter.name,
-            k.parameter.symbol.replace("\\varphi", "φ"),
-            k.parameter.about,
-            k.parameter.unit,
+            p.name,
+            p.symbol.replace("\\varphi", "φ"),
+            p.about,
+            p.unit,
             with_error(k.value, k.error),
-            _interval(*k.interval),
+            interval(*k.interval),
         ]
         for k in proposal.estimates
+        for p in (k.parameter,)
     ]
     page.table(
         ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"], rows,
@@ -133,7 +135,3 @@ def _tried(page: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
               f"{w.validate.left:.2f}", in_words(w.p)] for t, w in tried],
             "Shares of the explainable gap closed, and what is left over the variance of the noise.",
         )  # fmt: skip
-
-
-def _interval(low: float, high: float) -> str:
-    return f"{low:.4g} to {high:.4g}" if np.isfinite([low, high]).all() else ""

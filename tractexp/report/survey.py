@@ -20,16 +20,8 @@ COLUMNS = (  # key, heading, kind of cell, digits
     ("load", "load", "words", 0), ("start", "starts [s]", "number", 3), ("when", "when", "time", 0),
     ("rate", "rate [Hz]", "figure", 5), ("why", "why", "why", 0),
 )  # fmt: skip
-FURTHER = (
-    "file",
-    "station",
-    "P_before",
-    "P_after",
-    "Q_before",
-    "Q_after",
-    "unit",
-    "command",
-)  # of a row, beside the columns
+# of a row, beside the columns
+FURTHER = ("file", "station", "P_before", "P_after", "Q_before", "Q_after", "unit", "command")
 
 
 def summary(content: Mapping[str, Any]) -> Report:
@@ -57,7 +49,6 @@ def kinds(content: Mapping[str, Any]) -> Table:
 
 
 def report(content: Mapping[str, Any]) -> Report:
-    """The page."""
     keys = [key for key in (*(c[0] for c in COLUMNS), *FURTHER) if key not in ("P", "Q")]
     rows = [{key: row[key] for key in keys} for row in content["rows"]]
     data = {

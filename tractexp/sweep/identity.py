@@ -4,10 +4,11 @@ import functools
 import glob
 import hashlib
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from tractexp import provenance
+from tractexp.composition import texts
 from tractexp.errors import UserError
 from tractexp.files import located
 
@@ -20,7 +21,7 @@ def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
 
 def inputs(config: Mapping[str, Any]) -> str:
     """SHA-256 of the installed code, plugins of all packages included, and of the data files the job names."""
-    named = sorted(set(_strings(config.get("data") or {})))
+    named = sorted(set(texts(config.get("data") or {})))
     return _digest("".join([provenance.code(), *map(_file, named)]).encode())
 
 
@@ -39,14 +40,3 @@ def _file(name: str) -> str:
         return "".join(_digest(file.read_bytes()) for file in files if file.is_file())
     except (OSError, ValueError, UserError):  # the job will say what is wrong with it
         return ""
-
-
-def _strings(value: Any) -> Iterator[str]:
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping):
-        for item in value.values():
-            yield from _strings(item)
-    elif isinstance(value, list | tuple):
-        for item in value:
-            yield from _strings(item)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import credentials, files
-from tractexp.api.task import variant
+from tractexp.api.task import Job, variant
 from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
@@ -88,7 +88,6 @@ def run_job(config: Any) -> Status:
 
 def _run(job: SweepJob) -> str:
     """Run the task; returns what went wrong, in one line, or ""."""
-    from tractexp.api.task import Job
     from tractexp.cli.run import perform
 
     try:

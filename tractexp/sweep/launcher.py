@@ -9,6 +9,7 @@ from typing import Any
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
 
+from tractexp.api.task import Job
 from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
@@ -86,8 +87,6 @@ def _trace(job: SweepJob) -> Status | bool:
 def warm(jobs: Sequence[SweepJob]) -> None:
     """Compile the kernels of the jobs' models, once for each, so that the workers find them on disk."""
     import json
-
-    from tractexp.api.task import Job
 
     seen = set()
     for job in jobs:

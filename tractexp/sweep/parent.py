@@ -6,11 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from tractexp import provenance, quoting
+from tractexp import provenance, quoting, tracking
+from tractexp.api.task import Job
 from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
 from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
+from tractexp.tracking.runfile import save
 from tractexp.tracking.sweepfile import FILE, parent_of
 
 
@@ -26,7 +28,6 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         (folder / FILE).unlink(missing_ok=True)
         yield
         return
-    from tractexp import tracking
 
     uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
     run_id = _opened(folder, run, uri, afresh)
@@ -48,8 +49,6 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
 
 def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
     """The id of the parent run, opened or opened again; None, and a sentence, where the store cannot be used."""
-    from tractexp import tracking
-
     try:
         run_id = parent_of(folder)
         if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
@@ -61,10 +60,6 @@ def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
 
 
 def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
-    """Close the parent run."""
-    from tractexp import tracking
-    from tractexp.tracking.runfile import save
-
     try:
         entry = save(folder, run, uri, sweep=True)
         if run_id is not None:
@@ -84,7 +79,6 @@ def _send(folder: Path, uri: str) -> None:
 
 
 def metrics(jobs: list[Any]) -> dict[str, float]:
-    """The figures of a sweep as a whole."""
     ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
     best = [f for _, folder in ends if (f := objective(folder)) is not None]
     counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
@@ -93,16 +87,11 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
 
 def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The settings that all jobs of a sweep have, as `tracking.flatten` spells them."""
-    from tractexp import tracking
-
     settings = [tracking.flatten(config) for config in configs]
     return {key: value for key, value in settings[0].items() if all(flat.get(key) == value for flat in settings)}
 
 
 def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
-    from tractexp import tracking
-    from tractexp.api.task import Job
-
     first = Job(jobs[0].config, jobs[0].choices, folder)
     return tracking.TrackedRun(
         experiment=first.experiment,

@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
-from tractexp.progress import FIRST_LINE, NEXT_LINES, console, say
+from tractexp.progress import Pace, console, say
 from tractexp.sweep.job import SweepJob, shared
-from tractexp.sweep.status import FAILED, Status, search_objective
+from tractexp.sweep.status import FAILED, Status, objective
 
 SHOWN = 3  # variants named in a line of a log file
 
@@ -15,19 +15,12 @@ SHOWN = 3  # variants named in a line of a log file
 class Tally:
     """Counts the ends of a sweep's jobs."""
 
-    total: int
-    done: int
-    failed: int
-    common: set[str]
-    started: float
-    first: float
-
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0
         self.common = shared(jobs)
         self.jobs: dict[str, int] = {}  # done, by variant
         self.best: dict[str, float] = {}
-        self.started = self.first = time.perf_counter()
+        self.first = time.perf_counter()
 
     def add(self, job: SweepJob, end: Status) -> None:
         variant = job.variant(self.common)
@@ -36,7 +29,7 @@ class Tally:
             self.first = time.perf_counter()
         self.failed += end.status == FAILED
         self.jobs[variant] = self.jobs.get(variant, 0) + 1
-        value = search_objective(job.folder)
+        value = objective(job.folder, of_search=True)
         if value is not None:
             self.best[variant] = min(value, self.best.get(variant, value))
 
@@ -52,7 +45,6 @@ class Tally:
         return f"about {spent * (self.total - self.done) / (self.done - 1):.0f} s left"
 
     def line(self) -> str:
-        """The state in one line."""
         parts = [f"{self.done} of {self.total} jobs"]
         if self.failed:
             parts.append(f"{self.failed} failed")
@@ -69,14 +61,11 @@ def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], 
         with _live(tally) as callback:
             yield callback
         return
-    due = FIRST_LINE
+    pace = Pace()
 
     def note(job: SweepJob, end: Status) -> None:
-        nonlocal due
         tally.add(job, end)
-        spent = time.perf_counter() - tally.started
-        if spent >= due and tally.done < tally.total:
-            due = spent + NEXT_LINES
+        if pace() and tally.done < tally.total:
             say(tally.line())
 
     yield note

@@ -1,10 +1,9 @@
 """The state of a job of a sweep: `status.json` in its folder."""
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
 
 from tractexp.files import write_json
 
@@ -36,18 +35,13 @@ def read(folder: Path) -> Status | None:
         return None
 
 
-def objective(folder: Path) -> float | None:
-    """The objective of the estimate in the job's `result.json`; None where its task writes none."""
-    return _objective(folder, lambda result: result)
+def objective(folder: Path, *, of_search: bool = False) -> float | None:
+    """The objective of the estimate in the job's `result.json`; None where its task writes none.
 
-
-def search_objective(folder: Path) -> float | None:
-    """The objective where the job's search ended, by which optimizers are compared."""
-    return _objective(folder, lambda result: result.get("search") or result)
-
-
-def _objective(folder: Path, of: Callable[[Any], Any]) -> float | None:
+    Of the search: where that ended, by which optimizers are compared.
+    """
     try:
-        return float(of(json.loads((folder / "result.json").read_text(encoding="utf-8")))["objective"])
+        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+        return float(((of_search and result.get("search")) or result)["objective"])
     except (OSError, ValueError, TypeError, KeyError):
         return None

@@ -210,7 +210,7 @@ def comparable(jobs: Sequence[SweepJob]) -> bool:
     variants = {job.variant(common) for job in jobs}
     if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
         return False
-    ended = (job for job in jobs if status.search_objective(job.folder) is not None)
+    ended = (job for job in jobs if status.objective(job.folder, of_search=True) is not None)
     return len(list(itertools.islice(ended, 2))) > 1
 
 
@@ -226,7 +226,7 @@ def summary(jobs: Sequence[SweepJob]) -> None:
     common = shared(jobs)
     objectives: dict[str, list[float]] = {}
     for job in jobs:
-        value = status.search_objective(job.folder)
+        value = status.objective(job.folder, of_search=True)
         if value is not None:
             objectives.setdefault(job.variant(common), []).append(value)
     if objectives:

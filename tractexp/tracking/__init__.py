@@ -12,4 +12,4 @@ from tractexp.tracking.run import tag_experiment as tag_experiment
 from tractexp.tracking.store import address as address
 from tractexp.tracking.store import chosen_uri as chosen_uri
 from tractexp.tracking.store import default_uri as default_uri
-from tractexp.tracking.store import prepare as prepare
+from tractexp.tracking.store import open_store as open_store

@@ -73,7 +73,6 @@ def close_stale(client: Any) -> list[str]:
 
 
 def running(client: Any) -> list[Any]:
-    """All runs that say they are running."""
     experiments = [experiment.experiment_id for experiment in client.search_experiments()]
     return search(client, experiments, "attributes.status = 'RUNNING'") if experiments else []
 

@@ -19,7 +19,7 @@ from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.tracking.run import TrackedRun, log
-from tractexp.tracking.store import import_mlflow, prepare
+from tractexp.tracking.store import import_mlflow, open_store
 
 OPTIONAL = ("pandas", "polars", "pyarrow", "scipy", "IPython", "pygments")  # what MLflow imports and logs without
 _ahead: "list[Logger]" = []
@@ -125,7 +125,7 @@ def main() -> None:
     try:
         with absent(OPTIONAL):
             import_mlflow()
-            prepare(uri := pickle.load(sys.stdin.buffer))
+            open_store(uri := pickle.load(sys.stdin.buffer))
         run_id = log(pickle.load(sys.stdin.buffer), uri)
     except (EOFError, pickle.UnpicklingError):
         os._exit(0)  # nothing to log, and perhaps nobody listens

@@ -48,14 +48,6 @@ def address(setting: str | None) -> str:
     return f"sqlite:///{database.as_posix()}" if database else chosen
 
 
-def prepare(uri: str) -> None:
-    """Create the store at `uri` if it is not there yet; any number of processes may do so at the same moment.
-
-    Raises `UserError` when it cannot be written or reached, or comes from another version of MLflow.
-    """
-    open_store(uri)
-
-
 def database_of(uri: str) -> Path | None:
     """The file behind an SQLite address, None for any other store; a relative one counts from the current folder."""
     return Path(uri.removeprefix("sqlite:///")).absolute() if uri.startswith("sqlite:///") else None
@@ -63,9 +55,10 @@ def database_of(uri: str) -> Path | None:
 
 @functools.cache
 def open_store(uri: str) -> Any:
-    """An open `MlflowClient`, the store behind it created or migrated. One per store and process.
+    """An open `MlflowClient`, the store behind it created where it is not there yet. One per store and process.
 
-    Runs still marked as running by processes that have ended are closed.
+    Any number of processes may do so at the same moment. Runs still marked as running by processes that have ended are
+    closed. Raises `UserError` for a store that cannot be written or reached, or comes from another version of MLflow.
     """
     credentials.check("the MLflow store", uri)
     if not uri.strip():

@@ -62,14 +62,8 @@ def _guard(host: str, port: int) -> list[str]:
     served = [f"{each}:{port}" for each in dict.fromkeys((host, "localhost"))]
     names = [name for each in served for name in (each.rpartition(":")[0], each)]
     origins = [f"http://{name}" for name in (names if port == 80 else served)]
-    return [
-        "--allowed-hosts",
-        ",".join(names),
-        "--cors-allowed-origins",
-        ",".join(origins),
-        "--x-frame-options",
-        "DENY",
-    ]
+    options = {"allowed-hosts": ",".join(names), "cors-allowed-origins": ",".join(origins), "x-frame-options": "DENY"}
+    return [word for name, value in options.items() for word in (f"--{name}", value)]
 
 
 def check_servable(uri: str, host: str = "127.0.0.1", port: int = 5000) -> None:

@@ -143,8 +143,7 @@ def check(
         for value in values:
             check_range(f"task.{name}", value, low, high)
     check_range("task.multiplier", multiplier, 1)
-    if cores is not None:
-        check_range("task.cores", cores, 1)
+    check_range("task.cores", cores, 1)
 
 
 def _tuple(value: Any) -> Any:

@@ -170,7 +170,6 @@ def check(
 
 
 def _report(comparison: "Comparison | Several") -> Any:
-    """The module that reports one problem, or several."""
     from tractexp.studies.comparison import overall_page, page
     from tractexp.studies.comparison.overall import Several
 

@@ -16,7 +16,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
-from tractexp.progress import NEXT_LINES, say, telling
+from tractexp.progress import NEXT_LINES, Pace, say, telling
 
 if TYPE_CHECKING:
     from tractexp.studies.paper.claims import Claim
@@ -125,9 +125,10 @@ def paper(
     """
     started = time.perf_counter()
     check(parts, seeds, workers)
-    model_settings = {"bounds": bounds, "fixed": fixed, "per_event": per_event, "substeps": substeps}
-    limits = {"budget": budget, "time_limit": time_limit, "target": target}
-    setup = Setup.of(records, model, validate, objective, model_settings, seed=seed, **limits)
+    setup = Setup.of(
+        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
+        seed=seed, budget=budget, time_limit=time_limit, target=target,
+    )  # fmt: skip
     settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
     with telling(progress) as tell:
         study = _study(setup, **settings, tell=tell, count=_counted(tell))
@@ -145,8 +146,7 @@ def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
     for part in parts:
         check_choice("task.parts", part, PARTS)
     check_range("task.seeds", seeds, 1)
-    if workers is not None:
-        check_range("task.workers", workers, 1)
+    check_range("task.workers", workers, 1)
 
 
 def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "Study":
@@ -162,13 +162,10 @@ def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "
 
 def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
     """A counter of the searches that have ended, which reports now and then."""
-    last = time.perf_counter()
+    pace = Pace(NEXT_LINES)
 
     def count(done: int, total: int) -> None:
-        nonlocal last
-        now = time.perf_counter()
-        if done == total or now - last > NEXT_LINES:
-            last = now
+        if pace() or done == total:
             tell(f"  {done} of {total} searches")
 
     return count
@@ -191,7 +188,7 @@ class Paper(Task, call=paper):
 
     def perform(self, job: Job, **instead: Any) -> PaperResult:
         job = job.holding_out(self.held_out)
-        for line in recorded(job.events_of_fit.train, job.events_of_fit.validate, "hold out"):
+        for line in recorded(*job.events_of_fit, held_out="hold out"):
             say(line)
         return super().perform(job, progress=lambda line: say(f"  {line}"), **instead)
 

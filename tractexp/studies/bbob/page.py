@@ -13,7 +13,6 @@ from tractexp.wording import counted
 
 
 def scale(benchmark: BbobRuns) -> str:
-    """What was run, in words."""
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
@@ -106,7 +105,6 @@ def span(functions: list[int]) -> str:
 
 
 def report(benchmark: BbobRuns) -> Report:
-    """The page."""
     plan = benchmark.plan
     page = Report(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
     page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *sentences(benchmark))
@@ -174,12 +172,8 @@ def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
     """
     plan = benchmark.plan
     times = [
-        {
-            "optimizer": name,
-            "dimension": d,
-            "function": f,
-            "ert": [benchmark.ert(name, d, f, k)[0] for k in range(len(plan.targets))],
-        }
+        {"optimizer": name, "dimension": d, "function": f,
+         "ert": [benchmark.ert(name, d, f, k)[0] for k in range(len(plan.targets))]}
         for name in benchmark.optimizers for d in plan.dimensions for f in plan.functions
     ]  # fmt: skip
     summary = [
@@ -198,7 +192,7 @@ def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
             "optimizers": settings,
             "summary": summary,
             "running_times": times,
-            "runs": [asdict(run) for run in benchmark.runs],
+            "runs": benchmark.runs,
             "sentences": sentences(benchmark),
         }
     )

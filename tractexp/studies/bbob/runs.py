@@ -45,18 +45,9 @@ class Bbob:
     `hits` (k,), inf before.
     """
 
-    problem: Any  # of ioh
-    lower: np.ndarray
-    upper: np.ndarray
-    optimum: float
-    goals: np.ndarray
-    hits: np.ndarray
-    evaluations: int
-    best: float
-
     def __init__(self, function: int, dimension: int, instance: int, targets: Sequence[float]):
         ioh = package()
-        self.problem = ioh.get_problem(function, instance, dimension, ioh.ProblemClass.BBOB)
+        self.problem: Any = ioh.get_problem(function, instance, dimension, ioh.ProblemClass.BBOB)
         self.name: str = self.problem.meta_data.name
         self.lower, self.upper = np.array(self.problem.bounds.lb), np.array(self.problem.bounds.ub)
         self.optimum = float(self.problem.optimum.y)

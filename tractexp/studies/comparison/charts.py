@@ -75,7 +75,6 @@ def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np
 
 
 def targets_in_words() -> str:
-    """The targets of the ECDF in words."""
     return f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times the floor"
 
 
@@ -132,7 +131,6 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
 
 
 def round_numbers(low: float, high: float) -> list[float]:
-    """A few round numbers between two."""
     few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
     return few if len(few) > 2 else more
 

@@ -7,6 +7,7 @@ from tractexp.studies.comparison.comparison import Comparison, VariantPair, seed
 from tractexp.studies.comparison.floor import AT_FLOOR
 from tractexp.studies.comparison.statistics import ALPHA
 from tractexp.studies.comparison.summary import Spread
+from tractexp.wording import joined
 
 MORE = 1.2  # times the simulations of another variant are worth a word
 
@@ -81,7 +82,6 @@ def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], 
 
 
 def headline(comparison: Comparison) -> str:
-    """How the best variant stands to the others."""
     if not comparison.pairs:
         return "No difference between variants was tested."
     best, *others = comparison.leaders
@@ -105,10 +105,7 @@ def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[Varian
 
 
 def _listed(names: list[str]) -> str:
-    names = sorted(names)
-    if len(names) > 6:
-        return f"{len(names)} other variants"
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+    return joined(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
 
 
 def of_pair(comparison: Comparison, pair: VariantPair) -> str:
@@ -166,7 +163,6 @@ def of_speed(comparison: Comparison) -> str:
 
 
 def of_floor(comparison: Comparison) -> str:
-    """How often the noise floor was reached."""
     shares = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
     return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {shares}."
@@ -188,7 +184,6 @@ def _ranked(rows: list[tuple[float, int, str]]) -> str:
 
 
 def of_effect(effect: SwitchEffect) -> str:
-    """A switch's own effect."""
     (switch,) = effect.switches
     verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
     return (

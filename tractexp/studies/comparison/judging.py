@@ -5,41 +5,39 @@ import json
 from collections.abc import Mapping, Sequence
 from inspect import unwrap
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from tractexp import files
+from tractexp import files, provenance
+from tractexp.api.setup import Setup
 from tractexp.errors import UserError
+from tractexp.identification.problem import Problem
+from tractexp.plugin import build, discover, get
 from tractexp.progress import counting
+from tractexp.record import detect
+from tractexp.studies.api.benchmark import BenchmarkResult, benchmark
+from tractexp.studies.comparison.ablation import family
+from tractexp.studies.comparison.comparison import Comparison, compare
+from tractexp.studies.comparison.floor import Polished, polish
+from tractexp.studies.comparison.load import nested
+from tractexp.studies.comparison.overall import Overall, Several, on_functions, on_records, terms_of
+from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
 from tractexp.wording import joined
-
-if TYPE_CHECKING:
-    from tractexp.identification.problem import Problem
-    from tractexp.studies.api.benchmark import BenchmarkResult
-    from tractexp.studies.comparison.comparison import Comparison
-    from tractexp.studies.comparison.floor import Polished
-    from tractexp.studies.comparison.overall import Overall, Several
-    from tractexp.studies.comparison.runs import Gathered, SearchRun
 
 DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
 BBOB = "bbob.json"
 
 
-def compared(gathered: "Gathered", progress: Any, judging: Mapping[str, Any]) -> "Comparison":
+def compared(gathered: Gathered, progress: Any, judging: Mapping[str, Any]) -> Comparison:
     """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
-    from tractexp.studies.comparison.comparison import compare
-
     polished, why_not = _polished(gathered, progress)
     return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
 
 
 def several(
-    groups: Mapping[tuple[str, ...], "Sequence[SearchRun]"], source: str, judging: Mapping[str, Any],
+    groups: Mapping[tuple[str, ...], Sequence[SearchRun]], source: str, judging: Mapping[str, Any],
     folder: Path | None, bbob: int, cores: int | None, progress: Any,
-) -> "Several":  # fmt: skip
+) -> Several:  # fmt: skip
     """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
-    from tractexp.studies.comparison.overall import Several, on_records, terms_of
-    from tractexp.studies.comparison.runs import gather
-
     comparisons: dict[str, Comparison] = {}
     by_terms: dict[str, dict[str, Comparison]] = {}
     for (data, *_), runs in groups.items():
@@ -58,7 +56,7 @@ def several(
     return Several(comparisons, tuple(overall), tuple(notes))
 
 
-def _noted(comparisons: Mapping[str, "Comparison"]) -> list[str]:
+def _noted(comparisons: Mapping[str, Comparison]) -> list[str]:
     """What a reader must know, once, with the problems that it is true of unless that is all of them."""
     of: dict[str, list[str]] = {}
     for label, comparison in comparisons.items():
@@ -67,16 +65,8 @@ def _noted(comparisons: Mapping[str, "Comparison"]) -> list[str]:
     return [n if len(labels) == len(comparisons) else f"{joined(labels)}: {n}" for n, labels in of.items()]
 
 
-def _on_bbob(
-    comparison: "Comparison", instances: int, folder: Path | None, cores: int | None, progress: Any
-) -> "Overall":
+def _on_bbob(comparison: Comparison, instances: int, folder: Path | None, cores: int | None, progress: Any) -> Overall:
     """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what they depend on."""
-    from tractexp import provenance
-    from tractexp.studies.api.benchmark import benchmark
-    from tractexp.studies.comparison.ablation import family
-    from tractexp.studies.comparison.load import nested
-    from tractexp.studies.comparison.overall import on_functions
-
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
     budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
@@ -91,10 +81,8 @@ def _on_bbob(
     return on_functions(result.bbob, family(variants, plain()))
 
 
-def _stored(folder: Path, settings: Mapping[str, Any]) -> "BenchmarkResult | None":
+def _stored(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
     """The runs on BBOB that were made before with the same code and settings."""
-    from tractexp.studies.api.benchmark import BenchmarkResult
-
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
         content = json.loads((folder / BBOB).read_text(encoding="utf-8"))
         if content["of"] == files.plain(settings):
@@ -102,10 +90,8 @@ def _stored(folder: Path, settings: Mapping[str, Any]) -> "BenchmarkResult | Non
     return None
 
 
-def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, str]":
+def _polished(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
     """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
-    from tractexp.studies.comparison.floor import polish
-
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
         problem = _problem(next(run for run in runs if run.finished))
@@ -119,23 +105,16 @@ def _polished(gathered: "Gathered", progress: Any) -> "tuple[Polished | None, st
     return polished, "" if polished else why
 
 
-def _problem(run: "SearchRun") -> "Problem":
+def _problem(run: SearchRun) -> Problem:
     """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
-    from tractexp.api.setup import Setup
-    from tractexp.plugin import build
-    from tractexp.record import detect
-    from tractexp.studies.comparison.load import nested
-
     config = nested(run.config)
     home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
         records = build("data", config["data"]).read()
     train = [detect(record) for record in records.train]
-    return Setup.of(train, config["model"], (), config.get("objective"), {}).problem
+    return Setup.of(train, config["model"], objective=config.get("objective")).problem
 
 
 def plain() -> dict[str, str]:
     """For each optimizer the one that it is with all its switches off, "" where there is none."""
-    from tractexp.plugin import discover, get
-
     return {name: get("optimizer", name).plain for name in discover()["optimizer"]}

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp.composition import leaves
 from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event
 from tractexp.studies.comparison.runs import SearchRun
@@ -139,12 +140,9 @@ def _yaml(path: Path) -> Any:
             raise ValueError(str(error)) from error
 
 
-def flat(node: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """A nested configuration as {"optimizer.population": 50}."""
-    config: dict[str, Any] = {}
-    for key, value in node.items():
-        config |= flat(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
-    return config
+def flat(node: Mapping[str, Any]) -> dict[str, Any]:
+    """A nested configuration as {"optimizer.population": 50}, without mappings that are empty."""
+    return {key: value for key, value in leaves(node) if not isinstance(value, dict)}
 
 
 def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:

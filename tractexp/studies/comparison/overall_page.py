@@ -10,7 +10,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts
 from tractexp.studies.comparison import overall_claims as claims
 from tractexp.studies.comparison import page as one
-from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
+from tractexp.studies.comparison.ablation import Ablation
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
 from tractexp.studies.comparison.statistics import ALPHA
@@ -95,12 +95,11 @@ def effects(overall: Overall) -> Chart:
 
 
 def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
-    """Main effects with sizes and costs, and interactions."""
     cost = overall.cost
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
     columns += ["simulations per iteration"] if cost else []
     rows = [
-        [*_factor(effect), *(f"{x:.0%}" for x in effect.better or ()), "yes" if effect.shown else "no"]
+        [*one.factor(effect), *(f"{x:.0%}" for x in effect.better or ()), "yes" if effect.shown else "no"]
         + ([f"{cost[effect.switches[0]]:+.1f}"] if cost else [])
         for effect in ablation.effects
     ]
@@ -115,12 +114,8 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
         return
     with page.folded("interactions of pairs of ingredients"):
         for changes, caption in ((ablation.interactions, one.INTERACTIONS), (ablation.company, one.COMPANY)):
-            rows = [[*_factor(effect), "yes" if effect.shown else "no"] for effect in changes]
+            rows = [[*one.factor(effect), "yes" if effect.shown else "no"] for effect in changes]
             page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
-
-
-def _factor(effect: SwitchEffect) -> list[str]:
-    return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
 
 
 def _reading(page: Report) -> Report:
@@ -147,6 +142,6 @@ def content(several: Several, source: str) -> dict[str, Any]:
         "answer": claims.answer(several),
         "sentences": claims.sentences(several),
         "notes": several.notes,
-        "overall": [one.as_dicts(overall) for overall in several.overall],
+        "overall": several.overall,
         "problems": {label: one.content(c, source) for label, c in several.comparisons.items()},
     })  # fmt: skip

@@ -1,14 +1,14 @@
 """A comparison as one self-contained page for people, and as one JSON file for machines."""
 
 import math
-from dataclasses import asdict, is_dataclass
+from dataclasses import asdict
 from typing import Any
 
 from tractexp import files
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.studies.comparison import charts, claims
-from tractexp.studies.comparison.ablation import Ablation
+from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number, p_value
 from tractexp.studies.comparison.comparison import Comparison, VariantPair
 from tractexp.studies.comparison.floor import AT_FLOOR
@@ -43,12 +43,10 @@ def report(comparison: Comparison, source: str) -> Report:
 
 
 def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
-    """Best, lower quartile, median, upper quartile, worst."""
     return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
 
 
 def quality(page: Report, comparison: Comparison) -> None:
-    """Where the runs ended: every run, and quartiles."""
     page.heading("Where the runs ended")
     drawn = charts.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
@@ -106,8 +104,9 @@ def _speed(page: Report, comparison: Comparison) -> None:
         + [number(x) for x in s.ert["seconds"]]
         for s in comparison.summaries
     ]
+    few = len(comparison.summaries) <= charts.TOGETHER
     for by in ("simulations", "iterations"):
-        caption = f"Best objective by {by}: the median" + (" and the quartiles." if _few(comparison) else ".")
+        caption = f"Best objective by {by}: the median{' and the quartiles' * few}."
         costs = " An iteration may cost several populations." if by == "iterations" else ""
         _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), caption + costs)
     caption = f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
@@ -118,10 +117,6 @@ def _speed(page: Report, comparison: Comparison) -> None:
         "Median of all simulations made, and expected running time (ERT) to each target: what all runs spent until "
         "they reached it, those that did not all they had, per run that did.",
     )
-
-
-def _few(comparison: Comparison) -> bool:
-    return len(comparison.summaries) <= charts.TOGETHER
 
 
 def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str) -> None:
@@ -146,10 +141,10 @@ def _differences(page: Report, comparison: Comparison) -> None:
     if not comparison.pairs:
         return
     main, rest = claims.near_and_far(comparison)
-    _pairs(page, main, "")
+    _pairs(page, main)
     if rest:
         with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
-            _pairs(page, rest, "")
+            _pairs(page, rest)
     sentences = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
     page.heading("To quote", 3).items(sentences[:QUOTED])
     if sentences[QUOTED:]:
@@ -157,30 +152,20 @@ def _differences(page: Report, comparison: Comparison) -> None:
             page.items(sentences[QUOTED:])
 
 
-def _pairs(page: Report, pairs: list[VariantPair], caption: str) -> None:
-    columns = ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"]
+def _pairs(page: Report, pairs: list[VariantPair]) -> None:
     rows = [
-        [
-            *(
-                pair.first,
-                pair.second,
-                str(pair.seeds),
-                *map(number, pair.medians),
-                *map(p_value, (pair.p, pair.corrected)),
-            ),
-            *(f"{pair.effect:.2f}", size_of(pair.effect), "yes" if pair.significant else "no"),
-        ]
+        [pair.first, pair.second, str(pair.seeds), *map(number, pair.medians), *map(p_value, (pair.p, pair.corrected)),
+         f"{pair.effect:.2f}", size_of(pair.effect), "yes" if pair.significant else "no"]
         for pair in pairs
-    ]
-    said = (
+    ]  # fmt: skip
+    page.table(
+        ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"], rows,
         "p: Wilcoxon signed-rank test over paired seeds, two-sided, as it is and after Holm's correction. A: "
-        "probability that a run of the first ends lower than one of the second (Vargha-Delaney)."
-    )
-    page.table(columns, rows, f"{caption} {said}".strip(), words=(1, 8))
+        "probability that a run of the first ends lower than one of the second (Vargha-Delaney).", words=(1, 8),
+    )  # fmt: skip
 
 
 def switches(page: Report, ablation: Ablation) -> None:
-    """The effects of the switches on one problem."""
     page.heading("What each ingredient does")
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
@@ -190,31 +175,34 @@ def switches(page: Report, ablation: Ablation) -> None:
         (ablation.interactions, INTERACTIONS),
     )
     for effects, caption in groups:
-        rows = [
-            [
-                *(" with ".join(e.switches), number(e.factor), number(e.low), number(e.high)),
-                *(str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))),
-            ]
-            for e in effects
-        ]
+        rows = [[*factor(e), str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))] for e in effects]
         if rows:
             page.table(columns, rows, f"{caption} 95 % bootstrap intervals over seeds.")
     if unknown := claims.of_unknown(ablation):
         page.text(unknown)
 
 
+def factor(effect: SwitchEffect) -> list[str]:
+    """The switches and what they multiply the objective by, with its interval."""
+    return [" with ".join(effect.switches), *map(number, (effect.factor, effect.low, effect.high))]
+
+
 def _not_judged(page: Report, comparison: Comparison) -> None:
-    """The runs without a result: those that failed, and those that were interrupted."""
-    failed = _failed(comparison)
-    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
-    for title, rows in (("Failures", failed), ("Interrupted: not judged", interrupted)):
+    for title, rows in zip(("Failures", "Interrupted: not judged"), _without_result(comparison), strict=True):
         if rows:
             page.heading(f"{title}: {len(rows)}")
-            page.table(["variant", "seed", "job", "because"], [list(map(str, row)) for row in rows], words=(2, 3))
+            page.table(["variant", "seed", "job", "because"], [[str(v) for v in row.values()] for row in rows],
+                       words=(2, 3))  # fmt: skip
 
 
-def _failed(comparison: Comparison) -> list[tuple[str, int, str, str]]:
-    return [(v.name, run.seed, run.where, run.failure) for v in comparison.variants for run in v.runs if run.failure]
+def _without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
+    """The runs that failed, and those that were interrupted: variant, seed, job and why."""
+    failed = [(v.name, run, run.failure) for v in comparison.variants for run in v.runs if run.failure]
+    interrupted = [(name, run, run.interruption) for name, run in comparison.gathered.interrupted]
+    return [
+        [{"variant": name, "seed": run.seed, "job": run.where, "message": why} for name, run, why in rows]
+        for rows in (failed, interrupted)
+    ]
 
 
 def _reading(page: Report, comparison: Comparison) -> None:
@@ -237,11 +225,9 @@ def _reading(page: Report, comparison: Comparison) -> None:
 
 def content(comparison: Comparison, source: str) -> dict[str, Any]:
     """What `comparison.json` holds: every number of the page. What is not finite is None."""
-    failed = _failed(comparison)
-    interrupted = [(name, run.seed, run.where, run.interruption) for name, run in comparison.gathered.interrupted]
-    keys = ("variant", "seed", "job", "message")
+    failed, interrupted = _without_result(comparison)
     polished = comparison.polished
-    whole = {
+    return files.plain({
         "source": source,
         "problem": comparison.gathered.problem,
         "values": f"objectives, errors and parameters are those {AT_END}",
@@ -256,23 +242,12 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
         "ablation": comparison.ablation,
         "sentences": claims.sentences(comparison),
         "notes": comparison.notes,
-        "failures": [dict(zip(keys, row, strict=True)) for row in failed],
-        "interrupted": [dict(zip(keys, row, strict=True)) for row in interrupted],
-    }
-    return files.plain(as_dicts(whole))
+        "failures": failed,
+        "interrupted": interrupted,
+    })  # fmt: skip
 
 
 def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
-    """One run, as `comparison.json` holds it."""
     inside = comparison.polished.in_valley(run) if comparison.polished else None
     fields = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
     return {"variant": variant.name, **fields, "simulations": run.simulations[-1], "in_valley": inside}
-
-
-def as_dicts(value: Any) -> Any:
-    """Data classes within as dictionaries."""
-    if is_dataclass(value) and not isinstance(value, type):
-        value = asdict(value)
-    if isinstance(value, dict):
-        return {key: as_dicts(item) for key, item in value.items()}
-    return [as_dicts(item) for item in value] if isinstance(value, list | tuple) else value

@@ -57,6 +57,12 @@ def number(value: float) -> str:
     return f"{value:.3g}" if abs(value) >= 1e-3 or value == 0 else f"{value:.2e}"
 
 
+def middle(values: Sequence[float] | np.ndarray) -> str:
+    """The median and, in brackets, lowest and highest."""
+    low, middle, high = np.quantile(values, (0, 0.5, 1))
+    return f"{number(middle)} ({number(low)} .. {number(high)})"
+
+
 def percent(value: float) -> str:
     return f"{100 * value:.2f} %"
 
@@ -154,7 +160,6 @@ def how_read(name: str) -> str:
 
 
 def table3(study: Study) -> list[Claim]:
-    """Which of the three ends lowest."""
     claims = []
     for first, second in PAIRS:
         for by in BUDGETS:
@@ -242,7 +247,6 @@ def _sure(study: Study, holds: bool) -> str:
 
 
 def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[[Study], list[Claim]]:
-    """The claims of Table 4 or 5."""
 
     def claims(study: Study) -> list[Claim]:
         residuals = study.residuals(kind)
@@ -373,5 +377,4 @@ BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {
 
 
 def claims(study: Study, parts: Sequence[str]) -> list[Claim]:
-    """The claims of these parts, judged."""
     return [claim for part in parts if part in BY_PART for claim in BY_PART[part](study)]

@@ -51,7 +51,6 @@ def _values() -> str:
 
 
 def _ranking(study: Study) -> str:
-    """How the three rank by both budgets."""
     parts = []
     for by, budget in (
         ("iterations", "After 300 iterations"),
@@ -68,7 +67,6 @@ def _ranking(study: Study) -> str:
 
 
 def _differ(study: Study, first: str, second: str, by: str) -> bool:
-    """Whether either ends lower."""
     pair = PAIRS[[set(p) for p in PAIRS].index({first, second})]
     three = [study.pair(a, b, by) for a, b in PAIRS]
     flipped = [study.pair(b, a, by) for a, b in PAIRS]
@@ -116,7 +114,6 @@ def reasons(study: Study) -> list[str]:
 
 
 def _lacking(lack: why.Lack) -> str:
-    """What one of the sparrow searches lacks."""
     farther = "" if lack.convergence.lacks else "not "
     others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
     lost = [name for name, test in others.items() if test.lacks]
@@ -212,7 +209,6 @@ def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
 
 
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
-    """What other bounds change."""
     shares = {bounds: np.mean(ends.objective <= AT_FLOOR * lowest) for bounds, ends in study.rebounded.items()}
     listed = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]

@@ -158,7 +158,6 @@ def _methods() -> list[Check]:
 
 
 def _rankings() -> list[Check]:
-    """What the text says of the tables."""
     results = []
     tables = {"epsilon_p": printed.EPSILON_P, "epsilon_q": printed.EPSILON_Q, "Obj.E": printed.OBJECTIVE}
     for said, table in tables.items():
@@ -202,10 +201,6 @@ def motor_reactive(value: Mapping[str, float], U0: float) -> float:
 
 class Sphere:
     """The sum of squares about an optimum, in the box [-5, 5]^d: a problem for the search loop."""
-
-    optimum: np.ndarray
-    lower: np.ndarray
-    upper: np.ndarray
 
     def __init__(self, optimum: np.ndarray):
         self.optimum = optimum

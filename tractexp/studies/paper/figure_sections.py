@@ -12,9 +12,8 @@ from tractexp.studies.comparison import charts
 from tractexp.studies.comparison.floor import Floor
 from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.paper import conclusion, figures, maps, why
-from tractexp.studies.paper.cells import label, middle
-from tractexp.studies.paper.claims import number
-from tractexp.studies.paper.printed import COMPARED, LABELS
+from tractexp.studies.paper.claims import middle, number
+from tractexp.studies.paper.printed import COMPARED, LABELS, label
 from tractexp.studies.paper.study import AT_FLOOR, BUDGETS, LEVEL, RANDOM, TARGETS, TRADED, Study
 from tractexp.wording import as_sentence
 

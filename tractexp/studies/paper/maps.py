@@ -18,7 +18,6 @@ TAIL = 0.005  # share of the steps that count as the tail
 
 
 def issa(**settings: Any) -> Any:
-    """The improved sparrow search with these settings."""
     return build("optimizer", {"name": "issa", **settings})
 
 

@@ -82,16 +82,8 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
     fits += [respond(model, values, event, "validate") for event in held_out]
     substeps = int(problem.step.substeps.max())
     parameters = dict(zip(model.names, values.tolist(), strict=True))
-    return Order(
-        motor,
-        parameters,
-        result.objective,
-        tuple(fits),
-        estimate(problem, result.values).uncertainty,
-        duration(problem),
-        substeps,
-        count(model.source),
-    )
+    uncertainty, cost = estimate(problem, result.values).uncertainty, count(model.source)
+    return Order(motor, parameters, result.objective, tuple(fits), uncertainty, duration(problem), substeps, cost)
 
 
 def duration(problem: Problem) -> float:

@@ -6,8 +6,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
-from tractexp.studies.paper.cells import middle
-from tractexp.studies.paper.claims import BOTH, Claim, counted
+from tractexp.studies.paper.claims import BOTH, Claim, counted, middle
 from tractexp.studies.paper.figure_sections import figure3, figure4, figure6, figure8, figure9, held_out
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study

@@ -81,5 +81,13 @@ READINGS: dict[str, Reading] = {
        for name, (switch, label) in INGREDIENTS.items()},
     "random_search": Reading("random_search", "the best of random points"),
 }  # fmt: skip
+
+
+def label(name: str) -> str:
+    """ "issa_10_perceivers" -> "ISSA, 10 perceivers (section 4.2)"; the three of the tables are named alone."""
+    reading = READINGS[name]
+    return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.words}"
+
+
 TEN = {"issa": "issa_10_perceivers", "ssa": "ssa_10_perceivers"}  # section 4.2's reading of the same optimizer
 LITERAL = {name: f"{name}_to_the_letter" for name in COMPARED}

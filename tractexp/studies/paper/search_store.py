@@ -41,7 +41,6 @@ class SearchStore:
         return None
 
     def put(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
-        """Write the entry of a search."""
         ending = {k: v for k, v in vars(result).items() if k not in ("values", "history")}
         arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)

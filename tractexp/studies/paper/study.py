@@ -44,8 +44,6 @@ SHOWN: Mapping[str, Mapping[str, Sequence[str]]] = {
 class OptimizerPair:
     """One optimizer against another over paired seeds: two-sided p of Wilcoxon's test, and the Vargha-Delaney A."""
 
-    first: str
-    second: str
     p: float
     A: float
 
@@ -86,13 +84,11 @@ class Study:
 
     @functools.cached_property
     def printed_problem(self) -> Problem:
-        """The problem to the letter."""
         assert self.literal is not None
         return self.literal()
 
     @functools.cached_property
     def orders(self) -> dict[str, orders.Order]:
-        """Table 1."""
         self.tell("Table 1: fitting three orders of the motor")
         return {m: orders.fit(self.node, m, self.train, self.held_out, self.seed) for m in printed.TABLE_1}
 
@@ -160,7 +156,7 @@ class Study:
 
     def pair(self, first: str, second: str, by: str) -> OptimizerPair:
         a, b = self.objectives(first, by), self.objectives(second, by)
-        return OptimizerPair(first, second, wilcoxon(a, b)[0], vargha_delaney(a, b))
+        return OptimizerPair(wilcoxon(a, b)[0], vargha_delaney(a, b))
 
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
         """What each search spent until `target` times the floor or in all (seeds,), and whether it got there."""
@@ -213,14 +209,12 @@ class Study:
         return self.objectives(name) / self.ends[name].objective
 
     def shares(self, name: str) -> Shares:
-        """Of the searches of a reading."""
         at, bottom = self.objectives(name), self.ends[name].objective
         counts = (bottom <= AT_FLOOR * self.floor, at <= AT_FLOOR * self.floor, at <= AT_FLOOR * bottom)
         return Shares(self.seeds, *(int(np.count_nonzero(count)) for count in counts))
 
     @property
     def control_shares(self) -> Shares:
-        """Of the random points."""
         there = int(np.count_nonzero(self.control.objective <= AT_FLOOR * self.floor))
         return Shares(RANDOM, there, 0, 0)
 
@@ -243,10 +237,6 @@ class Study:
         own = next(p.bounds for p in self.problem.parameters if p.name == TRADED)
         others = {bounds: self.random_ends(valleys.within(self.problem, TRADED, *bounds)) for bounds in (WIDE, NARROW)}
         return {own: self.control, **others}
-
-    def floor_share(self, objectives: np.ndarray) -> float:
-        """The share of objectives (n,) at the floor."""
-        return float(np.mean(objectives <= AT_FLOOR * self.floor))
 
     @functools.cached_property
     def _fits(self) -> dict[str, list[list[Fit]]]:
@@ -284,9 +274,8 @@ class Study:
         events = self.held(kind)
 
         def residual(fits: list[Fit], channel: str) -> float:
-            each = [mean_residual(getattr(fits[e].event.record, channel), getattr(fits[e], channel))
-                    for e in events]  # fmt: skip
-            return float(np.mean(each))
+            each = [(getattr(fits[e].event.record, channel), getattr(fits[e], channel)) for e in events]
+            return float(np.mean([mean_residual(*powers) for powers in each]))
 
         names = (*COMPARED, *TEN.values())
         return {name: np.array([[residual(fits, c) for c in "PQ"] for fits in self.fits(name)]) for name in names}

@@ -7,9 +7,8 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.studies.paper import printed
-from tractexp.studies.paper.cells import label, middle, percent
-from tractexp.studies.paper.claims import PAIRS, number
-from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN
+from tractexp.studies.paper.claims import PAIRS, middle, number
+from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN, label
 from tractexp.studies.paper.study import AT_FLOOR, BUDGETS, LEVEL, Study
 
 TO_THE_LETTER = (
@@ -28,7 +27,7 @@ def table1(sheet: Report, study: Study) -> None:
     )
     rows, sizes = [], []
     for motor, order in study.orders.items():
-        fitted, held = (", ".join(map(percent, order.spread(role))) for role in ("train", "validate"))
+        fitted, held = (", ".join(f"{100 * e:.3g} %" for e in order.spread(role)) for role in ("train", "validate"))
         rows.append([
             motor, ", ".join(printed.TABLE_1[motor][:4]), fitted, held if study.held_out else "-",
             f"{order.condition:.1e}", f"{order.finite} of {order.free}", f"{order.identified} of {order.free}",
@@ -133,7 +132,7 @@ def _spent(study: Study, name: str) -> list[str]:
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         label(name), middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
-        "-" if literal else f"{study.floor_share(ends):.0%}",
+        "-" if literal else f"{np.mean(ends <= AT_FLOOR * study.floor):.0%}",
         "-" if literal else middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
