@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from command_line import run_command
 from scipy.special import chdtrc
+from written_out import dense_normal
 
 from hidden_effects import Case, Noise, Recorder, make, write
 from tractexp import store
@@ -499,7 +500,7 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
     apart = SeparableColumns(np.array([[1], [2]]), (np.arange(20), np.arange(20, 40)))
     alone = normal(rows, unit, rows(unit, lanes), lanes)
     together = normal(rows, unit, rows(unit, lanes), lanes, apart)
-    for one, other in (alone[0], together[0]), (alone[1].dense, together[1].dense):
+    for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-9)
     assert calls == [2, 6, 2, 4]
 

@@ -70,10 +70,6 @@ class Adequacy:
     sentence: str
     p: float | None
 
-    @property
-    def good(self) -> bool:
-        return self.grade is Grade.ADEQUATE
-
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
         return {"grade": str(self.grade), "sentence": self.sentence, "p": self.p}
@@ -81,7 +77,7 @@ class Adequacy:
 
 def surprise(
     observed: Observed, likelihood: Likelihood, unit: np.ndarray, squares: Likelihood | None = None,
-    least: float = np.inf, seed: int = SEED,
+    least: float = np.inf,
 ) -> Surprise:  # fmt: skip
     """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too little quiet.
 
@@ -93,7 +89,7 @@ def surprise(
     inside = _inside(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]

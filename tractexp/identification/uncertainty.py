@@ -18,6 +18,7 @@ from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.residual_tests import ResidualTest, jarque_bera, ljung_box
 from tractexp.identification.sandwich import scatter
+from tractexp.identification.separable import Sensitivities
 from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.noise.color import FEWEST
 
@@ -77,6 +78,11 @@ class Uncertainty:
     def exact(self) -> bool:
         """Whether nothing but noise is left, so that the likelihood is that of the noise."""
         return self.likelihood.initial_power
+
+    @functools.cached_property
+    def sensitivities(self) -> tuple[np.ndarray, Sensitivities]:
+        """What the estimate leaves of the records (R,), whitened, and its differences."""
+        return self.likelihood.of_records.jacobian(self.unit)
 
     @functools.cached_property
     def whitened(self) -> np.ndarray:
@@ -148,11 +154,11 @@ class Uncertainty:
         }
 
 
-def threshold(level: float = LEVEL) -> float:
+def threshold() -> float:
     """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
     from scipy.special import chdtri
 
-    return float(chdtri(1, 1 - level))
+    return float(chdtri(1, 1 - LEVEL))
 
 
 def conclude(
