@@ -67,7 +67,7 @@ def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, recorder=SLOW, *
 
 
 def bench(model, made, only=FEW, bounds=None):
-    missing = catalogue(model.motor, model.static, model.effects, made, only)
+    missing = catalogue(model, made, only)
     return Context.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
 
 
@@ -157,7 +157,7 @@ def test_every_effect_is_judged_and_what_cannot_be_seen_is_said(planted):
     judged = {j.name: j for j in judgements(planted)}
     assert judged["stator_resistance"].status == "relevant"
     assert {"time_skew", "measurement_window", "load_drift"} <= judged.keys()
-    silent_channels = catalogue(base().motor, base().static, (), planted.context.events).untestable
+    silent_channels = catalogue(base(), planted.context.events).untestable
     assert "not recorded" in silent_channels["frequency_dependence"]
     assert "U2" in silent_channels["negative_sequence_braking"]
 

@@ -353,14 +353,14 @@ def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, de
 
 def test_members_belong_to_the_effects_that_are_asked_for():
     made = events(count=1)
-    names = lambda only: {m.name for m in catalogue(base().motor, base().static, (), made, only).members}  # noqa: E731
+    names = lambda only: {m.name for m in catalogue(base(), made, only).members}  # noqa: E731
     assert names(("magnetic_saturation",)) == {"saturation_curve"}
     assert names(("stator_resistance",)) == set()
     assert names(()) == set(MEMBERS)
 
 
 def test_a_member_is_no_candidate_of_the_first_search():
-    missing = catalogue(base().motor, base().static, (), events(count=1))
+    missing = catalogue(base(), events(count=1))
     assert not {c.name for c in missing.candidates} & set(MEMBERS)
     assert missing.textbook(("saturation_curve", "load_drift")) == ("magnetic_saturation", "load_drift")
 

@@ -102,7 +102,7 @@ def _of_set(findings: Findings, rival: Rival) -> Evidence:
     unit = weighed.extended.get(rival.fit.names, rival.fit).unit
     errors = {} if rival.tests is None else standard_errors(rival.tests)
     at = findings.context.coordinates
-    own = [p for name in names for p in findings.catalogue[name].sizes]
+    own = findings.catalogue.sizes(names)
     sizes = tuple(ParameterEstimate(p, at.value(p.name, unit), errors.get(p.name, np.nan)) for p in own)
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 

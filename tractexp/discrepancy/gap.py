@@ -140,8 +140,7 @@ def beyond_chance(
 
     Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
     """
-    up, down = two_sided(unit, fitted)
-    raw = context.residuals(np.concatenate([unit[None], up, down]), names)
+    raw = context.residuals(np.concatenate([unit[None], two_sided(unit, fitted)[0]]), names)
     rows = np.nan_to_num(context.whiten(noise, raw))
     r, k = rows[0], len(fitted)
     nuisance = rows[1 : 1 + k] - rows[1 + k :]

@@ -162,21 +162,13 @@ def next_event(
     tried = [
         EventTrial(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
     ]
-    best = _held(context, noise, sides, tried, ignored, seed, _by_rule)
+    best = _held(context, noise, sides, tried, ignored, seed, lambda event: event.chances)
     sure = best.chances.least >= context.criteria.decided
-    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, _by_noise)
+    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, lambda event: event.exact)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
     return NextEvent(tuple(labels), best, by_noise, tuple(tried), context.criteria, proved, hopeless)
-
-
-def _by_rule(tried: EventTrial) -> Chances:
-    return tried.chances
-
-
-def _by_noise(tried: EventTrial) -> Chances:
-    return tried.exact
 
 
 def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial:

@@ -14,7 +14,7 @@ import numpy as np
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linear import linearised, two_sided
+from tractexp.discrepancy.linear import linearised, slopes, two_sided
 from tractexp.discrepancy.linearization import resting
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
 from tractexp.model.drive import Drive
@@ -104,9 +104,8 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     drives = [driven(context, event) for event in events]
     inside = list(side.columns[: -len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
-    up, down = two_sided(middle, inside)
-    width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
-    moved = _simulated(context, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)
+    points, width = two_sided(middle, inside)
+    moved = _simulated(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
     before = [
         _simulated(context, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
         for channel in ("P0", "Q0")
@@ -119,7 +118,7 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
         rows = np.concatenate([moved[e], *(b[e] for b in before)])
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
-        K[:k] = (rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k]) / width[:, None] * side.free[:k, None]
+        K[:k] = slopes(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
         chances.append(EventView(rows[0], K))
     return chances

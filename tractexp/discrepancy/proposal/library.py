@@ -155,14 +155,20 @@ class Term:
         return self.balance.latex.replace("{g}", self.signal.latex)
 
 
-def size_of(balance: Balance, size: Size) -> str:
-    """What the library calls a size."""
-    return f"{balance.name}_{size.name}"
+def size_of(kind: str, balance: Balance, size: Size) -> str:
+    """What the library's effect of a kind calls a size: of several, each is that of a balance of its own."""
+    part = size.name.removeprefix("size")
+    return f"{kind}_{balance.name}{part}_size"
 
 
 def shape_of(signal: Signal, shape: Shape) -> str:
-    """What the library calls a parameter of a signal."""
-    return f"{signal.name}_{shape.name}"
+    """What it calls a parameter of a signal."""
+    return f"{signal.kind}_{signal.name}_{shape.name}"
+
+
+def pick_of(kind: str, name: str) -> str:
+    """What it calls the choice of a signal or a clock: 1 where it is chosen."""
+    return f"{kind}_pick_{name}"
 
 
 def _level(low: float, high: float, grid: Grid, latex: str) -> Shape:

@@ -191,10 +191,8 @@ def standard_errors(result: Fitted, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
     context, chosen = result.context, result.term(fit)
     at = context.coordinates
-    faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
     own = at.parameters(fit.names)
-    columns = [*at.base, *at.before, *faults, *own]
-    _, rows = linearised(context, fit.unit, result.noise, columns, fit.names)
+    _, rows = linearised(context, fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
     covariance = np.linalg.pinv(rows[1:] @ rows[1:].T, rcond=1e-14, hermitian=True)
     spread = np.sqrt(np.diag(covariance))[-len(own) :] * [at.width(at.names[k]) for k in own]
     determined = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0

@@ -41,9 +41,7 @@ class Ground:
     @classmethod
     def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
-        at = context.coordinates
-        faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
-        raw, rows = linearised(context, unit, noise, [*at.base, *at.before, *faults], ())
+        raw, rows = linearised(context, unit, noise, context.coordinates.nuisances(()), ())
         Q = np.linalg.qr(rows[1:].T)[0]
         ground = cls(context, unit, noise, raw, Q, rows[0])
         return replace(ground, r=ground.off(rows[:1])[0])
