@@ -39,7 +39,9 @@ def content(investigation: Findings) -> dict[str, Any]:
             "validate": None if investigation.validate is None else _gap(investigation.validate),
             "fitted_to_both": investigation.fitted_to_both,
         },
-        "contributions": contributions(investigation),
+        "contributions": [
+            {"effects": list(names), "model_error": files.plain(error)} for names, error in investigation.contributions
+        ],
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
@@ -130,12 +132,6 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     }
 
 
-def contributions(investigation: Findings) -> list[dict[str, Any]]:
-    """The model's error with the names added one at a time, the one that helps most first; on held-out events."""
-    steps = investigation.contributions
-    return [{"effects": list(names), "model_error": files.plain(error)} for names, error in steps]
-
-
 def _error(error: ModelError) -> dict[str, Any]:
     return files.plain({"value": error.value, "interval": error.interval})
 
@@ -153,7 +149,6 @@ def write_left(investigation: Findings, path: Path) -> Path:
 
 
 def write_plugin(investigation: Findings, path: Path) -> Path:
-    """Write the plugin file of a proposal."""
     proposal = investigation.proposed.proposal
     assert proposal is not None
     return files.write(path, proposal.source)

@@ -90,6 +90,10 @@ class HeldOut:
             of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
         return tuple(of_family.values())
 
+    def names_of(self, rival: Rival) -> Names:
+        """The effects of an explanation, with the faults of the measurement beside it."""
+        return tuple(sorted((*rival.fit.names, *self.faults)))
+
     def fitted_to_all(self, fits: Sequence[Refit]) -> "HeldOut":
         """With explanations that were fitted to all events."""
         return replace(self, together=tuple(fits), extended={**self.extended, **{f.names: f for f in fits}})

@@ -71,14 +71,6 @@ class Family:
 class Kernels:
     """Simulates coordinates (n, D) by the kernel of a set of effects."""
 
-    family: Family
-    events: tuple[Event, ...]
-    bounds: Mapping[str, Sequence[float]]
-    fixed: Mapping[str, float]
-    bare: Problem
-    whole: Problem
-    substeps: int
-
     def __init__(
         self,
         family: Family,

@@ -148,7 +148,8 @@ def next_event(
     separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
     reads = {channel for fit in rivals for name in fit.names for channel in context.catalogue[name].effect.reads}
     events, denied = [], []
-    for group in _alike(imagined(context, sorted(reads))):
+    by_rate = sorted(imagined(context, sorted(reads)), key=lambda e: e.rate)
+    for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):  # sampled alike
         for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
@@ -175,12 +176,6 @@ def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
-
-
-def _alike(events: Sequence[ImaginedDip]) -> list[list[ImaginedDip]]:
-    """Events that are sampled alike together."""
-    by_rate = sorted(events, key=lambda e: e.rate)
-    return [list(group) for _, group in itertools.groupby(by_rate, key=lambda e: e.rate)]
 
 
 def _held(

@@ -148,15 +148,13 @@ class Separation:
     def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
         """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
 
-        First by the product's rule, then where formulas are exact. None is denied where a side does not survive.
+        First by the product's rule, then where formulas are exact. None is denied where a side does not survive, the
+        truth itself always where all do.
         """
         if not all(x.survives for x in seen):
             return np.zeros((2, len(self.sides) - 1, self.draws), bool)
         rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
-        return self._denied(truth, [x[0] for x in rows], [x[1:] for x in rows])
-
-    def _denied(self, truth: int, f: Sequence[np.ndarray], K: Sequence[np.ndarray]) -> np.ndarray:
-        """Which rivals (2, a, b) each of b draws denies where one of them is the truth; itself it always does."""
+        f, K = [x[0] for x in rows], [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
         k, here = len(side.columns), side.fit.unit[list(side.columns)]

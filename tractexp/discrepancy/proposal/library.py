@@ -54,8 +54,8 @@ class Signal:
 
     @property
     def settings(self) -> list[dict[str, float]]:
-        """Every combination of grid values."""
-        values = itertools.product(*(s.grid for s in self.shapes))
+        """Every combination of grid values; of phases the first, for two of them make one block of a screen."""
+        values = itertools.product(*(s.grid[:1] if s.name == "phase" else s.grid for s in self.shapes))
         return [dict(zip((s.name for s in self.shapes), chosen, strict=True)) for chosen in values]
 
 
@@ -175,8 +175,8 @@ def _level(low: float, high: float, grid: Grid, latex: str) -> Shape:
     return Shape("level", grid, (low, high), "1", "level, over the value before the event", latex)
 
 
-def _time(grid: Grid, most: float = 3.0) -> Shape:
-    return Shape("time", grid, (0.002, most), "s", "time constant", "T")
+def _time(grid: Grid) -> Shape:
+    return Shape("time", grid, (0.002, 3.0), "s", "time constant", "T")
 
 
 def _spread(first: float, last: float, step: float) -> Grid:

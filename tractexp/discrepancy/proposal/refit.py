@@ -159,10 +159,8 @@ def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
     """
-    chosen, at = term(fit.names[0]), context.coordinates
-    values = values_of(at, fit.unit, chosen)
+    chosen, values, there = _without(context, noise, fit)
     setting = {s.name: values[s.name] for s in chosen.signal.shapes}
-    there = Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise)
     return _starts(context, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
@@ -171,14 +169,21 @@ def regridded(context: Context, noise: Noise, fit: Refit) -> Start:
 
     At the first fit of the base model, which something missing bends, another setting may have seemed the best.
     """
-    chosen, at = term(fit.names[0]), context.coordinates
-    sizes = [0.0] * len(chosen.balance.sizes)
-    values = values_of(at, fit.unit, chosen)
-    there = Ground.at(context, place(at, fit.unit, chosen, values, sizes), noise)
-    tried = [(chosen, s) for s in chosen.signal.settings if s.get("phase", 0.0) == 0.0]
-    best = max(scores(there, tried), key=lambda f: f.drop)
+    chosen, _, there = _without(context, noise, fit)
+    best = max(scores(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop)
     (best,) = zoomed(there, [best])
-    return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
+    return fit.names, place(context.coordinates, fit.unit, chosen, best.setting, best.sizes)
+
+
+def _without(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str, float], Ground]:
+    """The term of a fit, its sizes and setting, and the ground of that fit without it."""
+    chosen, at = term(fit.names[0]), context.coordinates
+    values = values_of(at, fit.unit, chosen)
+    return (
+        chosen,
+        values,
+        Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise),
+    )
 
 
 def _starts(context: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
