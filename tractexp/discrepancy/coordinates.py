@@ -62,7 +62,6 @@ class Coordinates:
         return {name: k for k, name in enumerate(self.names)}
 
     def width(self, name: str) -> float:
-        """Range of a parameter."""
         k = self.column[name]
         return float(self.upper[k] - self.lower[k])
 

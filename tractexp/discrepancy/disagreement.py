@@ -118,7 +118,6 @@ class Disagreement:
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
-    """The tests of the base model."""
     return examined(base.quiet, base.fit, base.noise, seed)
 
 

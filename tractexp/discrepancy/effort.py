@@ -57,7 +57,6 @@ class Effort:
             self._parts.remove(counted)
 
     def spend(self, simulations: int) -> None:
-        """Count simulations that are about to run."""
         with self._lock:
             self.simulations += simulations
 

@@ -113,7 +113,6 @@ class Predictions(Generic[OneSet]):
 
     @property
     def bare(self) -> OneSet:
-        """The base model."""
         return self.sets[()]
 
     def ranked(self, most: int, factor: float) -> list[OneSet]:

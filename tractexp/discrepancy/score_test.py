@@ -15,7 +15,8 @@ from scipy.special import chdtrc
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.identification import surprises
 from tractexp.identification.problem import Problem
-from tractexp.identification.surprises import PER_EVENT, SMALLEST_P
+from tractexp.identification.surprises import DISTINCT, PER_EVENT, SMALLEST_P
+from tractexp.noise.span import spanned
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +53,7 @@ class ScoreTest:
     along: np.ndarray  # (b, k) the residuals' part along the nuisances
     departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
     blocks: list[np.ndarray]  # per column (k, R)
-    split: np.ndarray  # (e, R)
+    split: np.ndarray  # (e, R) what each parameter changes in one event alone
     perturbed: np.ndarray  # (c, R)
 
     def of(self, white: np.ndarray) -> "ScoreTest":
@@ -132,7 +133,7 @@ class ScoreTest:
             **surprises.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
-            by_test[PER_EVENT] = surprises.of_each_event(self.r, self.split, least=1e-12)
+            by_test[PER_EVENT] = ((self.r @ spanned(self.split, DISTINCT, 1e-12).T) ** 2).sum(axis=1)
         return by_test
 
 

@@ -61,7 +61,6 @@ class Verdict:
 
 
 def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
-    """Weigh what remains."""
     left = weighed.survivors
     explained = left.explanations
     context, first = explained.base.context, explained.steps[0]
@@ -99,7 +98,6 @@ def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
 
 
 def word_of(weighed: HeldOut) -> str:
-    """What it comes to."""
     explained, left = weighed.survivors.explanations, weighed.survivors
     first = explained.steps[0]
     if explained.empty and first.adequate:
@@ -118,7 +116,6 @@ def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
 
 
 def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest: Nearest | None) -> str:
-    """The sentence behind the word."""
     left = weighed.survivors
     first = left.explanations.steps[0]
     if weighed.leaves_more:

@@ -37,7 +37,6 @@ class ModelError:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "ModelError":
-        """From `to_dict`."""
         low, high = content["interval"]
         return cls(content["value"], (low, high), content["of_S"], content["value"] ** 2)
 

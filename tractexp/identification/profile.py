@@ -233,7 +233,6 @@ class _Drawing:
         self.simulations = 0
 
     def begin(self, points: int, ended: Callable[[], None]) -> None:
-        """Lanes from the optimum."""
         k = len(self.column)
         lanes = _Lanes(self.uncertainty, self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k))
         self._run(lanes, points, ended)

@@ -200,7 +200,6 @@ def search(
 
 
 def _result(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
-    """Where a search is."""
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))

@@ -77,7 +77,6 @@ class Chances:
 
     @property
     def least(self) -> float:
-        """Over all rivals in turn."""
         return float(self.alone.min())
 
 

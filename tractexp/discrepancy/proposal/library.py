@@ -287,7 +287,6 @@ BALANCES = (
 
 @functools.cache
 def terms() -> tuple[Term, ...]:
-    """Every term of the library."""
     return tuple(_terms())
 
 
@@ -300,5 +299,4 @@ def _terms() -> Iterator[Term]:
 
 
 def term(name: str) -> Term:
-    """The term of this name."""
     return next(t for t in terms() if t.name == name)
