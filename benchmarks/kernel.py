@@ -1,7 +1,8 @@
 """Kernels beside those that Numba compiled: processor time to compile, and time of a step.
 
     python benchmarks/kernel.py --other PYTHON [--rounds 40] [--store]    measure both versions and print the tables
-    python benchmarks/kernel.py --tables                                  the tables of the stored run
+    python benchmarks/kernel.py --other PYTHON --narrow [...]             as on a processor of 256 bits
+    python benchmarks/kernel.py --tables                                  the tables of the stored runs
 
 PYTHON is the interpreter of an environment with the version to compare with, such as a checkout of fd91fa8, the last
 with Numba. Both versions run at the same time in a process each and take turns, call by call; the fastest call counts,
@@ -11,6 +12,7 @@ in processor time, so that other work on the machine disturbs little.
 import argparse
 import json
 import os
+import statistics
 import subprocess
 import sys
 import tempfile
@@ -36,15 +38,31 @@ RUN = {
 }  # fmt: skip
 CANDIDATES = (8, 16, 50, 200, 1024)
 SAMPLES = 1000
+WIDEST, NARROW = "widest", "narrow"  # vectors: those of the processor, or of 256 bits
 
 
-def serve() -> None:
+def hide_wide_vectors() -> None:
+    """Let LLVM find a processor without AVX-512: both versions compile for what llvmlite tells of the host."""
+    from llvmlite import binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    features.update({name: False for name in features if name.startswith(("avx512", "avx10"))})
+    llvm.get_host_cpu_features = lambda: features
+    llvm.get_host_cpu_name = lambda: "x86-64-v3"
+
+
+def serve(narrow: bool) -> None:
     """Do what is asked, a line each, in the version that this interpreter has; say what it took."""
+    if narrow:
+        hide_wide_vectors()
     sys.path.insert(0, str(Path(__file__).parent))
-    import kernel_reference
     import numpy as np
 
+    from tractexp.model import drive
     from tractexp.model.drive import Drive
+
+    vars(drive).setdefault("WaveformDrive", vars(drive).get("Waveforms"))  # the name it has in fd91fa8
+    import kernel_reference
 
     def load(parts: list[str]) -> Any:
         return kernel_reference.model(kernel_reference.case(*parts))
@@ -87,9 +105,9 @@ def serve() -> None:
 class Version:
     """A process of one version."""
 
-    def __init__(self, python: str, folder: str):
+    def __init__(self, python: str, folder: str, narrow: bool):
         there = os.environ | {"TRACTEXP_CACHE_DIR": str(Path(folder) / "cache"), "OPENBLAS_NUM_THREADS": "1"}
-        command = [python, str(Path(__file__).resolve()), "--serve"]
+        command = [python, str(Path(__file__).resolve()), "--serve", *["--narrow"] * narrow]
         self.process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=there, cwd=folder
         )
@@ -130,13 +148,17 @@ def measured(ours: Version, other: Version, rounds: int) -> dict[str, Any]:
     return {"compiling": compiling, "running": running, "processor": processor(), "load": os.getloadavg()[0]}
 
 
-def tables(rows: dict[str, Any]) -> str:
-    """Both tables, as docs/model.md has them."""
+def compile_table(rows: dict[str, Any]) -> str:
+    """Seconds to derive and to compile each model, as docs/model.md has them."""
     lines = ["| model | declare and lower [s] | IR to machine code [s] | Numba [s] |", "|---|---|---|---|"]
     for r in rows["compiling"]:
         lines.append(f"| {r['model']} | {r['derive']:.2f} | {r['compile']:.2f} | {r['other']:.1f} |")
-    lines += [
-        "",
+    return "\n".join(lines)
+
+
+def run_table(rows: dict[str, Any]) -> str:
+    """Nanoseconds of a step and candidate, as docs/model.md has them."""
+    lines = [
         f"| model | {' | '.join(f'{n} candidates' for n in CANDIDATES)} |",
         "|---" * (len(CANDIDATES) + 1) + "|",
     ]
@@ -147,27 +169,38 @@ def tables(rows: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def tables(stored: dict[str, Any]) -> list[str]:
+    """The paragraphs and tables of docs/model.md."""
+    parts = [compile_table(stored[WIDEST])]
+    for rows in stored.values():
+        ratios = sorted(r["ns"] / r["other_ns"] for r in rows["running"])
+        middle, worst = statistics.median(ratios), ratios[-1]
+        parts += [f"On {rows['processor']}, median {middle:.2f}, at worst {worst:.2f}:", run_table(rows)]
+    return parts
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--other", help="an interpreter of the version to compare with")
     parser.add_argument("--rounds", type=int, default=40)
+    parser.add_argument("--narrow", action="store_true", help="compile as for a processor without AVX-512")
     parser.add_argument("--store", action="store_true")
     parser.add_argument("--tables", action="store_true")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     chosen = parser.parse_args()
     if chosen.serve:
-        serve()
+        serve(chosen.narrow)
         return
+    stored = json.loads(FILE.read_text(encoding="utf-8"))
     if not chosen.tables:
+        if chosen.narrow:
+            hide_wide_vectors()  # for the processor's own row
         with tempfile.TemporaryDirectory() as one, tempfile.TemporaryDirectory() as two:
-            rows = measured(Version(sys.executable, one), Version(chosen.other, two), chosen.rounds)
+            own, other = Version(sys.executable, one, chosen.narrow), Version(chosen.other, two, chosen.narrow)
+            stored[NARROW if chosen.narrow else WIDEST] = measured(own, other, chosen.rounds)
         if chosen.store:
-            FILE.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    else:
-        rows = json.loads(FILE.read_text(encoding="utf-8"))
-    print(tables(rows))
-    ratios = sorted(r["ns"] / r["other_ns"] for r in rows["running"])
-    print(f"\ntime over the other's: median {ratios[len(ratios) // 2]:.2f}, worst {ratios[-1]:.2f}")
+            FILE.write_text(json.dumps(stored, indent=1) + "\n", encoding="utf-8")
+    print("\n\n".join(tables(stored)))
 
 
 if __name__ == "__main__":

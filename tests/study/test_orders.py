@@ -158,6 +158,14 @@ def test_the_sets_are_fitted_on_two_dips_and_held_out_on_a_deeper_one(name):
     assert set_holding(("dip.csv",)) == ""
 
 
+def test_the_power_of_what_diverges_is_not_finite_and_warns_nobody():
+    power = np.full((1, 1, 400), 1.0)
+    power[..., 200:] = np.finfo(float).max
+    averaged = averaged_power(power, np.full(400, 0.8), np.full(21, 1 / 21))
+    assert np.isfinite(averaged[..., 25:150]).all()
+    assert not np.isfinite(averaged[..., 250:350]).any()
+
+
 def test_the_script_makes_the_shipped_contactors(tmp_path):
     made = make_contactors.write(tmp_path)
     assert len(made) == 6

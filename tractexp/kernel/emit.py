@@ -17,7 +17,7 @@ from tractexp.kernel import steady
 from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.graph import Symbol
-from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH
+from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, WIDTH
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers
 from tractexp.kernel.room import PREFIX, Room
@@ -31,7 +31,7 @@ SIZES = ("events", "n", "samples", "block", "stored", "started")
 Values = Mapping[Symbol, str]
 
 
-def text(lowered: Lowered, title: str, integration: str, width: int) -> str:
+def text(lowered: Lowered, title: str, integration: str, width: int = WIDTH) -> str:
     """The kernel's IR, for vectors of `width` doubles. The same equations give the same text.
 
     Its second line tells the room that a call needs.

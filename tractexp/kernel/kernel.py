@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.kernel import objects, steady, target
+from tractexp.kernel import objects, steady
 from tractexp.kernel.layout import INPUTS, LANES
 from tractexp.kernel.room import Room
 
@@ -112,11 +112,6 @@ class Kernel:
                 f" n) and (5 or {len(INPUTS)}, samples)"
             )
         return candidates.shape[0], candidates.shape[2], inputs.shape[1]
-
-
-def width() -> int:
-    """Doubles in a vector of this machine's kernels."""
-    return target.width()
 
 
 def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype = NUMBERS) -> None:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.kernel import objects, target
+from tractexp.kernel import objects
 from tractexp.kernel.kernel import NUMBERS, WHOLE
+from tractexp.kernel.layout import WIDTH
 from tractexp.texts import text_in
 
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, *[ctypes.c_int64] * 3)
@@ -38,7 +39,7 @@ class Stencil:
 
     @functools.cached_property
     def _ir(self) -> tuple[str, int, int]:
-        settings = repr((self.expression.__qualname__, self.rows, self.shared, self.numbers, target.width()))
+        settings = repr((self.expression.__qualname__, self.rows, self.shared, self.numbers))
         description = text_in(self.expression.__module__, settings, lambda: "\n".join(map(str, ir_of(self))), "stencil")
         first, last, text = description.split("\n", 2)
         return text, int(first), int(last)
@@ -99,7 +100,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     arrays = {name: functools.partial(element, name) for name in (*stencil.rows, *stencil.shared)}
     expression = stencil.expression(**arrays, **single)
     f = Function()
-    lanes, scalars = Numbers(f, target.width()), Numbers(f, 1)
+    lanes, scalars = Numbers(f, WIDTH), Numbers(f, 1)
     places = _places(f, (*stencil.rows, *stencil.shared, *stencil.numbers))
     with f.loop(0, "%rows") as row:
         shifts = [

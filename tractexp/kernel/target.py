@@ -10,8 +10,6 @@ from typing import Any
 from tractexp.errors import check_choice
 
 CHOICE, GENERIC = "TRACTEXP_CPU", "generic"  # the environment's; set to `generic` results do not hang on the processor
-WIDTHS = {"avx512f": 8, "avx": 4}  # doubles in the widest vectors of processors with a feature; of others 2
-FEWEST = 2
 
 
 @functools.cache
@@ -39,13 +37,6 @@ def machine() -> Any:
     return llvm.Target.from_default_triple().create_target_machine(
         cpu=name, features=features, opt=2, reloc="pic", codemodel="small"
     )
-
-
-@functools.cache
-def width() -> int:
-    """Doubles in a vector of this processor's."""
-    own = processor()[1].split(",")
-    return next((doubles for feature, doubles in WIDTHS.items() if f"+{feature}" in own), FEWEST)
 
 
 @functools.cache

@@ -11,7 +11,7 @@ import numpy as np
 
 from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
-from tractexp.kernel.kernel import NOTHING, Kernel, width
+from tractexp.kernel.kernel import NOTHING, Kernel
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
 from tractexp.model.arithmetic import evaluated
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
@@ -147,13 +147,13 @@ class Model:
 
     @functools.cached_property
     def source(self) -> str:
-        """The kernel's text: LLVM IR for the vectors of this machine."""
+        """The kernel's text: LLVM IR, the same on every machine."""
         return text_of((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
 
     @property
     def _text_in_cache(self) -> str:
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return self._in_cache(f"{name}_of_{width()}")
+        return self._in_cache(name)
 
     def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
@@ -163,7 +163,7 @@ class Model:
         from tractexp.kernel.emit import text
         from tractexp.model.lowering import lower
 
-        return text(lower(self.equations), self.title, self.integration, width())
+        return text(lower(self.equations), self.title, self.integration)
 
     @functools.cached_property
     def kernel(self) -> Kernel:
@@ -314,7 +314,7 @@ class Model:
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
-        lanes = LANES * max(1, int(LONGEST / (LANES * max(np.diff(drive.first) @ steps, 1))))
+        lanes = LANES * max(1, int(LONGEST / (LANES * max(drive.samples * int(steps.max()), 1))))
         if n > lanes:
             for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
                 some = np.ascontiguousarray(candidates[..., part])

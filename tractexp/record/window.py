@@ -81,6 +81,7 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     return np.lib.stride_tricks.sliding_window_view(wide, len(weights), axis=-1) @ weights
 
 
+@np.errstate(over="ignore")  # likewise
 def averaged_power(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show it."""
     return average(power / u, weights) * average(u, weights)
