@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
-from tractexp.discrepancy import families, fitting, held_out, survivors
+from tractexp.discrepancy import families, fit_effort, fitting, held_out, survivors
 from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
@@ -306,7 +306,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
-    assert len(turns) == 1 + fitting.MOST_TURNS
+    assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
 def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_dips():
