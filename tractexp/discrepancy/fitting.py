@@ -241,7 +241,7 @@ def _with_prior(
 
 def distances(context: Context, noise: Noise, fits: Sequence[Refit]) -> np.ndarray:
     """Squared distances (n,) of fits from the first of them, in standard deviations; the faults' priors count."""
-    prior = context.coordinates.sizes(context.catalogue.of_measurement)
+    prior = context.coordinates.parameters(context.catalogue.of_measurement)
     rows = context.rows(np.array([f.unit for f in fits]), noise, prior, [f.names for f in fits])
     return ((rows - rows[0]) ** 2).sum(axis=1)
 
