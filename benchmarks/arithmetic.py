@@ -16,8 +16,8 @@ import numpy as np
 
 from tractexp.kernel import objects
 from tractexp.kernel.function import Function
+from tractexp.kernel.kernel import Room
 from tractexp.kernel.numbers import Numbers
-from tractexp.kernel.room import Room
 
 PACKED = re.compile(r"v(fn?m|mul|div|sqrt|add|sub|max|min|rndscale|round)\w*pd\b|vcvt")
 MULTIPLIES = re.compile(r"vfn?m|vmul")

@@ -4,10 +4,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.extend import UserError, check_choice
+from tractexp.extend import DATA, UserError, check_choice
 
 PHASES = "abc"
 PAIRS = ("ab", "bc", "ca", "ba", "cb", "ac")
+TWO = tuple(sorted(PAIRS))  # of phases, whose currents are measured
 
 
 def line(pair: str) -> np.ndarray:
@@ -17,8 +18,12 @@ def line(pair: str) -> np.ndarray:
     return row
 
 
-def check_pairs(where: str, pairs: Sequence[str]) -> None:
-    """Raise `UserError` for what are no pairs of phases, or two of the same phases."""
+def check_pairs(pairs: Sequence[str], count: int, such: str) -> None:
+    """Raise `UserError` for what are not so many pairs of phases, `such` as these, or two of the same phases."""
+    where = "data.connection.pairs"
+    if len(pairs) != count:
+        what = {2: "two", 3: "three"}[count]
+        raise UserError(f"{DATA.connection}.pairs={pairs} must be {what} pairs of phases, {such}")
     for pair in pairs:
         check_choice(where, pair, PAIRS)
     if len({frozenset(pair) for pair in pairs}) < len(pairs):
@@ -33,12 +38,4 @@ def from_lines(pairs: Sequence[str]) -> np.ndarray:
 
 def from_two(phases: str) -> np.ndarray:
     """(3, 2): three currents of no zero sequence from those of two phases."""
-    matrix = np.zeros((3, 2))
-    for k, phase in enumerate(PHASES):
-        matrix[k] = [float(phase == p) for p in phases] if phase in phases else -1.0
-    return matrix
-
-
-def check_two(where: str, phases: str) -> None:
-    """Raise `UserError` for what are not two phases."""
-    check_choice(where, phases, ("ab", "ac", "ba", "bc", "ca", "cb"))
+    return np.array([[float(p == phase) if phase in phases else -1.0 for p in phases] for phase in PHASES])

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from tractexp.extend import Connection, plugin
+from tractexp.extend import Connection, check_choice, plugin
 
-from ._phases import check_two, from_two
+from ._phases import TWO, from_two
 
 
 @plugin
@@ -23,7 +23,7 @@ class Aron(Connection):
     phases: str = "ac"  # in the order of data.currents
 
     def check(self) -> None:
-        check_two("data.connection.phases", self.phases)
+        check_choice("data.connection.phases", self.phases, TWO)
 
     @property
     def notes(self) -> tuple[str, ...]:

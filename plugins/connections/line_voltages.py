@@ -4,7 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import DATA, Connection, UserError, plugin
+from tractexp.extend import Connection, plugin
 
 from ._phases import check_pairs, from_lines
 
@@ -27,9 +27,7 @@ class LineVoltages(Connection):
     pairs: list[str] = field(default_factory=lambda: ["ab", "bc", "ca"])  # of phases, in the order of data.voltages
 
     def check(self) -> None:
-        if len(self.pairs) != 3:
-            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be three pairs of phases, e.g. [ab, bc, ca]")
-        check_pairs("data.connection.pairs", self.pairs)
+        check_pairs(self.pairs, 3, "e.g. [ab, bc, ca]")
 
     def voltage(self) -> np.ndarray:
         return from_lines(self.pairs)

@@ -4,9 +4,9 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import DATA, Connection, UserError, plugin
+from tractexp.extend import Connection, check_choice, plugin
 
-from ._phases import check_pairs, check_two, from_lines, from_two
+from ._phases import TWO, check_pairs, from_lines, from_two
 
 
 @plugin
@@ -28,11 +28,9 @@ class TwoLineVoltages(Connection):
     phases: str = "abc"  # in the order of data.currents; two letters, e.g. ac, where there are two current transformers
 
     def check(self) -> None:
-        if len(self.pairs) != 2:
-            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be two pairs of phases, e.g. [ab, bc]")
-        check_pairs("data.connection.pairs", self.pairs)
+        check_pairs(self.pairs, 2, "e.g. [ab, bc]")
         if self.phases != "abc":
-            check_two("data.connection.phases", self.phases)
+            check_choice("data.connection.phases", self.phases, TWO)
 
     def voltage(self) -> np.ndarray:
         return from_lines(self.pairs)

@@ -4,7 +4,7 @@ from dataclasses import field
 
 import numpy as np
 
-from tractexp.extend import DATA, UserError, plugin
+from tractexp.extend import plugin
 
 from ._arms import _Arms
 from ._phases import check_pairs, line
@@ -27,9 +27,7 @@ class VV(_Arms):
 
     def check(self) -> None:
         super().check()
-        if len(self.pairs) != 2:
-            raise UserError(f"{DATA.connection}.pairs={self.pairs} must be two pairs of phases, of alpha and beta")
-        check_pairs("data.connection.pairs", self.pairs)
+        check_pairs(self.pairs, 2, "of alpha and beta")
 
     def rows(self) -> np.ndarray:
         return np.array([line(pair) for pair in self.pairs])

@@ -21,8 +21,8 @@ def since(eq, returned, name):
     return time
 
 
-def changes(eq, returned, name, sizes, wait, duration, static):
-    """Let P and Q change by `sizes` within `duration` [s], `wait` [s] after the time of `since`.
+def changes(eq, returned, name, more_P, more_Q, wait, duration, static):
+    """Let P and Q change by shares of themselves within `duration` [s], `wait` [s] after the time of `since`.
 
     Where `static` is 1 all but the motors change.
     """
@@ -30,9 +30,9 @@ def changes(eq, returned, name, sizes, wait, duration, static):
     begun, before = (ramp((t - wait) / duration, WIDTH) for t in (time, 0))
     way = eq.define(f"changed_{name}", begun - before, "r")
     if eq.waves:
-        places = ((sites.current, sites.motor_current, sizes[0]),)
+        places = ((sites.current, sites.motor_current, more_P),)
     else:
-        places = ((sites.P, sites.P_motor, sizes[0]), (sites.Q, sites.Q_motor, sizes[1]))
+        places = ((sites.P, sites.P_motor, more_P), (sites.Q, sites.Q_motor, more_Q))
     for site, motor, size in places:
         there = motor in eq
         spared = static * eq[motor] if there else 0

@@ -3,7 +3,7 @@
 
 def phases_of(eq, vector, zero):
     """The three phases of a space vector in the frame and a zero sequence."""
-    return [_real(eq, vector * _turned(-k)) + zero for k in range(3)]
+    return [eq.parts(eq.turn * (vector * _turned(-k)))[0] + zero for k in range(3)]
 
 
 def vector_of(eq, phases):
@@ -36,7 +36,3 @@ def _turned(k):
 
     k = k % 3
     return (1, Rational(-1, 2) + I * sqrt(3) / 2, Rational(-1, 2) - I * sqrt(3) / 2)[k]
-
-
-def _real(eq, vector):
-    return eq.parts(eq.turn * vector)[0]

@@ -98,11 +98,6 @@ def _mean(ahead, behind, to_ahead, to_behind, r, each):
     return (whole + ends) * each
 
 
-def drifted(y, t, rate, out):
-    """Write y (C, n, N) times 1 + rate t to `out`, of rates (C, n) and times t (N,)."""
-    np.multiply(y, 1 + rate[..., None] * t, out=out)
-
-
 def _changed(change, y, amount, out):
     """`change(y, amount, out)` of the candidates with an amount; the others' y (C, n, N) is copied."""
     some = amount != 0

@@ -51,11 +51,8 @@ class FeederImpedance(Effect):
     confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
 
     def refusal(self, eq):
-        if eq.waves:
-            return None
-        if sites.P_motor not in eq or _affine(eq):
-            return None
-        return "its motor's current is not a + b V in the voltage V"
+        fits = eq.waves or sites.P_motor not in eq or _affine(eq)
+        return None if fits else "its motor's current is not a + b V in the voltage V"
 
     def edit(self, eq, R_f, X_f):
         import sympy

@@ -35,6 +35,5 @@ class LoadChangeAfterDip(Effect):
     relevant = {"after_change_P": 0.02, "after_change_Q": 0.02}
     confused_with = ("load_drift", "exponential_recovery", "undervoltage_trip")
 
-    def edit(self, eq, after_change_P, after_change_Q, after_change_wait, after_change_time, after_change_static):
-        sizes = after_change_P, after_change_Q
-        changes(eq, True, "after_dip", sizes, after_change_wait, after_change_time, after_change_static)
+    def edit(self, eq, **values):
+        changes(eq, True, "after_dip", *values.values())

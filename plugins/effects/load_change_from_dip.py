@@ -35,6 +35,5 @@ class LoadChangeFromDip(Effect):
     relevant = {"dip_change_P": 0.02, "dip_change_Q": 0.02}
     confused_with = ("load_drift", "exponential_recovery", "undervoltage_trip")
 
-    def edit(self, eq, dip_change_P, dip_change_Q, dip_change_wait, dip_change_time, dip_change_static):
-        sizes = dip_change_P, dip_change_Q
-        changes(eq, False, "from_dip", sizes, dip_change_wait, dip_change_time, dip_change_static)
+    def edit(self, eq, **values):
+        changes(eq, False, "from_dip", *values.values())

@@ -28,15 +28,13 @@ class LoadDrift(Measurement):
     confused_with = ("exponential_recovery", "undervoltage_trip", "frequency_dependence")
 
     def observe(self, power, drive, values):
-        from ._recorder import drifted
-
         out = np.empty_like(power)
         for e in range(drive.events):
             part = drive.part(e)
             rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
             rate = np.stack([values[name][e] for name in ("drift_P", "drift_Q")])
             if "turn_re" not in rows:
-                drifted(power[:, :, part], rows["t"], rate, out[:, :, part])
+                np.multiply(power[:, :, part], 1 + rate[..., None] * rows["t"], out=out[:, :, part])
                 continue
             turn, drawn = rows["turn_re"] + 1j * rows["turn_im"], power[:, :, part]
             rotating = (drawn[0] + 1j * drawn[1]) * np.conj(turn)

@@ -31,9 +31,7 @@ class RotorSpeed(Effect):
     confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
 
     def refusal(self, eq):
-        if _orders.moving(eq, _orders.SPEED):
-            return "its speed moves already"
-        return None
+        return "its speed moves already" if _orders.moving(eq, _orders.SPEED) else None
 
     def edit(self, eq, swing):
         excess = eq[sites.electrical_torque] - eq[sites.load_torque]

@@ -12,7 +12,7 @@ from pathlib import Path
 from tractexp.extend import UserError, plugin
 from tractexp.extend.formats import Format, Simulated, TCircuit, dip, held
 
-from ._motor import SMALLEST, restored
+from ._motor import SMALLEST, restored, terms
 
 SYSTEM = 100.0  # MVA, the system base of ANDES
 STEP = 1e-3  # s
@@ -102,10 +102,7 @@ class Andes(Format):
         if static.startswith("exponential"):
             exponents = {"ap": value("p_v"), "aq": value("q_v"), "bp": value("p_f", 0.0), "bq": value("q_f", 0.0)}
             return {"PQ": [pq], "FLoad": [{"idx": "law", "pq": "static", "kp": 100.0, "kq": 100.0, **exponents}]}
-        shares = {"constant_impedance": (1, 0, 1, 0), "branch": (1, 0, 1, 0), "constant_power": (0, 0, 0, 0)}.get(
-            static
-        )
-        a_Z, a_I, b_Z, b_I = shares or (value(name) for name in ("a_Z", "a_I", "b_Z", "b_I"))
+        a_Z, a_I, b_Z, b_I = (sum(a for a, n in side if n == power) for side in terms(load) for power in (2, 1))
         named = {"kpz": a_Z, "kpi": a_I, "kpp": 1 - a_Z - a_I, "kqz": b_Z, "kqi": b_I, "kqp": 1 - b_Z - b_I}
         return {"PQ": [pq], "ZIP": [{"idx": "law", "pq": "static", **{k: 100.0 * v for k, v in named.items()}}]}
 

@@ -46,8 +46,8 @@ class Modelica(Format):
         if any(_reads(right, "U2") for _, right in rows):
             lines.append(f"  input Real U2 {quoting.modelica('negative-sequence voltage [pu]')};")
         lines += [f"  output Real {power} {quoting.modelica('consumed [pu]')};" for power in "PQ"]
-        for symbol, start in _starts(eq):
-            lines.append(f"  Real {symbol}(start = {before[start]!r}, fixed = true);")
+        for (symbol, *_), start in zip(eq.real_states(), eq.real_starts(), strict=True):
+            lines.append(f"  Real {symbol}(start = {before[start.name]!r}, fixed = true);")
         lines += [f"  Real {symbol};" for symbol in eq.steps]
         lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
         return "\n".join(lines) + "\n"
@@ -86,17 +86,6 @@ def _equations(eq):
     rows = [(f"der({symbol})", _modelica(d.xreplace(at))) for symbol, d, _ in eq.real_states()]
     rows += [(symbol.name, show(e)) for symbol, e in eq.steps.items()]
     return [*rows, ("P", show(eq.P)), ("Q", show(eq.Q))]
-
-
-def _starts(eq):
-    """Each real state and the name of its value before the event."""
-    from tractexp.extend.symbols import phasor_parts, start_symbol
-
-    for state in eq.states:
-        if state.is_real:
-            yield state, start_symbol(state).name
-        else:
-            yield from zip(phasor_parts(state), (p.name for p in phasor_parts(start_symbol(state))), strict=True)
 
 
 def _modelica(expression):

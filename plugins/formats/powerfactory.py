@@ -5,7 +5,7 @@ from math import pi
 from tractexp.extend import plugin
 from tractexp.extend.formats import Format, TCircuit
 
-from ._motor import restored
+from ._motor import law, restored, terms
 
 POLE_PAIRS = 2  # of the machine that is written; only inertia and rated speed are said in them
 HEAD = "* written by tractexp; classes and columns as readers of DGS 5 have them\n"
@@ -79,10 +79,10 @@ class PowerFactory(Format):
             motor = circuit, inertia, torque
         for element in tables.get("ElmLod", ()):
             static = element["plini"] / load.power, element["qlini"] / load.power
-        law = {}
-        for of_type in tables.get("TypLod", ()):
-            law = _law(load.result.model["static"]["name"], of_type)
-        return restored(load, motor, law, static)
+        own = {}
+        for row in tables.get("TypLod", ()):
+            own = law(load, [((row[a], row[m]), (row[b], row[n])) for a, b, m, n, _ in TERMS.values()])
+        return restored(load, motor, own, static)
 
     def _machine(self, load):
         P, Q = (load.power * load.before[f"{power}_motor"] for power in "PQ")
@@ -105,22 +105,10 @@ class PowerFactory(Format):
                 "u0": load.before["U0"]}  # fmt: skip
 
     def _load_type(self, load):
-        value, static = load.values.get, load.result.model["static"]["name"]
         row = {"loc_name": "Static load type", "fold_id": ""}
-        fixed = {"constant_impedance": 2.0, "branch": 2.0, "constant_power": 0.0}.get(static)
-        for names, shares, exponent in zip(TERMS.values(), "ab", ("p_v", "q_v"), strict=True):
-            terms = (1.0, 0.0, value(exponent, fixed), 0.0, 0.0)
-            if static == "zip":
-                terms = (value(f"{shares}_Z"), value(f"{shares}_I"), 2.0, 1.0, 0.0)
-            row |= dict(zip(names, terms, strict=True))
+        for names, side in zip(TERMS.values(), terms(load), strict=True):
+            row |= dict(zip(names, (*(a for a, _ in side[:2]), *(n for _, n in side)), strict=True))
         return row
-
-
-def _law(static, row):
-    """Parameters of the static load from the polynomial of its type."""
-    if static == "exponential":
-        return {"p_v": row["kpu0"], "q_v": row["kqu0"]}
-    return {"a_Z": row["aP"], "a_I": row["bP"], "b_Z": row["aQ"], "b_I": row["bQ"]} if static == "zip" else {}
 
 
 def _table(name, rows):

@@ -3,7 +3,7 @@
 from tractexp.extend import plugin
 from tractexp.extend.formats import Format, TCircuit
 
-from ._motor import restored
+from ._motor import law, restored, terms
 
 
 @plugin
@@ -39,9 +39,8 @@ class PsseDyr(Format):
                 _record(load.bus, "CIM5BL", "M", 1, c.R_s, c.X_s, c.X_m, *cages, *saturation, *rating, *trip, 0.0, 0.0)
             )
         if "P_static" in load.before:
-            terms = self._terms(load)
-            coefficients = [a / load.before["U0"] ** n for side in terms for a, n in side]
-            exponents = [n for side in terms for _, n in side]
+            pairs = [pair for side in terms(load) for pair in side]
+            coefficients, exponents = [a / load.before["U0"] ** n for a, n in pairs], [n for _, n in pairs]
             records.append(_record(load.bus, "IEELBL", "S", *coefficients, 0.0, 0.0, *exponents))
         return "".join(records)
 
@@ -54,7 +53,7 @@ class PsseDyr(Format):
         return lines
 
     def read_back(self, text, load):
-        motor, law, static = None, {}, (0.0, 0.0)
+        motor, own, static = None, {}, (0.0, 0.0)
         for record in text.split("/")[:-1]:
             _, model, _, *rest = (field.strip() for field in record.replace("\n", " ").split(","))
             c = [float(constant) for constant in rest]
@@ -63,27 +62,9 @@ class PsseDyr(Format):
                 motor = TCircuit(load.omega_n, *c[1:4], *cages), c[14], load.values["T_m"]
             else:
                 static = load.before["P_static"], load.before["Q_static"]  # in the power flow: see the notes
-                law = self._law(load, c)
-        return restored(load, motor, law, static)
-
-    def _law(self, load, c):
-        """Parameters of the static load from the constants of its record."""
-        static, U0 = load.result.model["static"]["name"], load.before["U0"]
-        if static == "exponential":
-            return {"p_v": c[8], "q_v": c[11]}
-        if static == "zip":
-            shares = [c[k] * U0 ** c[8 + k] for k in range(6)]
-            return dict(zip(("a_Z", "a_I", "b_Z", "b_I"), (*shares[0:2], *shares[3:5]), strict=True))
-        return {}
-
-    def _terms(self, load):
-        """Three (coefficient, exponent) for P, then for Q, in powers of U/U_0."""
-        value, static = load.values.get, load.result.model["static"]["name"]
-        if static == "zip":
-            shares = [(value(f"{x}_Z"), value(f"{x}_I")) for x in "ab"]
-            return [((Z, 2.0), (current, 1.0), (1 - Z - current, 0.0)) for Z, current in shares]
-        fixed = {"constant_impedance": (2.0, 2.0), "branch": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
-        return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (load.values["p_v"], load.values["q_v"])]
+                pairs = [(c[k] * load.before["U0"] ** c[8 + k], c[8 + k]) for k in range(6)]
+                own = law(load, (pairs[:3], pairs[3:]))
+        return restored(load, motor, own, static)
 
 
 def _record(bus, model, load, *constants):

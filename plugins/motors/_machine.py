@@ -37,23 +37,33 @@ def single_cage(eq, T_prime, X_prime, C, T_m):
     """Declare what the motors with rotor flux and without stator transients share, Eqs. (1)-(2) but for the speed.
 
     Returns the stator current, the speed's symbol, its value relative to synchronous before the event, and the
-    electrical and the load torque.
+    excess of the electrical over the load torque.
     """
-    from sympy import I, conjugate, re
+    from sympy import I
 
     E, omega = eq.flux("E", "E"), eq.speed(r"\omega")
     V = eq.V
     Z = eq.place(sites.stator_impedance, I * X_prime)
     current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=E))
+    flux, excess = rotor(eq, E, E, omega, current, T_prime, X_prime, C, T_m)
+    E_0, slower = at_rest(eq, T_prime, X_prime, C, T_m)
+    eq.moves(E, flux, E_0)
+    return current, omega, slower, excess
+
+
+def rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m):
+    """dE/dt of a cage, Eq. (1), and the excess of the electrical over the load torque.
+
+    The torque is that of the voltage `inner`, of all rotor circuits together.
+    """
+    from sympy import I, conjugate, re
+
     coupling = eq.place(sites.coupling, C)
     time_constant = eq.place(sites.time_constant, T_prime)
-    electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
+    electrical_torque = eq.place(sites.electrical_torque, re(inner * conjugate(current)))
     load_torque = eq.place(sites.load_torque, T_m)
-
-    E_0, slower = at_rest(eq, T_prime, X_prime, C, T_m)
     flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
-    eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)  # Eq. (1)
-    return current, omega, slower, electrical_torque, load_torque
+    return flux + I * (omega - eq.omega_s) * E, electrical_torque - load_torque
 
 
 def at_rest(eq, T_prime, X_prime, C, T_m):

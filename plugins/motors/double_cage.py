@@ -41,25 +41,20 @@ class DoubleCage(Motor):
         return _machine.usual(T_prime, X_prime, C, M, T_m)
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m, T_second, X_second):
-        from sympy import I, conjugate, re
+        from sympy import I
 
         E, D, omega = eq.flux("E", "E"), eq.flux("D", "D"), eq.speed(r"\omega")
         V = eq.V
         Z = eq.place(sites.stator_impedance, I * X_second, "Z''")
         inner = eq.place(sites.internal_voltage, E + D, "E''")
         current = eq.place(sites.stator_current, eq.branch("psi", r"\psi", V, Z, behind=inner))
-        coupling = eq.place(sites.coupling, C)
-        time_constant = eq.place(sites.time_constant, T_prime)
-        electrical_torque = eq.place(sites.electrical_torque, re(inner * conjugate(current)))
-        load_torque = eq.place(sites.load_torque, T_m)
-
+        flux, excess = _machine.rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m)
         open_second = T_second * X_prime / X_second  # T_0''
         E_0, D_0, slip = self._guess(eq, T_prime, X_prime, C, T_m, open_second, X_second)
-        flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
         second = (I * (X_prime - X_second) * current - D) / open_second
-        eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
+        eq.moves(E, flux, E_0)
         eq.moves(D, second + I * (omega - eq.omega_s) * D, D_0)
-        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 - slip)
+        eq.moves(omega, excess / M, eq.omega_s0 - slip)
         _machine.require_physical(eq, (T_prime, X_prime, M, T_second, X_second), C)
         eq.require(X_prime - X_second, "X'' must be at most X', of which it exceeds {value:g} pu", X_second - X_prime)
         return current

@@ -36,7 +36,7 @@ class Electromechanical(Motor):
         return _machine.usual(T_prime, X_prime, C, M, T_m)
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m):
-        current, omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
-        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 + slower)  # Eq. (1)
+        current, omega, slower, excess = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
+        eq.moves(omega, excess / M, eq.omega_s0 + slower)  # Eq. (1)
         _machine.require(eq, (T_prime, X_prime, M), X_prime, C, T_m)
         return current

@@ -40,21 +40,16 @@ class StatorFlux(Motor):
         return [*_machine.usual(T_prime, X_prime, C, M, T_m), (R_s / X_prime, 0.12, 3.9)]
 
     def declare(self, eq, T_prime, X_prime, C, M, T_m, R_s):
-        from sympy import I, conjugate, re
+        from sympy import I
 
         psi, E, omega = eq.flux("psi", r"\psi"), eq.flux("E", "E"), eq.speed(r"\omega")
         V = eq.V
         current = eq.place(sites.stator_current, (psi + I * E) / X_prime)
-        coupling = eq.place(sites.coupling, C)
-        time_constant = eq.place(sites.time_constant, T_prime)
-        electrical_torque = eq.place(sites.electrical_torque, re(E * conjugate(current)))
-        load_torque = eq.place(sites.load_torque, T_m)
-
+        flux, excess = _machine.rotor(eq, E, E, omega, current, T_prime, X_prime, C, T_m)
         E_0, I_0, y = self._at_rest(eq, X_prime, C, R_s, T_m)
         eq.moves(psi, eq.omega_n * (V - R_s * current) - I * (eq.omega_n + eq.omega_s) * psi, X_prime * I_0 - I * E_0)
-        flux = (I * X_prime * coupling * current - (1 - coupling) * E) / time_constant
-        eq.moves(E, flux + I * (omega - eq.omega_s) * E, E_0)
-        eq.moves(omega, (electrical_torque - load_torque) / M, eq.omega_s0 - y / T_prime)
+        eq.moves(E, flux, E_0)
+        eq.moves(omega, excess / M, eq.omega_s0 - y / T_prime)
         _machine.require_physical(eq, (T_prime, X_prime, M), C)
         return current
 

@@ -30,7 +30,7 @@ class Voltage(Motor):
     T_prime, X_prime, C, T_m = _machine.T_PRIME, _machine.X_PRIME, _machine.C, _machine.T_M
 
     def declare(self, eq, T_prime, X_prime, C, T_m):
-        current, omega, slower, electrical_torque, load_torque = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
-        eq.moves(omega, 0, eq.omega_s0 + slower, balance=electrical_torque - load_torque)
+        current, omega, slower, excess = _machine.single_cage(eq, T_prime, X_prime, C, T_m)
+        eq.moves(omega, 0, eq.omega_s0 + slower, balance=excess)
         _machine.require(eq, (T_prime, X_prime), X_prime, C, T_m)
         return current

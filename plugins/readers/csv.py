@@ -7,6 +7,7 @@ from typing import Any
 from tractexp.extend import DATA, Base, Events, Reader, Record, UserError, check_range, plugin
 from tractexp.extend.files import (
     DECLARATION,
+    ENDINGS,
     LOAD,
     PACKAGE,
     SIZES,
@@ -47,21 +48,7 @@ class CSV(Tabular, Reader):
     Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (
-        ".csv",
-        ".txt",
-        ".tsv",
-        ".parquet",
-        ".pq",
-        ".xlsx",
-        ".xls",
-        ".xlsb",
-        ".ods",
-        ".out",
-        ".pqd",
-        ".pqdif",
-        ".cev",
-    )
+    endings = (*ENDINGS, ".pqd", ".pqdif", ".cev")
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number
@@ -105,17 +92,13 @@ class CSV(Tabular, Reader):
         check_numbers(self.train or None, self.validate)
 
     def read(self) -> Events:
-        if self.path:
-            return self._numbered()
+        if self.path:  # the dips of one table: the whole of it where there is one
+            whole, dips = self._dips()
+            notes = () if dips and dips[0].result is whole else (*whole.notes, counted(len(dips), "dip"))
+            return chosen(self.path, dips, self.train or None, self.validate, notes)
         first = self._record(str(self.train[0]))
         rest = [self._record(str(path), first.base) for path in (*self.train[1:], *(self.validate or []))]
         return Events([first, *rest[: len(self.train) - 1]], rest[len(self.train) - 1 :])
-
-    def _numbered(self) -> Events:
-        """The dips of one table: the whole of it where there is one."""
-        whole, dips = self._dips()
-        notes = () if dips and dips[0].result is whole else (*whole.notes, counted(len(dips), "dip"))
-        return chosen(self.path, dips, self.train or None, self.validate, notes)
 
     def table(self) -> tuple[Record, list[FileDip]] | None:
         return self._dips() if self.path else None

@@ -1,7 +1,7 @@
 """Records from tables of waveforms: the dips of one file, numbered in order of time."""
 
 from tractexp.extend import Recording, WaveformReader, check_range, plugin
-from tractexp.extend.files import QUANTITIES, SIZES, Tabular, beside, kind_of, recording, restored
+from tractexp.extend.files import ENDINGS, QUANTITIES, SIZES, Tabular, beside, kind_of, recording, restored
 
 
 @plugin
@@ -18,7 +18,7 @@ class Waveforms(Tabular, WaveformReader):
     """
 
     quantities = QUANTITIES
-    endings = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
+    endings = ENDINGS
 
     frequency: float = 50.0  # Hz, nominal
 

@@ -169,7 +169,7 @@ def test_planted_code_is_not_run_and_the_file_heals(folder):
 
 
 def code_path(text):
-    return store.CODE.path(objects._key(text))
+    return store.CODE.path(store.key(target.key(), text))
 
 
 def stored(number):

@@ -156,8 +156,8 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
     told = set(re.findall(r"`eq\.(\w+)", text))
     framework = {
         "parameters", "definitions", "steps", "values_before", "shown", "states", "memories", "requirements", "edits",
-        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_balances", "parts",
-        "real", "latex", "outputs",
+        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_starts",
+        "real_balances", "parts", "real", "latex", "outputs",
     }  # fmt: skip
     assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
     listed = sites.write(tmp_path).read_text(encoding="utf-8")

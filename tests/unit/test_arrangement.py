@@ -8,7 +8,8 @@ import pytest
 from field_waves import KA, KV, dip, load, noise, phases, recording, wave
 
 from tractexp.errors import UserError
-from tractexp.recording import Feeder, arranged, tuned
+from tractexp.recording import Feeder
+from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.measure import phasors_of
 
 T = np.arange(4800) / 3200

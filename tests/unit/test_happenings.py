@@ -8,8 +8,9 @@ from field_waves import KA, KV, load, noise, phases, recording, wave
 
 from tractexp.filetypes import comtrade
 from tractexp.record import Base, Record
-from tractexp.recording import Feeder, happenings, happenings_of
-from tractexp.recording.measure import phasors_of, waves_of
+from tractexp.recording import Feeder
+from tractexp.recording.happening import happenings, happenings_of
+from tractexp.recording.measure import FeederWaves, phasors_of
 
 SEEDS = range(4)
 THREE = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
@@ -26,7 +27,11 @@ def seen(t, volts, amps, f=50.0, sigma=0.002, seed=0, rate=3200.0, extra=0.0, no
 def of(record, feeder):
     [segment] = record.segments
     return happenings(
-        waves_of(record, feeder, segment), segment.rate, 0.0, record.frequency, phasors_of(record, feeder, segment)
+        FeederWaves.of(record, feeder, segment)[:, :],
+        segment.rate,
+        0.0,
+        record.frequency,
+        phasors_of(record, feeder, segment),
     )
 
 
@@ -318,7 +323,7 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     events = []
     for segment in record.waveforms():
         phasors = phasors_of(record, feeder, segment)
-        events += happenings(waves_of(record, feeder, segment), segment.rate, segment.start, 50.0, phasors)
+        events += happenings(FeederWaves.of(record, feeder, segment)[:, :], segment.rate, segment.start, 50.0, phasors)
     assert [(event.kind, event.worth) for event in events] == [("dip", True)] * 2
     assert [event.depth for event in events] == pytest.approx([0.131, 0.127], abs=0.003)
 

@@ -5,7 +5,8 @@ import pytest
 from field_waves import KV, noise, phases, recording, wave
 
 from tractexp.filetypes import comtrade
-from tractexp.recording import Channel, Recording, Segment, quality
+from tractexp.recording import Channel, Recording, Segment
+from tractexp.recording.quality import quality
 
 RATE = 3200.0
 T = np.arange(6400) / RATE

@@ -4,6 +4,7 @@ from tractexp.files import PACKAGE, located
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
 from tractexp.filetypes.mapping import QUANTITIES
 from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.table import ENDINGS
 from tractexp.filetypes.tabulated import Powers, Tabular, kind_of, powers
 from tractexp.filetypes.tabulated_waves import recording
 from tractexp.filetypes.tidy import restored
@@ -16,6 +17,7 @@ from tractexp.wording import counted
 
 __all__ = [
     "DECLARATION",
+    "ENDINGS",
     "LOAD",
     "PACKAGE",
     "QUANTITIES",

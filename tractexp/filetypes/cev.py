@@ -11,7 +11,6 @@ import re
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,6 @@ from tractexp.errors import UserError
 from tractexp.filetypes import timeline
 from tractexp.filetypes.comtrade_fields import number, quoted
 from tractexp.filetypes.comtrade_samples import HUGE
-from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
 from tractexp.filetypes.text import decode
@@ -110,17 +108,14 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     )
     t = opened.t[quarter:]
     back = np.exp(-2j * np.pi * opened.nominal * t)
-    columns: dict[str, tuple[str, np.ndarray]] = {"t": ("s", t), "f": ("Hz", opened.frequency[quarter:])}
+    columns = [("t", "s", t), ("f", "Hz", opened.frequency[quarter:])]
     for k in range(opened.values.shape[1]):
         channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks) if _named(report, k) else None
         if channel is not None and channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
             x = channel.ratio * channel.recorded()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
-            columns |= {channel.name: (channel.unit, np.abs(X)), f"{channel.name} angle": ("rad", np.angle(X))}
-    cells: list[Any] = [values for _, values in columns.values()]
-    head = TableHeading(tuple(columns), tuple(unit for unit, _ in columns.values()), 0, 0)
-    sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
-    return Rows(str(path), head, cells.__getitem__, sample, first=1 + quarter, word="sample", notes=remarks.notes())
+            columns += [(channel.name, channel.unit, np.abs(X)), (f"{channel.name} angle", "rad", np.angle(X))]
+    return Rows.of(path, columns, 1 + quarter, remarks.notes())
 
 
 @dataclass(frozen=True, eq=False)
@@ -191,7 +186,10 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     for line, row in _joined(body):
         if line > HEAD and not report.columns:
             break
-        cells = _cells(row)
+        try:
+            cells = next(csv.reader([row], strict=False), [])
+        except csv.Error:  # a cell without end
+            cells = [row]
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
                 remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
@@ -230,13 +228,6 @@ def _joined(body: str) -> list[tuple[int, str]]:
             rows.append((start, held.strip()))
         held = ""
     return rows if not held.strip() else [*rows, (start, held.strip())]
-
-
-def _cells(row: str) -> list[str]:
-    try:
-        return next(csv.reader([row], strict=False), [])
-    except csv.Error:  # a cell without end
-        return [row]
 
 
 def _samples(path: Path, report: EventReport, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:

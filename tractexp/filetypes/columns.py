@@ -23,12 +23,9 @@ UNITS: Mapping[str, tuple[str, float]] = {
     "квар": ("reactive", 1e-3),
     "hz": ("frequency", 1.0), "mhz": ("frequency", 1e-3), "гц": ("frequency", 1.0),
     "hz/s": ("rocof", 1.0),
-    "deg": ("angle", 0.017453292519943295), "degree": ("angle", 0.017453292519943295),
-    "degrees": ("angle", 0.017453292519943295), "°": ("angle", 0.017453292519943295),
-    "grad": ("angle", 0.017453292519943295), "度": ("angle", 0.017453292519943295), "rad": ("angle", 1.0),
-    "radian": ("angle", 1.0), "radians": ("angle", 1.0),
-    "pu": ("", 1.0), "p.u.": ("", 1.0), "p.u": ("", 1.0), "per unit": ("", 1.0), "puv": ("", 1.0), "1": ("", 1.0),
-    "%": ("", 1e-2),
+    **{unit: ("angle", 0.017453292519943295) for unit in ("deg", "degree", "degrees", "°", "grad", "度")},
+    **{unit: ("angle", 1.0) for unit in ("rad", "radian", "radians")},
+    **{unit: ("", 1.0) for unit in ("pu", "p.u.", "p.u", "per unit", "puv", "1")}, "%": ("", 1e-2),
 }  # fmt: skip
 PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quantity)
 FITTING: Mapping[str, tuple[str, ...]] = {
@@ -143,16 +140,13 @@ def role(name: str, unit: str = "") -> Role | None:
     kind = (meaning(unit) or ("",))[0]
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}")
-    if key in ("U", "I") and (kind == "angle" or _tells_angle(words)):
+    angle = kind == "angle" or ANGLE & set(words) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
+    if key in ("U", "I") and angle:
         return Role(f"{key}{phase}_angle", unit)
     if key not in ("U", "I", "P", "Q"):
         return Role(key, unit)
     line = True if LINE & set(words) or len(phase) == 2 else False if phase or GROUND & set(words) else None
     return Role(key + phase, unit, line if key == "U" else None)
-
-
-def _tells_angle(words: Sequence[str]) -> bool:
-    return bool(ANGLE & set(words)) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
 
 
 def _words(name: str) -> list[str]:

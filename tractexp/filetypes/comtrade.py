@@ -13,7 +13,7 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import DATA, UserError, nearest
 from tractexp.filetypes import timeline
-from tractexp.filetypes.comtrade_header import Analog, Digital, Header, parse
+from tractexp.filetypes.comtrade_header import Analog, Header, parse
 from tractexp.filetypes.comtrade_samples import NONE, ByteRange, Samples, read
 from tractexp.filetypes.comtrade_writer import write as write
 from tractexp.filetypes.remarks import Remarks
@@ -109,7 +109,12 @@ def _recording(
         device=header.device,
         start=header.start,
         trigger=_trigger(header, stretches, remarks),
-        status=[_status(header, k, samples, stretches) for k in range(len(header.digitals))],
+        status=[
+            StatusChannel(
+                d.name, timeline.nearest(samples.words[:, k // 16], stretches), d.phase, d.circuit, d.normal, bit=k % 16
+            )
+            for k, d in enumerate(header.digitals)
+        ],
         notes=remarks.notes(),
         extra={**extra, **_extra(header, samples, stretches)},
     )
@@ -140,15 +145,10 @@ def _missing(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, fl
     return raw, missing if missing is None or analog.limits is None or least > missing else None
 
 
-def _status(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> StatusChannel:
-    digital: Digital = header.digitals[k]
-    words = timeline.nearest(samples.words[:, k // 16], stretches)
-    return StatusChannel(digital.name, words, digital.phase, digital.circuit, digital.normal, bit=k % 16)
-
-
 def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:
     """Segments from the rates; from the time stamps where there are none."""
-    unit = header.timemult * (1e-9 if all(_digits(date) > 6 for date in header.dates) else 1e-6)
+    fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
+    unit = header.timemult * (1e-9 if fine else 1e-6)
     if header.rates[0][0] > 0:
         result = timeline.from_rates(header.rates, _stamped(header, samples.stamps, unit, remarks))
         if any(s.t is not None for s in result):
@@ -172,16 +172,13 @@ def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remar
     return result
 
 
-def _digits(date: str) -> int:
-    return len(date.strip().rpartition(".")[2]) if "." in date else 0
-
-
 def _stamped(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) -> np.ndarray | None:
     """Times (N,) [s] by the time stamps; None where there are none or they contradict the rates, which is said."""
     if stamps[-1] in (NONE, 0) or stamps[0] == stamps[-1] or not np.isfinite(stamps).all():
         return None
     t = (stamps.astype(np.float64) - float(stamps[0])) * unit
-    if sum(n / rate for n, rate in _lengths(header.rates)) > 2.0**32 * unit or np.any(np.diff(t) < 0):
+    lengths = np.diff([0, *(stop for _, stop in header.rates)])
+    if sum(lengths / [rate for rate, _ in header.rates]) > 2.0**32 * unit or np.any(np.diff(t) < 0):
         return None  # the counter ran over
     first = 0
     for rate, stop in header.rates:
@@ -192,10 +189,6 @@ def _stamped(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) 
             return None
         first = stop
     return t
-
-
-def _lengths(rates: list[tuple[float, int]]) -> list[tuple[int, float]]:
-    return [(stop - first, rate) for first, (rate, stop) in zip([0, *(r[1] for r in rates)], rates, strict=False)]
 
 
 def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> float | None:

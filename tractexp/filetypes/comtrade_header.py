@@ -191,10 +191,11 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
         rows.remarks.add(f"{quoted(fields[12])} is neither P nor S, primary values taken", line)
     elif not declared and any(fields[10:12]):
         rows.remarks.add("neither P nor S stands there, primary values taken", line)
+    low, high = number(fields[8]), number(fields[9])
     analog = Analog(
         name, fields[2], fields[3], fields[4],
         value(5, "multiplier", None), value(6, "offset", 0.0), value(7, "time skew", 0.0) if fields[7] else 0.0,
-        _limits(fields[8], fields[9]),
+        (low, high) if low is not None and high is not None and low < high else None,
         value(10, "primary ratio", 1.0) if declared else number(fields[10]) or 1.0,
         value(11, "secondary ratio", 1.0) if declared else number(fields[11]) or 1.0,
         side if declared else "",
@@ -214,11 +215,6 @@ def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Ana
         )  # fmt: skip
     rows.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
     return Analog(**{**vars(analog), "primary": 1.0, "secondary": 1.0})
-
-
-def _limits(least: str, greatest: str) -> tuple[float, float] | None:
-    low, high = number(least), number(greatest)
-    return (low, high) if low is not None and high is not None and low < high else None
 
 
 def _digital(rows: _Lines, k: int, count: int) -> Digital:

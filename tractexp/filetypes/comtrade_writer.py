@@ -1,9 +1,7 @@
 """COMTRADE records written, 1999 or 2013: what is read back is what was written."""
 
-from collections.abc import Sequence
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,7 +10,7 @@ from tractexp.errors import UserError, check_choice
 from tractexp.filetypes.comtrade_fields import date
 from tractexp.filetypes.comtrade_header import EPOCH, VALUE
 from tractexp.filetypes.comtrade_samples import NONE, row
-from tractexp.recording.recording import Channel, Recording, Segment
+from tractexp.recording.recording import Channel, Recording
 
 KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}  # ever more values fit
 FULL = {"BINARY": (-32767, 32767), "BINARY32": (-2147483647, 2147483647), "FLOAT32": (-3.4028235e38, 3.4028235e38)}
@@ -32,7 +30,7 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     if path.suffix.lower() == ".cff" and revision < 2013:
         raise UserError(f"{path}: a .cff is of the standard of 2013; give revision=2013, or a name that ends in .cfg")
     kind = _kind(recording, kind, revision)
-    rates, stamps, timemult = _times(recording, kind)
+    rates, stamps, timemult = _times(recording)
     data = _ascii(recording, stamps) if kind == "ASCII" else _binary(recording, kind, stamps)
     text = "\r\n".join(_lines(recording, kind, revision, rates, timemult)) + "\r\n"
     if path.suffix.lower() == ".cff":
@@ -40,11 +38,6 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     dat = path.with_suffix(".DAT" if path.suffix.isupper() else ".dat")
     files.write(dat, data)  # first: whoever finds the description finds the samples
     return [files.write(path, text), dat]
-
-
-def _even_stamps(segments: Sequence[Segment], timemult: float) -> np.ndarray:
-    """The time stamps (N,) of segments that follow one another, in units of `timemult` microseconds."""
-    return np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
 
 
 def _kind(recording: Recording, first_kind: str, revision: int) -> str:
@@ -99,13 +92,14 @@ def _limits(channel: Channel, kind: str) -> tuple[float, float]:
     return low, high
 
 
-def _times(recording: Recording, kind: str) -> tuple[list[tuple[float, int]], np.ndarray, float]:
+def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, float]:
     """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had some."""
     extra, segments = recording.extra, recording.segments
     own, timemult = extra.get("stamps"), float(extra.get("timemult", 1.0))
     usable = own is not None and len(own) == recording.samples
-    edges = [0, *(s.stop for s in segments)]
-    if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or _by_stamps(extra):
+    edges, rates = [0, *(s.stop for s in segments)], extra.get("rates")
+    by_stamps = bool(rates) and rates[0][0] == 0 and "stamps" in extra
+    if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or by_stamps:
         if not usable:
             raise UserError(
                 f"{recording.source}: its segments leave samples out, and it has no time stamps: it cannot be written "
@@ -116,13 +110,8 @@ def _times(recording: Recording, kind: str) -> tuple[list[tuple[float, int]], np
         last = segments[-1].t[-1] if len(segments) else 0.0
         while not usable and last > 4.29e3 * timemult:  # a counter of 32 bits
             timemult *= 10
-        own = own if usable else _even_stamps(segments, timemult)
+        own = own if usable else np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
     return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
-
-
-def _by_stamps(extra: Any) -> bool:
-    rates = extra.get("rates")
-    return bool(rates) and rates[0][0] == 0 and "stamps" in extra
 
 
 def _lines(
@@ -162,16 +151,13 @@ def _dates(recording: Recording) -> tuple[str, str]:
     """Of the first sample and the trigger: as the file had them, where they still hold."""
     first, second = recording.extra.get("dates", ("", ""))
     start, at = date(first, False)[0], date(second, False)[0]
-    own = recording.extra.get("revision", 1991) >= 1999 and start is not None and at is not None
-    if own and start == recording.start and recording.trigger == _between(start, at):
-        return first, second
+    if recording.extra.get("revision", 1991) >= 1999 and start is not None and at is not None:
+        trigger = None if at == EPOCH else (at - start) / timedelta(seconds=1)
+        if (start, trigger) == (recording.start, recording.trigger):
+            return first, second
     begin = recording.start or EPOCH
     trigger = EPOCH if recording.trigger is None else begin + timedelta(seconds=recording.trigger)
     return f"{begin:%d/%m/%Y,%H:%M:%S.%f}", f"{trigger:%d/%m/%Y,%H:%M:%S.%f}"
-
-
-def _between(start: datetime | None, at: datetime | None) -> float | None:
-    return None if start is None or at is None or at == EPOCH else (at - start) / timedelta(seconds=1)
 
 
 def _name(text: str) -> str:

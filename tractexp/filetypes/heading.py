@@ -21,7 +21,7 @@ class TableHeading:
     line: int | None  # number of the row with the names, from 0; None where there is none
 
 
-def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None, line: str = "line") -> TableHeading:
+def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None) -> TableHeading:
     """The heading of a table's first rows; `header` is the row of the names, from 0, None to search for it.
 
     Raises `UserError` where there are no rows of numbers, or no names above them.
@@ -30,7 +30,8 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     first = next((i for i in range(begin, len(rows)) if _begins(rows, i)), None)
     if first is None:
         above = "" if header is None else f" below the header line {header + 1}"
-        raise UserError(f"{source}: there are no rows below the header line" if _names_only(rows) else
+        names_only = len(rows) == 1 and len(rows[0]) > 1
+        raise UserError(f"{source}: there are no rows below the header line" if names_only else
                         f"{source}: there are no rows of numbers{above}; a table has a line that names its columns, "
                         "such as t,U,P,Q, and rows of numbers below it")  # fmt: skip
     named = header if header is not None else _named(rows, first)
@@ -69,10 +70,6 @@ def _begins(rows: Sequence[Sequence[Any]], i: int) -> bool:
     return _numeric(rows[i]) and all(_numeric(row) and len(row) >= len(rows[i]) - 1 for row in following)
 
 
-def _names_only(rows: Sequence[Sequence[Any]]) -> bool:
-    return len(rows) == 1 and len(rows[0]) > 1
-
-
 def _named(rows: Sequence[Sequence[Any]], first: int) -> int | None:
     """The row of names above the values: the nearest with a text for most columns that is no row of units."""
     for i in range(first - 1, -1, -1):
@@ -100,11 +97,8 @@ def _bare(row: Sequence[Any]) -> list[str]:
 def _are_units(texts: Sequence[str]) -> bool:
     """Whether a row is one of units: most of its texts are units, and none is a column's name."""
     filled = [text for text in texts if text and text != "-"]
-    return len(filled) >= 1 and 2 * sum(map(is_unit, filled)) > len(filled) and not _names_too(filled)
-
-
-def _names_too(filled: Sequence[str]) -> bool:
-    return len(set(filled)) == len(filled) and "t" in (text.lower() for text in filled)
+    names_too = len(set(filled)) == len(filled) and "t" in (text.lower() for text in filled)
+    return len(filled) >= 1 and 2 * sum(map(is_unit, filled)) > len(filled) and not names_too
 
 
 def _joined(groups: Sequence[Any], names: list[str]) -> list[str]:

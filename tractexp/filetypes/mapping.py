@@ -73,7 +73,9 @@ def mapped(
                 f"{DATA.columns}={{{key}: '{options[key][0].name}'}}"
             )
         chosen[key] = options[key][0]
-    chosen = {key: _with_unit(one, units) for key, one in chosen.items()}
+    for key, one in chosen.items():
+        if (quantity := one.role.quantity) in units:  # the user's unit goes before that in the header
+            chosen[key] = replace(one, role=replace(one.role, unit=str(units[quantity])))
     for one in chosen.values():
         _check_unit(table, one)
     return Mapped(kind, chosen, tuple(_notes(table, chosen, other_columns)))
@@ -216,8 +218,9 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
     for kind in order:
         if wanted <= {"t", *kinds[kind]} and "t" in keys:
             if kind == "waves" and not _oscillates(table, options, wave):
+                named = ", ".join(options[key][0].label for key in wave)
                 raise UserError(
-                    f"{table.source}: the columns {_named(options, wave)} hold magnitudes without angles, and "
+                    f"{table.source}: the columns {named} hold magnitudes without angles, and "
                     "there are none of P and Q: the load's power does not follow from them; add P and Q, or the angles"
                 )
             return kind, ["t", *kinds[kind]]
@@ -271,10 +274,6 @@ def _oscillates(table: TableFile, options: Mapping[str, list[MappedColumn]], key
     return False
 
 
-def _named(options: Mapping[str, list[MappedColumn]], keys: Iterable[str]) -> str:
-    return ", ".join(options[key][0].label for key in keys)
-
-
 def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]) -> str:
     """The sentence on what is missing."""
     names = [table.label(k) for k in range(len(table.heading.names)) if table.heading.names[k]]
@@ -316,12 +315,6 @@ def _increases(table: TableFile, number: int) -> bool:
     cells = [row[number] for row in table.sample if number < len(row)]
     values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
     return len(values) == len(cells) > 1 and all(a < b for a, b in itertools.pairwise(values))
-
-
-def _with_unit(one: MappedColumn, units: Mapping[str, str]) -> MappedColumn:
-    """The user's unit goes before that in the header."""
-    quantity = one.role.quantity
-    return replace(one, role=replace(one.role, unit=str(units[quantity]))) if quantity in units else one
 
 
 def _check_unit(table: TableFile, one: MappedColumn) -> None:

@@ -10,7 +10,6 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
-from tractexp.filetypes.heading import TableHeading
 from tractexp.filetypes.pqdif_channels import (
     LOG,
     PHASOR,
@@ -83,7 +82,10 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     last = segments[-1].start + (segments[-1].stop - segments[-1].first) / segments[-1].rate
     return Recording(
         source=str(path),
-        channels=[_channel(*channels[k], values) for k, values in evened.items()],
+        channels=[
+            Channel(d.name, evened[k], unit, QUANTITIES.get(unit, ""), PHASES.get(d.phase, ""), d.circuit)
+            for k, (d, unit) in ((k, channels[k]) for k in evened)
+        ],
         segments=segments,
         frequency=content.frequency if 10 <= content.frequency <= 100 else 50.0,
         station=content.station,
@@ -100,7 +102,8 @@ def _waves(content: Observed, channels: dict[int, tuple[ChannelDefinition, str]]
     for each in content.observations:
         begin, own = seconds(each.start, content.observations[0].start), dict[tuple[float, ...], Stretch]()
         for one in each.instances:
-            definition, values = next(((d, v) for d, v in one.series if _wave(d)), (None, None))
+            sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
+            definition, values = next(sampled, (None, None))
             if definition is None or values is None or len(one.t) < FEWEST:
                 continue
             if not (np.isfinite(one.t).all() and (np.diff(one.t) > 0).all()):
@@ -133,11 +136,6 @@ def _together(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretc
     return [Stretch(t, columns)]
 
 
-def _wave(definition: SeriesDefinition) -> str:
-    """The unit of a series of samples; "" for another series."""
-    return UNITS.get(definition.unit, "-") if definition.value in (VALUE, INSTANT) else ""
-
-
 def _fullest(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
     """The stretches of the largest set of channels: what others have is no whole load."""
     if not stretches:
@@ -168,11 +166,6 @@ def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.S
     return segments, {k: each[0] if len(each) == 1 else np.concatenate(each) for k, each in parts.items()}
 
 
-def _channel(definition: ChannelDefinition, unit: str, values: np.ndarray) -> Channel:
-    quantity, phase = QUANTITIES.get(unit, ""), PHASES.get(definition.phase, "")
-    return Channel(definition.name, values, unit, quantity, phase, definition.circuit)
-
-
 def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
     try:
         return ZERO + timedelta(days=start[0], seconds=start[1] + more)
@@ -198,11 +191,8 @@ def table(path: Path, encoding: str | None = None) -> Rows:
         )
     fullest = _fullest(stretches, remarks)
     t, columns = _longest(fullest, remarks)
-    units = ("s", *(names[k][1] for k in columns))
-    head = TableHeading(("t", *(names[k][0] for k in columns)), units, 0, 0)
-    cells = [t - t[0], *columns.values()]
-    sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
-    return Rows(str(path), head, cells.__getitem__, sample, first=1, word="sample", notes=remarks.notes())
+    every = [("t", "s", t - t[0]), *((*names[k], values) for k, values in columns.items())]
+    return Rows.of(path, every, 1, remarks.notes())
 
 
 def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:

@@ -95,15 +95,6 @@ class Observation:
     instances: tuple[Instance, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class Observed:
-    """The content of a file."""
-
-    observations: tuple[Observation, ...]
-    station: str = ""
-    frequency: float = 0.0  # Hz, nominal; 0 where the file does not say
-
-
 def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
     """From one moment to another [s]."""
     return DAY * (moment[0] - since[0]) + moment[1] - since[1]
@@ -111,13 +102,13 @@ def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
 
 def observed(
     path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: Remarks, most: float = math.inf
-) -> Observed:
+) -> "Observed":
     """The channels of some kinds, as far as they have times, of the first `most` observations that have any.
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
     files.check_there(path)
-    reading = _Reading(kinds, remarks)
+    reading = Observed(kinds, remarks)
     for kind, body in records(path, encoding, remarks):
         if kind == SOURCE:
             reading.source(body)
@@ -127,11 +118,14 @@ def observed(
             reading.observation(body)
             if len(reading.observations) >= most:
                 break
-    return Observed(tuple(reading.observations), reading.station, reading.frequency)
+    return reading
 
 
-class _Reading:
-    """The state while the records of a file are read: an observation belongs to the source and settings before it."""
+class Observed:
+    """The content of a file: `observations`, the `station`, and the nominal `frequency` [Hz], 0 where none is said.
+
+    While the records are read, an observation belongs to the source and the settings before it.
+    """
 
     def __init__(self, kinds: Sequence[bytes], remarks: Remarks) -> None:
         self.kinds, self.remarks = kinds, remarks

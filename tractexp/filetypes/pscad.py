@@ -44,7 +44,8 @@ class Results(TableFile):
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         cells: dict[int, TableColumn] = {}
         for part in self.parts:
-            own = {k: kind for k, kind in wanted.items() if (k == 0 and part is self.parts[0]) or self._in(part, k)}
+            first = part is self.parts[0]  # whose time is that of all
+            own = {k: kind for k, kind in wanted.items() if (self.columns[k - 1][0] is part if k else first)}
             columns = part.read({0: "time", **{self.columns[k - 1][1]: kind for k, kind in own.items() if k}})
             cells |= {k: columns[self.columns[k - 1][1] if k else 0] for k in own}
         lengths = {len(one.values) for one in cells.values()}
@@ -52,9 +53,6 @@ class Results(TableFile):
             counts = " and ".join(map(str, sorted(lengths)))
             raise UserError(f"{self.source}: its .out files have {counts} rows: they are not of one run")
         return cells
-
-    def _in(self, part: TextTable, number: int) -> bool:
-        return number > 0 and self.columns[number - 1][0] is part
 
     def place(self, row: int) -> str:
         return self.parts[0].place(row)

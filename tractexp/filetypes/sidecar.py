@@ -39,26 +39,23 @@ def beside(path: str) -> Sidecar:
     if not isinstance(content, dict):
         return Sidecar()
     notes = [content["note"]] if isinstance(content.get("note"), str) else []
-    notes += [note for note in _list(content, "notes") if isinstance(note, str)]
+    notes += [note for note in _of(list, content, "notes") if isinstance(note, str)]
     return Sidecar(
         str(content["name"]) if "name" in content else None,
         tuple(notes),
         _base(file, content.get("base")),
-        _mapping(content, "columns"),
-        {key: str(unit) for key, unit in _mapping(content, "units").items()},
+        _of(dict, content, "columns"),
+        {key: str(unit) for key, unit in _of(dict, content, "units").items()},
         content.get("uniform") is True,
         _window(file, content.get("window")),
-        tuple(str(name) for name in _list(content, "more")),
-        _mapping(content, "recording") or None,
+        tuple(str(name) for name in _of(list, content, "more")),
+        _of(dict, content, "recording") or None,
     )
 
 
-def _mapping(content: Mapping[str, Any], key: str) -> dict[str, Any]:
-    return dict(content[key]) if isinstance(content.get(key), dict) else {}
-
-
-def _list(content: Mapping[str, Any], key: str) -> list[Any]:
-    return list(content[key]) if isinstance(content.get(key), list) else []
+def _of(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
+    """What stands under a key where it is of that kind, else an empty one."""
+    return content[key] if isinstance(content.get(key), kind) else kind()
 
 
 def _window(file: Any, content: Any) -> Window | None:

@@ -5,7 +5,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import Any, Self
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from tractexp.filetypes.workbook import BadWorkbook, Workbook
 
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
+ENDINGS = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
 MOST = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
@@ -98,6 +100,13 @@ class Rows(TableFile):
     word: str = "row"
     notes: tuple[str, ...] = field(default=())
 
+    @classmethod
+    def of(cls, path: Path, columns: Sequence[tuple[str, str, np.ndarray]], first: int, notes: tuple[str, ...]) -> Self:
+        """A table of an instrument's samples, (name, unit, values) each column, the first one numbered `first`."""
+        names, units, cells = zip(*columns, strict=True)
+        sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
+        return cls(str(path), TableHeading(names, units, 0, 0), cells.__getitem__, sample, first, "sample", notes)
+
     def place(self, row: int) -> str:
         return f"{self.word} {self.first + row}"
 
@@ -120,13 +129,22 @@ def column(cells: Sequence[Any], kind: str, decimal: str) -> TableColumn:
     return TableColumn(numbers(cells, decimal, gaps=kind == "gaps"))
 
 
+def instrument_of(path: Path | str) -> ModuleType | None:
+    """The module of the instrument whose file it is, by its beginning; None for another file.
+
+    It has `holds_waveforms`, and `load` and `table` for what the instrument was set to record.
+    """
+    from tractexp.filetypes import cev, pqdif
+
+    return next((each for each in (pqdif, cev) if each.recognizes(path)), None)
+
+
 def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table.
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
     """
     from tractexp.filetypes import pscad
-    from tractexp.filetypes.instrument import instrument_of
     from tractexp.filetypes.table_text import HEAD, open_text
 
     if instrument := instrument_of(located(path)):
@@ -181,23 +199,19 @@ def _parquet(path: str, data: bytes) -> TableFile:
 
 def _arrow(chunked: Any) -> Any:
     """The cells of a column: an array of numbers where it is one, gaps nan."""
-    import pyarrow.types as kinds
-
-    kind = chunked.type
-    if kinds.is_floating(kind) or kinds.is_integer(kind) or kinds.is_boolean(kind) or kinds.is_null(kind):
-        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
-    if kinds.is_decimal(kind):
-        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
-    if kinds.is_timestamp(kind):
-        return [None if cell is None else cell.replace(tzinfo=None) for cell in _utc(chunked).to_pylist()]
-    return chunked.to_pylist()
-
-
-def _utc(chunked: Any) -> Any:
-    """Times of day as microseconds of UTC: Python's own have no finer ones."""
     import pyarrow
+    from pyarrow import types
 
-    return chunked.cast(pyarrow.timestamp("us", tz=chunked.type.tz), safe=False)
+    kind, numeric = (
+        chunked.type,
+        (types.is_floating, types.is_integer, types.is_boolean, types.is_null, types.is_decimal),
+    )
+    if any(is_of(kind) for is_of in numeric):
+        return np.asarray(chunked.cast("float64").to_numpy(), dtype=float)
+    if types.is_timestamp(kind):  # Python's own times have microseconds at most
+        moments = chunked.cast(pyarrow.timestamp("us", tz=kind.tz), safe=False)
+        return [None if cell is None else cell.replace(tzinfo=None) for cell in moments.to_pylist()]
+    return chunked.to_pylist()
 
 
 def _sheet(path: str, data: bytes, form: TableForm) -> TableFile:

@@ -6,6 +6,7 @@ cell, which is slower and names the place.
 
 import csv
 import io
+import itertools
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -43,7 +44,7 @@ class TextTable(TableFile):
         header = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
-        self.decimal = form.decimal or _decimal(self.sample, self.delimiter)
+        self.decimal = form.decimal or _decimal(self.sample)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
@@ -67,16 +68,13 @@ class TextTable(TableFile):
         """Refuse rows of more cells than names, for cells and names cannot be matched."""
         named = len([name for name in self.heading.names if name])
         spare = [cell for cell in self.sample[0][len(self.heading.names) :] if cell]
-        if self.heading.line is not None and (spare or self._split_decimals(named)):
+        split = self.width > named + 1 and self.width >= 1.5 * named  # at decimal commas, as it seems
+        if self.heading.line is not None and (spare or split):
             raise UserError(
                 f"{self.source}: line {self.line} has {self.width} cells where the header line names {named} columns"
                 + ("; if the decimal mark is a comma, save the file with another delimiter, such as a semicolon"
                    if self.delimiter == "," else "")
             )  # fmt: skip
-
-    def _split_decimals(self, named: int) -> bool:
-        """Whether values seem cut at decimal commas: far more cells than names."""
-        return self.width > named + 1 and self.width >= 1.5 * named
 
     def place(self, row: int) -> str:
         if self._lines is not None and row < len(self._lines):
@@ -96,10 +94,7 @@ class TextTable(TableFile):
 
     def _body(self) -> bytes:
         """The rows of values."""
-        begin = 0
-        for _ in range(self.line - 1):
-            begin = self.data.index(b"\n", begin) + 1
-        return self.data[begin:]
+        return self.data.split(b"\n", self.line - 1)[-1]
 
     def _at_once(self, wanted: Sequence[int]) -> dict[int, TableColumn] | None:
         """The columns, by NumPy's reader; None where it refuses, or rows differ in length."""
@@ -127,43 +122,33 @@ class TextTable(TableFile):
 
     def _cell_by_cell(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         """The columns, each cell looked at; raises `UserError` naming line, column and cell."""
-        cells: dict[int, list[str]] = {number: [] for number in wanted}
-        done: dict[int, list[np.ndarray]] = {number: [] for number in wanted}
         clock = {n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)}
-        lines: list[int] = []
-        self._lines = None
-        for line, row in self._rows(max(wanted)):
-            lines.append(line)
-            for number, column_cells in cells.items():
-                column_cells.append(row[number])
-            if len(lines) % BLOCK == 0:
-                self._convert(wanted, clock, cells, done, lines)
-        self._convert(wanted, clock, cells, done, lines)
-        self._lines = np.array(lines)
-        columns = {n: TableColumn(np.concatenate(parts)) for n, parts in done.items() if n not in clock}
-        for number in clock:
+        times: dict[int, list[str]] = {n: [] for n in clock}
+        done: dict[int, list[np.ndarray]] = {n: [np.empty(0)] for n in wanted if n not in clock}
+        self._lines, lines, rows = None, np.empty(0, int), self._rows(max(wanted))
+        while block := list(itertools.islice(rows, BLOCK)):
+            before, lines = len(lines), np.append(lines, [line for line, _ in block])
+            bad: list[tuple[int, int, str]] = []  # of all columns alike, so that the first bad line is refused
+            for number, kind in wanted.items():
+                cells = [row[number] for _, row in block]
+                if number in clock:
+                    times[number] += cells
+                    continue
+                try:
+                    done[number].append(column(cells, kind, self.decimal).values)
+                except BadCell as one:
+                    bad.append((before + one.row, number, one.why))
+            if bad:
+                self._lines = lines
+                raise self.refuse(*min(bad))
+        self._lines = lines
+        columns = {n: TableColumn(np.concatenate(parts)) for n, parts in done.items()}
+        for number, cells in times.items():
             try:
-                columns[number] = column(cells[number], "time", self.decimal)
-            except BadCell as bad:
-                raise self.refuse(bad.row, number, bad.why) from None
-        return columns
-
-    def _convert(self, wanted: Mapping[int, str], clock: set[int], cells: dict[int, list[str]],
-                 done: dict[int, list[np.ndarray]], lines: list[int]) -> None:  # fmt: skip
-        """Convert the cells read since the last call, of all columns alike, so that the first bad line is refused."""
-        bad: list[tuple[int, int, str]] = []
-        for number in wanted:
-            if number in clock:
-                continue
-            before = sum(map(len, done[number]))
-            try:
-                done[number].append(column(cells[number], wanted[number], self.decimal).values)
+                columns[number] = column(cells, "time", self.decimal)
             except BadCell as one:
-                bad.append((before + one.row, number, one.why))
-            cells[number].clear()
-        if bad:
-            self._lines = np.array(lines)
-            raise self.refuse(*min(bad))
+                raise self.refuse(one.row, number, one.why) from None
+        return columns
 
     def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
         """The rows of cells with their lines; a last row that is cut short is skipped, with a note."""
@@ -236,12 +221,12 @@ def _delimiter(lines: Sequence[str]) -> str:
     return best if alike(best)[0] > 0 else ","
 
 
-def _decimal(sample: Sequence[Sequence[str]], delimiter: str) -> str:
-    """The decimal mark: a comma where cells have one and none has a point."""
+def _decimal(sample: Sequence[Sequence[str]]) -> str:
+    """The decimal mark: a comma where more cells have one than a point."""
     cells = [cell for row in sample for cell in row]
     commas = sum(is_number(cell, ",") and "," in cell for cell in cells)
     points = sum(is_number(cell) and "." in cell for cell in cells)
-    return "," if commas > points and delimiter != "," else "." if commas <= points else ","
+    return "," if commas > points else "."
 
 
 def _cells(line: str, delimiter: str) -> list[str]:

@@ -9,10 +9,9 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.files import located
 from tractexp.filetypes.columns import PER_UNIT, factor
-from tractexp.filetypes.instrument import instrument_of
 from tractexp.filetypes.mapping import LINES, Mapped, MappedColumn, check_mapping, mapped
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import TableColumn, TableFile, TableForm, open_table
+from tractexp.filetypes.table import TableColumn, TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 
@@ -167,8 +166,8 @@ def _absolute(mapping: Mapped, key: str) -> bool | None:
 
 def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], list[str]]:
     """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; a note on what the time was counted from."""
-    wanted = {one.number: _wanted(key) for key, one in mapping.columns.items()}
-    cells = table.read(wanted)
+    kinds = {"t": "time", **{key: "gaps" for key in mapping.columns if key[0] in "PQ"}}
+    cells = table.read({one.number: kinds.get(key, "number") for key, one in mapping.columns.items()})
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
         key: values[key] * by
@@ -177,10 +176,6 @@ def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], lis
     }
     values["t"], note = seconds(cells[mapping.columns["t"].number], mapping.columns["t"].role.unit)
     return values, note
-
-
-def _wanted(key: str) -> str:
-    return "time" if key == "t" else "gaps" if key[0] in "PQ" else "number"
 
 
 def seconds(time: TableColumn, unit: str) -> tuple[np.ndarray, list[str]]:

@@ -9,6 +9,7 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import role
+from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped
 from tractexp.filetypes.table import TableFile
 from tractexp.filetypes.tabulated import seconds
@@ -17,7 +18,6 @@ from tractexp.recording.recording import Channel, Recording, Segment
 from tractexp.recording.unit import in_units
 
 GAP = 1.5  # usual steps: a longer one parts two segments
-HUGE = 1e38  # of a value: no unit makes sense of a greater one
 
 
 def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:

@@ -70,9 +70,7 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
             f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the sample before, and "
             "the sampling rate is declared as 0, so that the time stamps must be valid; write the rate into the .cfg"
         )
-    stretches = [
-        _stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1 or len(t) == 1
-    ]
+    stretches = [_stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1]
     if not stretches:
         raise UserError(f"{where}: time stamps without order: no two steps between samples are alike")
     return stretches
@@ -92,14 +90,14 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     runs: list[tuple[int, int]] = []
     taken = 0
     for k, (a, b) in enumerate(pairwise(edges)):
-        if b - a == 1 and len(edges) > 2 and _gap(steps, edges, k):
+        if b - a == 1 and len(edges) > 2 and _gap(edges, k):
             continue  # between two segments
         runs.append((max(a, taken), b + 1))
         taken = b + 1
     return runs
 
 
-def _gap(steps: np.ndarray, edges: list[int], k: int) -> bool:
+def _gap(edges: list[int], k: int) -> bool:
     """A single step between longer runs."""
     before = edges[k] - edges[k - 1] if k else 0
     after = edges[k + 2] - edges[k + 1] if k + 2 < len(edges) else 0

@@ -10,6 +10,7 @@ import io
 import pickle
 import subprocess
 import sys
+from collections.abc import Callable
 from typing import Any, Self
 
 ROOM, PER_BYTE = 2 << 30, 40  # bytes of memory that a workbook may take, and more for each byte of its file
@@ -74,29 +75,17 @@ def _serve(limit: int) -> None:
         hard = resource.getrlimit(resource.RLIMIT_AS)[1]
         limit = limit if hard == resource.RLIM_INFINITY else min(limit, hard)
         resource.setrlimit(resource.RLIMIT_AS, (limit, hard))
-    book = _opened(_question())
+    import python_calamine
+
+    def tried(read: Callable[[Any], Any], question: Any) -> Any:
+        with contextlib.suppress(python_calamine.CalamineError, OSError, ValueError):
+            return read(question)
+
+    book: Any = tried(lambda data: python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)), _question())
     _give(book and list(book.sheet_names))
     with contextlib.suppress(EOFError):
         while True:
-            _give(_rows(book, _question()))
-
-
-def _opened(data: bytes) -> Any:
-    import python_calamine
-
-    try:
-        return python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data))
-    except (python_calamine.CalamineError, OSError, ValueError):
-        return None
-
-
-def _rows(book: Any, name: str) -> list[list[Any]] | None:
-    import python_calamine
-
-    try:
-        return book.get_sheet_by_name(name).to_python(skip_empty_area=False)
-    except (python_calamine.CalamineError, OSError, ValueError):
-        return None
+            _give(tried(lambda name: book.get_sheet_by_name(name).to_python(skip_empty_area=False), _question()))
 
 
 def _question() -> Any:

@@ -19,6 +19,9 @@ CALLS = {"fabs": np.abs, "floor": np.floor, "ceil": np.ceil, "sqrt": np.sqrt}
 class Arrays:
     """As `numbers.Numbers`, of arrays (points,); `flags` mean nothing here."""
 
+    divide, negative, size, root, differ = np.divide, np.negative, np.abs, np.sqrt, np.not_equal
+    select = staticmethod(np.where)
+
     def __init__(self, points: int):
         self.points = points
 
@@ -40,12 +43,6 @@ class Arrays:
     def multiply(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
         return a * b
 
-    def divide(self, a: np.ndarray, b: np.ndarray, flags: str = "") -> np.ndarray:
-        return a / b
-
-    def negative(self, a: np.ndarray) -> np.ndarray:
-        return -a
-
     def fused(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, flags: str = "") -> np.ndarray:
         return a * b + c
 
@@ -54,12 +51,6 @@ class Arrays:
 
     def compare(self, how: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return COMPARISONS[how](a, b)
-
-    def differ(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return a != b
-
-    def select(self, condition: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        return np.where(condition, a, b)
 
     def larger(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         return np.where(a > b, a, b)
@@ -72,12 +63,6 @@ class Arrays:
 
     def call(self, name: str, a: np.ndarray) -> np.ndarray:
         return CALLS[name](a)
-
-    def size(self, a: np.ndarray) -> np.ndarray:
-        return np.abs(a)
-
-    def root(self, a: np.ndarray) -> np.ndarray:
-        return np.sqrt(a)
 
     def as_bits(self, a: np.ndarray) -> np.ndarray:
         return a.view(np.int64)

@@ -10,17 +10,17 @@ outputs, sums of squared errors, and by how much the steady state is missed.
 """
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 
 from tractexp.kernel import steady
 from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.graph import Symbol
+from tractexp.kernel.kernel import PREFIX, Room
 from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, WIDTH
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers
-from tractexp.kernel.room import PREFIX, Room
 
 HALF_WAY = {"classical": 0.5, "printed": 1 / 6}  # of a step: how far the two stages in the middle go along a slope
 ARRAYS = (
@@ -29,6 +29,7 @@ ARRAYS = (
 )  # fmt: skip
 SIZES = ("events", "n", "samples", "block", "stored", "started")
 Values = Mapping[Symbol, str]
+Samples = Callable[[str], str]  # an input by its name as a vector of the samples from one on
 
 
 def text(lowered: Lowered, title: str, integration: str, width: int = WIDTH) -> str:
@@ -144,10 +145,11 @@ class _Emitter:
 
     # What is the same in all lanes, for many samples at once
 
-    def _samples(self, i: str, ahead: int = 0) -> "_Samples":
+    def _samples(self, i: str, ahead: int = 0) -> Samples:
         """The inputs from sample i on, of those in the record."""
         remaining = self.f.integer("sub", "%samples", self.f.integer("add", i, ahead))
-        return _Samples(self, self.f.integer("add", i, ahead) if ahead else i, remaining)
+        first = self.f.integer("add", i, ahead) if ahead else i
+        return lambda name: self.lanes.part(self.f.at(self._input(name), first), remaining)
 
     def _point_pass(self) -> None:
         """Inputs and signals of the derivative at both ends and in the middle of each step."""
@@ -193,7 +195,7 @@ class _Emitter:
             for j, value in enumerate(values):
                 f.do(f"store double {self.lanes.lane(value, k)}, ptr {f.at(address, j)}, align 8")
 
-    def _between(self, name: str, here: "_Samples", there: "_Samples", x: str, step: str) -> str:
+    def _between(self, name: str, here: Samples, there: Samples, x: str, step: str) -> str:
         """An input by x from one sample to the next: on the cubic of its slopes, or on a straight line."""
         n = self.lanes
         rates = {rate: smooth for smooth, rate in SMOOTH.items()}
@@ -242,7 +244,7 @@ class _Emitter:
         with f.loop(0, self.width, always=True) as lane:
             candidate, target = f.at(source, f.smaller(f.integer("add", first, lane), last)), f.at(self.copied, lane)
             for k in range(count):
-                value = f.fresh(f"load double, ptr {f.at(candidate, f.integer('mul', '%n', k))}, align 8")
+                value = self._double(f.at(candidate, f.integer("mul", "%n", k)))
                 f.do(f"store double {value}, ptr {f.at(target, k * self.width)}, align 8")
 
     def _missed(self, slacks: Sequence[str]) -> str:
@@ -303,7 +305,10 @@ class _Emitter:
         return [{s: self._wide(self.f.at(address, k * count + j)) for j, s in enumerate(self.moving)} for k in range(3)]
 
     def _wide(self, address: str) -> str:
-        return self.lanes.everywhere(self.f.fresh(f"load double, ptr {address}, align 8"))
+        return self.lanes.everywhere(self._double(address))
+
+    def _double(self, address: str) -> str:
+        return self.f.fresh(f"load double, ptr {address}, align 8")
 
     def _step(self, group: str, first: str, points: Sequence[Values], ahead: Mapping[float, str]) -> None:
         """A step of four stages, Eq. (4), by shares `ahead` of its length; before the first of a sample its outputs."""
@@ -363,15 +368,11 @@ class _Emitter:
 
     # Results, lane by lane
 
-    def _lane(self, lane: str) -> str:
-        """Where the first row of a lane of this block lies."""
+    def _copy(self, lane: str, name: str, target: str) -> None:
+        """Store what a row holds of a lane of this block."""
         f = self.f
         group = self._group(f.integer("sdiv", lane, self.width))
-        return f.at(group, f.integer("srem", lane, self.width))
-
-    def _copy(self, lane: str, name: str, target: str) -> None:
-        f = self.f
-        value = f.fresh(f"load double, ptr {f.at(self._lane(lane), self.rows[name] * self.width)}, align 8")
+        value = self._double(self._row(f.at(group, f.integer("srem", lane, self.width)), name))
         f.do(f"store double {value}, ptr {target}, align 8")
 
     def _store_outputs(self, i: str, first: str, lane: str) -> None:
@@ -397,18 +398,7 @@ class _Emitter:
         remaining = f.integer("sub", "%n", first)
         with f.loop(0, f.smaller(remaining, self.width), always=True) as lane:
             for k in range(count):
-                value = f.fresh(f"load double, ptr {f.at(f.at(self.solved, lane), k * self.width)}, align 8")
+                value = self._double(f.at(f.at(self.solved, lane), k * self.width))
                 row = f.integer("mul", f.integer("add", f.integer("mul", e, count), k), "%n")
                 place = f.integer("add", row, f.integer("add", first, lane))
                 f.do(f"store double {value}, ptr {f.at('%starts', place)}, align 8")
-
-
-class _Samples:
-    """Inputs by name as vectors of the samples from one on."""
-
-    def __init__(self, emitter: _Emitter, i: str, left: str):
-        self.emitter, self.i, self.left = emitter, i, left
-
-    def __call__(self, name: str) -> str:
-        e = self.emitter
-        return e.lanes.part(e.f.at(e._input(name), self.i), self.left)

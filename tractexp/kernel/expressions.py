@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 import sympy
@@ -90,7 +91,7 @@ class Expressions:
             item = bool(coefficient < 0), abs(coefficient), rest
             fuses = isinstance(rest, sympy.Mul) or (coefficient not in (1, -1) and rest is not sympy.S.One)
             (products if fuses else single).append(item)
-        items = sorted(single, key=_negative) + sorted(products, key=_negative)
+        items = sorted(single, key=itemgetter(0)) + sorted(products, key=itemgetter(0))
         first = next((k for k, item in enumerate(items) if not item[0]), 0)
         items.insert(0, items.pop(first))
         n, total = self.numbers, None
@@ -189,7 +190,3 @@ class Expressions:
         raise UserError(
             f"the equations contain the condition {condition}, which kernels cannot decide; compare numbers"
         )
-
-
-def _negative(item: tuple[bool, sympy.Expr, sympy.Expr]) -> bool:
-    return item[0]

@@ -50,9 +50,6 @@ class Function:
         self.allocations.append(f"  {name} = alloca {kind}, align {alignment}")
         return name
 
-    def intrinsic(self, name: str, declaration: str) -> None:
-        self.intrinsics[name] = declaration
-
     def remark(self, text: str) -> None:
         """A line for those who read the IR."""
         self.lines.append(f"  ; {text}")
@@ -69,11 +66,8 @@ class Function:
     def integer(self, operation: str, a: object, b: object) -> str:
         return self.value(f"{operation} i64 {a}, {b}")
 
-    def less(self, a: object, b: object) -> str:
-        return self.value(f"icmp slt i64 {a}, {b}")
-
     def smaller(self, a: object, b: object) -> str:
-        return self.value(f"select i1 {self.less(a, b)}, i64 {a}, i64 {b}")
+        return self.value(f"select i1 {self.integer('icmp slt', a, b)}, i64 {a}, i64 {b}")
 
     def at(self, address: str, index: object) -> str:
         """The address `index` doubles further."""

@@ -3,18 +3,40 @@
 import ctypes
 import functools
 import itertools
+import json
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from tractexp.kernel import objects, steady
 from tractexp.kernel.layout import INPUTS, LANES
-from tractexp.kernel.room import Room
 
 FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 15, *[ctypes.c_int64] * 6)  # releases Python's lock
 VECTOR = 64  # bytes: a vector across two cache lines would take twice the time
 NOTHING = np.empty((0, 0, 0))
 NUMBERS, WHOLE = np.dtype(np.float64), np.dtype(np.int64)
+PREFIX = "; room "  # of the line of a kernel's text that tells its `Room`
+
+
+@dataclass(frozen=True)
+class Room:
+    """What a call needs beside its arrays: numbers of each candidate, of each event, and of the work space."""
+
+    width: int  # lanes of a vector
+    given: int  # of each candidate: its parameters, then P0 and Q0
+    event: int  # of each event
+    outputs: int
+    starts: int  # states and memories before the event
+    rows: int  # of each group of lanes
+    points: int  # at each point in time that a step looks at
+    signals: int  # at each sample
+
+    @classmethod
+    def of(cls, text: str) -> "Room":
+        """As a kernel's text tells it."""
+        line = text.split("\n", 2)[1]
+        return cls(**json.loads(line.removeprefix(PREFIX)))
 
 
 class Kernel:
@@ -51,7 +73,12 @@ class Kernel:
         float64, `first` and `substeps` of int64. Raises `ValueError` for anything else.
         """
         room = self.room
-        events, n, samples = self._sizes(candidates, inputs)
+        if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in (5, len(INPUTS)):
+            raise ValueError(
+                f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events, {room.given},"
+                f" n) and (5 or {len(INPUTS)}, samples)"
+            )
+        (events, _, n), samples = candidates.shape, inputs.shape[1]
         _check("candidates", candidates, (events, room.given, n))
         _check("event", event, (events, room.event))
         _check("first", first, (events + 1,), WHOLE)
@@ -104,14 +131,6 @@ class Kernel:
         space = np.empty(work + points + signals + VECTOR // 8)
         address = -(-_address(space) // VECTOR) * VECTOR
         return block, address, address + 8 * work, address + 8 * (work + points), space
-
-    def _sizes(self, candidates: np.ndarray, inputs: np.ndarray) -> tuple[int, int, int]:
-        if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in (5, len(INPUTS)):
-            raise ValueError(
-                f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events, {self.room.given},"
-                f" n) and (5 or {len(INPUTS)}, samples)"
-            )
-        return candidates.shape[0], candidates.shape[2], inputs.shape[1]
 
 
 def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype = NUMBERS) -> None:

@@ -105,7 +105,7 @@ class Numbers:
     def call(self, name: str, *arguments: str) -> str:
         """An intrinsic of LLVM."""
         full = f"llvm.{name}.{self._suffix}"
-        self.f.intrinsic(full, f"declare {self.kind} @{full}({', '.join([self.kind] * len(arguments))})")
+        self.f.intrinsics[full] = f"declare {self.kind} @{full}({', '.join([self.kind] * len(arguments))})"
         given = ", ".join(f"{self.kind} {a}" for a in arguments)
         return self.f.value(f"call {FAST} {self.kind} @{full}({given})")
 
@@ -152,7 +152,7 @@ class Numbers:
         if self.width == 1:
             return self.f.value(f"load double, ptr {address}, align 8")
         name = f"llvm.masked.load.{self._suffix}.p0"
-        self.f.intrinsic(name, f"declare {self.kind} @{name}(ptr, i32, {self.bits}, {self.kind})")
+        self.f.intrinsics[name] = f"declare {self.kind} @{name}(ptr, i32, {self.bits}, {self.kind})"
         counted = self._counted(left)
         return self.f.value(
             f"call {self.kind} @{name}(ptr {address}, i32 8, {self.bits} {counted}, {self.kind} zeroinitializer)"
@@ -161,7 +161,7 @@ class Numbers:
     def store_part(self, a: str, address: str, left: str) -> None:
         """The first `left` lanes, at most all, to wherever they lie."""
         name = f"llvm.masked.store.{self._suffix}.p0"
-        self.f.intrinsic(name, f"declare void @{name}({self.kind}, ptr, i32, {self.bits})")
+        self.f.intrinsics[name] = f"declare void @{name}({self.kind}, ptr, i32, {self.bits})"
         self.f.do(f"call void @{name}({self.kind} {a}, ptr {address}, i32 8, {self.bits} {self._counted(left)})")
 
     def _counted(self, left: str) -> str:

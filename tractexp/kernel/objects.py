@@ -38,11 +38,7 @@ def load(text: str) -> MachineCode:
 
 def object_code(text: str) -> bytes:
     """Object code of this IR, from the store or compiled and written there."""
-    return CODE.get(_key(text), lambda: machine_code(text))
-
-
-def _key(text: str) -> str:
-    return key(target.key(), text)
+    return CODE.get(key(target.key(), text), lambda: machine_code(text))
 
 
 def machine_code(text: str, machine: Any = None) -> bytes:

@@ -42,7 +42,8 @@ class _Newton:
         f, n = self.f, self.n
         n.store(n.constant(1.0), self.moved)
         f.do(f"store i64 1, ptr {self.going}, align 8")
-        with f.loop(0, ITERATIONS), f.when(f.fresh(f"icmp ne i64 {self.read_going()}, 0")):
+        load = f"load i64, ptr {self.going}, align 8"
+        with f.loop(0, ITERATIONS), f.when(f.fresh(f"icmp ne i64 {f.fresh(load)}, 0")):
             self.rest(self.balance)
             self.differences()
             self.elimination()
@@ -51,9 +52,6 @@ class _Newton:
         self.verdict()
         body = f.text(f"define void @steady({ARGUMENTS}) nounwind")
         return "\n".join([*f.intrinsics.values(), body])
-
-    def read_going(self) -> str:
-        return self.f.fresh(f"load i64, ptr {self.going}, align 8")
 
     def at(self, address: str, k: str) -> str:
         return self.f.at(address, self.f.integer("mul", k, self.n.width))

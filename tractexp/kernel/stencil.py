@@ -5,6 +5,7 @@ What a recorder does to a response is of this kind, and every candidate passes t
 
 import ctypes
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -25,11 +26,6 @@ class Stencil:
     `expression` is called by name with a function `y(k)` for each array, which gives the symbol of its element k
     samples further, and with the symbol of each number; it returns a SymPy expression.
     """
-
-    expression: Callable[..., Any]
-    rows: tuple[str, ...]
-    shared: tuple[str, ...]
-    numbers: tuple[str, ...]
 
     def __init__(
         self, expression: Callable[..., Any], rows: Sequence[str], shared: Sequence[str] = (),
@@ -101,7 +97,9 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     expression = stencil.expression(**arrays, **single)
     f = Function()
     lanes, scalars = Numbers(f, WIDTH), Numbers(f, 1)
-    places = _places(f, (*stencil.rows, *stencil.shared, *stencil.numbers))
+    addresses = (f.value(f"getelementptr ptr, ptr %places, i64 {k}") for k in itertools.count())
+    names = (*stencil.rows, *stencil.shared, *stencil.numbers)
+    places = {name: f.value(f"load ptr, ptr {a}, align 8") for name, a in zip(names, addresses, strict=False)}
     with f.loop(0, "%rows") as row:
         shifts = [
             f.count("%shifts", f.integer("add", f.integer("mul", "%rows", k), row)) for k in range(len(stencil.rows))
@@ -124,9 +122,3 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     text = "\n".join([*f.intrinsics.values(), f.text(f"define void @run({', '.join(arguments)}) nounwind")])
     offsets = [k for _, k in elements.values()]
     return min(offsets), max(offsets), text
-
-
-def _places(f: Any, names: Sequence[str]) -> Mapping[str, str]:
-    """The addresses of arrays, which are handed over in one."""
-    address = (f.value(f"getelementptr ptr, ptr %places, i64 {k}") for k in range(len(names)))
-    return {name: f.value(f"load ptr, ptr {a}, align 8") for name, a in zip(names, address, strict=True)}

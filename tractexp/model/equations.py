@@ -17,7 +17,6 @@ from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
-from tractexp.model.circuit import NOTHING, Circuit
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
 from tractexp.model.graph import as_real_imag, replaced
 from tractexp.model.graph import halves as real_and_imaginary
@@ -32,10 +31,13 @@ from tractexp.parameter import Parameter
 
 LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
+NOTHING = sympy.Integer(0)
+LOWEST = sympy.Rational(1, 20)  # of the voltage before the event: below it what draws a power is an admittance
+DAMPING = sympy.Rational(1, 20)  # resistance over reactance of a reactive load of which nothing else is said
 OWN = "motor"  # who writes the states that are pushed, and the speed that effects ask for
 
 
-class Equations(Circuit):
+class Equations:
     """The declaration of one composite load, Eq. (7) of Wu et al. 2022.
 
     Symbols given, all per unit of the record's base except angular speeds [rad/s], which are relative to the
@@ -61,26 +63,6 @@ class Equations(Circuit):
 
     A flux is one complex symbol; its real and imaginary part become two real states of the kernel.
     """
-
-    waves: bool
-    v: Any
-    v_rate: Any
-    omega_s: Symbol
-    omega_n: Symbol
-    U_rate: Symbol
-    U2: Symbol
-    U20: Symbol
-    t: Symbol
-    step: Symbol
-    omega_s0: Symbol
-    v_zero: Symbol
-    v_zero_rate: Symbol
-    turn: Any
-    recorded_voltage: Any
-    P0: Symbol
-    Q0: Symbol
-    P_s0: Symbol
-    Q_s0: Symbol
 
     def __init__(self, domain: str = PHASORS) -> None:
         self.waves = domain == WAVES
@@ -359,6 +341,85 @@ class Equations(Circuit):
         row.derivative, row.initial = sympy.sympify(derivative), sympy.sympify(initial)
         row.balance = None if balance is None else sympy.sympify(balance)
 
+    # What parts draw at the bus, written once for phasors and waveforms
+
+    def consume(self, P: sympy.Expr, Q: sympy.Expr, damping: sympy.Expr = DAMPING) -> None:
+        """Add power drawn at the bus (positive when consumed); before the event the static load gives way.
+
+        Of waves it is the current of a conductance beside a branch of resistance over reactance `damping`, which draw
+        these powers at the sizes of the voltage that `U` shows: admittances that vary slowly. A power that changes
+        within a cycle does so as fast as `U` follows. Below a twentieth of the voltage before the event admittances
+        grow no further.
+        """
+        P, Q = sympy.sympify(P), sympy.sympify(Q)
+        if not self.waves:
+            for site, power in ((sites.P, P), (sites.Q, Q)):
+                self._drawn[site] += power
+            return
+        speed = 1 + self.omega_s / self.omega_n
+        G, B = P - Q * damping / speed, Q * (speed**2 + damping**2) / speed
+        current = G * self.v + (B * self._flux_of(damping) if Q != 0 else 0)
+        self.draw(current / sympy.Max(self.U, LOWEST * self.U0) ** 2)
+
+    def draw(self, current: sympy.Expr, zero: sympy.Expr = NOTHING) -> None:
+        """Add a current drawn at the bus [pu] and, of waves, one of zero sequence."""
+        if self.waves:
+            self._drawn[sites.current] += self._named("drawn", current)
+            self._drawn[sites.zero_current] += zero
+            return
+        drawn = self.v * conjugate(current)
+        self.consume(re(drawn), im(drawn))
+
+    def _named(self, name: str, expression: sympy.Expr) -> sympy.Expr:
+        """A space vector by a name of its own, so that what is made of it does not repeat it."""
+        expression = sympy.sympify(expression)
+        if expression.is_Atom:
+            return expression
+        k = sum(s.name.startswith(f"{name}_") for s in self.definitions) + 1
+        return self._define(_complex(f"{name}_{k}"), expression, f"i_{{{name.split('_')[0]},{k}}}")
+
+    def lose(self, P: sympy.Expr, Q: sympy.Expr) -> None:
+        """Power lost before the event between the recorded bus and the voltage that all parts see, of waves."""
+        self._lost = self._lost[0] + P, self._lost[1] + Q
+
+    def branch(
+        self, name: str, latex: str, voltage: sympy.Expr, impedance: sympy.Expr, behind: sympy.Expr = NOTHING
+    ) -> sympy.Expr:
+        """The current [pu] through a resistance and a reactance in series, R + jX, from `voltage` to that `behind`.
+
+        Phasors: (V - E)/(R + jX). Waves: (psi + jE)/X, where the flux linkage psi, a state of that name, follows
+        dpsi/dt = omega_n (V - R i) - j (omega_n + omega_s) psi, which at rest and at nominal frequency is the same.
+        """
+        if not self.waves:
+            return (voltage - behind) / impedance
+        R, X = re(impedance), im(impedance)
+        psi, speed = self.lag_vector(name, latex), 1 + self.omega_s / self.omega_n
+        current = (psi + I * behind) / X
+        before = (voltage - speed * behind) / (R + I * X * speed)
+        self.moves(psi, self.omega_n * (voltage - R * current - I * speed * psi), X * before - I * behind)
+        self.states[psi].derived = True
+        return current
+
+    def capacitor(self, susceptance: sympy.Expr) -> sympy.Expr:
+        """The current [pu] of a capacitor at the bus, b (dv/dt/omega_n + j (1 + omega_s/omega_n) v)."""
+        rate, site = NOTHING, sites.bus_voltage_rate
+        if self.waves:  # its slope is a site where a part reads it, which most do not
+            rate = self[site] if site in self else self._define(_complex(site.name), self.v_rate, site.latex)
+        return susceptance * (rate / self.omega_n + I * (1 + self.omega_s / self.omega_n) * self.v)
+
+    def _flux_of(self, damping: sympy.Expr) -> Symbol:
+        """The flux linkage of a branch at the bus, of one reactance and so much resistance."""
+        damping = sympy.sympify(damping)
+        if damping not in self._fluxes:
+            k = "" if not self._fluxes else f"_{len(self._fluxes) + 1}"
+            psi = self._fluxes[damping] = self.lag_vector(f"branch_flux{k}", rf"\psi_s{k}")
+            leak = damping + I * (1 + self.omega_s / self.omega_n)
+            self.moves(psi, self.omega_n * (self.v - leak * psi), self.v / leak)
+            self.states[psi].derived = True
+        return self._fluxes[damping]
+
+    # What a sample renews, and what a steady state needs
+
     def memory(self, name: str, latex: str) -> Symbol:
         """A real state that changes once a sample, such as a relay's."""
         symbol = self._new(_real(name))
@@ -395,7 +456,9 @@ class Equations(Circuit):
             powers = (replaced(self.expand(power), without_static) for power in (self.P, self.Q))
             others = [self.real(self.before(power)) for power in powers]
         lost = [self.real(self.before(power)) for power in self._lost]
-        share = self._share()
+        size = sum(part**2 for part in self.parts(self.before(self.v)))
+        # what admittances that stand for a power at U_0 draw of it before the event, where the bus has less
+        share = sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
         self.definitions[self.P_s0] = (self.P0 - others[0] - lost[0]) / share
         self.definitions[self.Q_s0] = (self.Q0 - others[1] - lost[1]) / share
         self._halves.clear()
@@ -403,11 +466,6 @@ class Equations(Circuit):
             self._check_still(f"the value before the event of '{symbol}'", declared.initial)
         for requirement in self.requirements:
             self._check_still(f"what must hold for a steady state ('{requirement.sentence}')", requirement.slack)
-
-    def _share(self) -> sympy.Expr:
-        """What admittances that stand for a power at U_0 draw of it before the event, where the bus has less."""
-        size = sum(part**2 for part in self.parts(self.before(self.v)))
-        return sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
 
     def _derive_starts(self) -> None:
         """Take the values before the event of states that are written in others' by these."""
@@ -463,6 +521,11 @@ class Equations(Circuit):
             own = (state.symbol,) if state.symbol.is_real else phasor_parts(state.symbol)
             rows.extend(zip(own, self.parts(state.derivative), self.parts(state.initial), strict=False))
         return rows
+
+    def real_starts(self) -> list[Symbol]:
+        """What states and memories start from, in the order of the kernel, phasors split in two."""
+        starts = map(start_symbol, (*self.states, *self.memories))
+        return [part for s in starts for part in ((s,) if s.is_real else phasor_parts(s))]
 
     def real_balances(self) -> list[sympy.Expr]:
         """What vanishes in the steady state before the event, one for each real state."""
@@ -550,6 +613,3 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
     expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
     chosen: Any = min(plain, expanded, key=operations)
     return chosen.xreplace({symbol: part for part, symbol in hidden.items()})
-
-
-__all__ = ["Equations", "I", "Memory", "Requirement", "State", "phasor_parts", "start_symbol", "sympy"]

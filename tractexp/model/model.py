@@ -75,14 +75,6 @@ class Model:
     Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
     """
 
-    motor: Motor
-    static: Static
-    effects: tuple[Effect, ...]
-    measurements: tuple[Measurement, ...]
-    integration: str
-    domain: str
-    title: str
-
     def __init__(
         self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL,
         domain: str = PHASORS,
@@ -148,12 +140,8 @@ class Model:
     @functools.cached_property
     def source(self) -> str:
         """The kernel's text: LLVM IR, the same on every machine."""
-        return text_of((self.motor, self.static, *self.effects), self._written, self._text_in_cache)
-
-    @property
-    def _text_in_cache(self) -> str:
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return self._in_cache(name)
+        return text_of((self.motor, self.static, *self.effects), self._written, self._in_cache(name))
 
     def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
@@ -209,16 +197,12 @@ class Model:
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
         if self.measurements or drive.windows:
-            return self._errors_of(self.simulate(drive, values, substeps), drive)
+            response = self.simulate(drive, values, substeps)  # the measurement stands between kernel and sums
+            square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+            stored = np.add.reduceat(square, drive.first[:-1], axis=2)
+            return Errors(np.moveaxis(stored, 2, 0), response.miss.sum(axis=0))
         sums, miss = self._run(drive, self._candidates(drive, values), substeps)
         return Errors(sums, miss.sum(axis=0))
-
-    @staticmethod
-    def _errors_of(response: ModelResponse, drive: Drive) -> Errors:
-        """Squared errors of stored responses: where the measurement stands between kernel and sums."""
-        square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
-        sums = np.add.reduceat(square, drive.first[:-1], axis=2)
-        return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
     def substeps(
         self,
@@ -257,14 +241,14 @@ class Model:
             if not short.all():
                 coarse = self.simulate(drive, values, chosen)
 
-    def refusal(self, values: np.ndarray, drive: Drive, event: int = 0) -> str | None:
-        """Why these values (d,) have no steady state before an event, as a sentence; None where they have one."""
+    def refusal(self, values: np.ndarray, drive: Drive) -> str | None:
+        """Why these values (d,) have no steady state before the event, as a sentence; None where they have one."""
         _, miss = self._run(drive, self._candidates(drive, values), 1)
-        if miss[event, 0] == 0:
+        if miss[0, 0] == 0:
             return None  # the kernel found one; the sentence takes the symbols, which take a second to load
         eq = self.equations
         numbers = dict(zip(self.names, map(float, values), strict=True))
-        numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[event], *drive.before[event]), strict=True))
+        numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[0], *drive.before[0]), strict=True))
 
         def number(expression: Any) -> float:
             whole = eq.expand(expression)
@@ -286,9 +270,10 @@ class Model:
         return evaluated(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
-        from tractexp.model.before import starts, stated
+        from tractexp.model.printed import stated
 
-        return json.dumps({"starts": starts(self.equations), "quantities": stated(self.equations)})
+        starts = [symbol.name for symbol in self.equations.real_starts()]
+        return json.dumps({"starts": starts, "quantities": stated(self.equations)})
 
     def latex(self) -> list[str]:
         """The model's equations, one a line."""

@@ -98,7 +98,7 @@ class Static(Part):
 
     def damping(self, *_: Any, **parameters: Any) -> Any:
         """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is none."""
-        from tractexp.model.circuit import DAMPING
+        from tractexp.model.equations import DAMPING
 
         return DAMPING
 

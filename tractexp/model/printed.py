@@ -1,10 +1,12 @@
-"""Equations in LaTeX."""
+"""Equations in LaTeX, and quantities before the event as texts of arithmetic (`arithmetic.evaluated`)."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import sympy
+from sympy.printing.pycode import PythonCodePrinter
 
+from tractexp.model.arithmetic import VALUES
 from tractexp.model.symbols import phasor_parts, start_symbol
 
 if TYPE_CHECKING:
@@ -35,3 +37,20 @@ def changed(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | Non
     """
     old = {line.split("=")[0]: line for line in before}
     return [(old.get(line.split("=")[0]), line) for line in after if line not in before and "|_0" not in line]
+
+
+class _Printer(PythonCodePrinter):
+    """Python that takes its numbers by name, so that no name is taken for another thing."""
+
+    def _print_Symbol(self, expr: sympy.Symbol) -> str:
+        return f"{VALUES}[{expr.name!r}]"
+
+
+def stated(eq: "Equations") -> dict[str, str]:
+    """{quantity: text of its value before the event, of what stands above it}; phasors are left out."""
+    printer, texts = _Printer({"strict": True}), dict[str, str]()
+    for symbol in eq.definitions:
+        value, imaginary = eq.parts(eq.before(symbol))
+        if imaginary == 0:
+            texts[symbol.name] = str(printer.doprint(value))
+    return texts

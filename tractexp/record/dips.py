@@ -39,8 +39,12 @@ def numbered(wholes: Sequence[Record], where: str, pre: float, post: float) -> l
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
             window, number = slice(max(first, early), min(stop, late)), len(file_dips) + 1
             name, source = f"{whole.name}_dip{number}", f"{where} dip {number}"
-            record = _refused(replace(whole.part(window), name=name, source=source))
-            file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), record))
+            result: Record | UserError = replace(whole.part(window), name=name, source=source)
+            try:
+                detect(result)
+            except UserError as error:
+                result = error
+            file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), result))
     return file_dips
 
 
@@ -57,14 +61,6 @@ def around(event: Event) -> Event:
     note = f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about the first dip"
     part = record.part(slice(first, stop))
     return detect(replace(part, digest=digest(record), notes=(*record.notes, note)))
-
-
-def _refused(record: Record) -> Record | UserError:
-    try:
-        detect(record)
-    except UserError as error:
-        return error
-    return record
 
 
 def level(record: Record) -> tuple[float, float]:

@@ -20,7 +20,6 @@ FOREIGN = {
     ".rec": RECORDER, ".wfm": RECORDER, ".osc": RECORDER, ".dsr": RECORDER, ".tr0": RECORDER, ".icf": RECORDER,
     ".dmk": RECORDER, ".sig": RECORDER, ".trc": RECORDER, ".wdf": RECORDER, ".d01": RECORDER,
     ".pdf": DOCUMENT, ".docx": DOCUMENT,
-    ".xls": "the Excel format of before 2007: save it as .xlsx or .csv",
 }  # fmt: skip
 
 

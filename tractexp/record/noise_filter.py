@@ -43,13 +43,8 @@ class NoiseFilter:
         if len(self.weights) == 1 or len(departure) <= 2 * len(self.weights):
             return departure
         half = len(self.weights) // 2
-        slow = np.convolve(_beyond(departure, half), self.weights, "valid")
+        slow = np.convolve(np.pad(departure, half, "reflect", reflect_type="odd"), self.weights, "valid")
         fast = departure - slow
         loud = np.convolve(np.abs(fast) ** 2, np.ones(self.near) / self.near, "same")
         rest = noise * (1 - 2 * self.weights[half] + float(self.weights @ self.weights))
         return slow + np.clip(1 - LOUD * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
-
-
-def _beyond(x: np.ndarray, n: int) -> np.ndarray:
-    """(N + 2 n,): turned about its first and its last value."""
-    return np.concatenate([2 * x[0] - x[n:0:-1], x, 2 * x[-1] - x[-2 : -n - 2 : -1]])

@@ -109,19 +109,14 @@ def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
     record = event.record
     by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
-    note = said(own) if record.original_base is None else ""
-    return detect(
-        replace(record, base=base, original_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
-                notes=(*record.notes, *[note] * bool(note)), **arrays)
-    )  # fmt: skip
-
-
-def said(own: OwnBase) -> str:
-    """A sentence on the change of base."""
-    return (
+    note = (
         f"put on a base of {own}, the apparent power before the first dip that is fitted: on {own.file} powers, torque"
         f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values on this base"
     )
+    return detect(
+        replace(record, base=base, original_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
+                notes=(*record.notes, *[note] * (record.original_base is None)), **arrays)
+    )  # fmt: skip
 
 
 def scaled(value: Scalable, power_exponent: int, ratio: float) -> Scalable:

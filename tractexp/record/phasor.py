@@ -11,6 +11,7 @@ from tractexp.errors import UserError
 
 TURN = np.exp(2j * np.pi / 3)  # the operator a of symmetrical components
 SLOWEST, FASTEST = 0.9, 1.1  # of the nominal frequency: what is tracked
+SMOOTHED = 4.0  # cycles, over which a tracked frequency is
 PASSES = 3  # of the tracking, each at the frequency that the previous one measured
 DEAD = 0.01  # of the highest voltage: a phasor below it has no angle to speak of
 BLOCK = 1 << 15  # samples measured at once, about: what fits into a processor's cache
@@ -120,14 +121,14 @@ def turning(angle: np.ndarray, rate: float) -> np.ndarray:
     return np.gradient(np.unwrap(angle)) * rate / (2 * np.pi)
 
 
-def track(voltages: np.ndarray, rate: float, nominal: float, cycles: float = 4.0, least: float = 0.0) -> np.ndarray:
-    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over `cycles`, within 10 % of `nominal`.
+def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0) -> np.ndarray:
+    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over 4 cycles, within 10 % of `nominal`.
 
     The mean speed of the positive-sequence voltage (of the one there is) over the span about each sample. Three passes,
     each at the frequency that the previous one measured, remove the error of the frequency from the phasors.
     A voltage below `least` has no angle: spans end before it, and within the nominal frequency is taken.
     """
-    n, (every, reach, half) = voltages.shape[-1], _tracking(rate, nominal, cycles)
+    n, (every, reach, half) = voltages.shape[-1], _tracking(rate, nominal)
     at = np.arange(reach, n - reach, every)
     f = np.full(n, nominal)
     for _ in range(PASSES):
@@ -150,10 +151,10 @@ def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
     return speed
 
 
-def _tracking(rate: float, nominal: float, cycles: float = 4.0) -> tuple[int, int, int]:
+def _tracking(rate: float, nominal: float) -> tuple[int, int, int]:
     """Samples from one tracked phasor to the next, samples a phasor needs on either side, phasors in half a span."""
     every = max(1, int(rate / nominal / 20))
-    return every, one_cycle(rate, nominal).reach, int(cycles * rate / nominal / 2 / every)
+    return every, one_cycle(rate, nominal).reach, int(SMOOTHED * rate / nominal / 2 / every)
 
 
 @dataclass(frozen=True, eq=False)

@@ -189,7 +189,9 @@ def in_waves(event: Event) -> WaveEvent:
     half = half_cycle(v / turn, i / turn, turn, waves.rate, frequency)
     currents = np.stack([i.real, i.imag, i_zero])
     currents[:, :lead] = np.nan
-    calm = _calm(i, i_zero, turn, I * np.exp(-1j * np.angle(V)), slice(lead, lead + np.count_nonzero(before)))
+    steady = slice(lead, lead + np.count_nonzero(before))
+    residual = (i - I * np.exp(-1j * np.angle(V)) * turn)[steady]
+    calm = np.stack([residual.real, residual.imag, i_zero[steady]])  # no fundamental
     compared = _compared(currents[:, start:], calm, K)
     currents[~compared] = np.nan
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
@@ -203,7 +205,7 @@ def in_waves(event: Event) -> WaveEvent:
         | {
             "record": slow, "start": start, "end": end, "U0": float(np.abs(V)), "P0": float(power.real),
             "Q0": float(power.imag), "f0": frequency, "noise_U": float(noise_U),
-            "steady": slice(lead, lead + np.count_nonzero(before)),
+            "steady": steady,
         },
         phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
         omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
@@ -299,12 +301,6 @@ def half_cycle(
 
     V, I = mean(v), mean(i)
     return np.abs(V), V * I.conj(), np.abs(mean(np.conj(v * turn) / turn))
-
-
-def _calm(i: np.ndarray, zero: np.ndarray, turn: np.ndarray, I: complex, part: slice) -> np.ndarray:
-    """What is no fundamental in the currents before the dip, (3, n)."""
-    residual = (i - I * turn)[part]
-    return np.stack([residual.real, residual.imag, zero[part]])
 
 
 def _compared(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:

@@ -41,7 +41,8 @@ class Estimator(Plugin):
     def window(self, nominal: float) -> Window:
         """The window as a record stores it, at the nominal frequency."""
         half = self.half(nominal)
-        at = (np.arange(max(round(2 * half / SPACING), 2)) + 0.5) / max(round(2 * half / SPACING), 2) * 2 * half - half
+        count = max(round(2 * half / SPACING), 2)
+        at = (np.arange(count) + 0.5) / count * 2 * half - half
         weights = self.weight(at, nominal)
         return Window(self.name, at, weights / weights.sum())
 

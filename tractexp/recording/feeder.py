@@ -70,7 +70,9 @@ def propose(recording: Recording) -> list[Feeder]:
     three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
     loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
     level = max(phasors.size(each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
-    options = [_feeders(recording, phasors, load, buses, level) for load in loads if buses and _fits(load, buses)]
+    two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)  # with which two currents are enough
+    fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
+    options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
     options += _single(recording, phasors, volts, amps, [*buses, *loads], level)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
@@ -163,10 +165,6 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
 def _unit(x: np.ndarray) -> np.ndarray:
     size = np.abs(x)
     return np.where(size > 0, x, 1) / np.where(size > 0, size, 1)
-
-
-def _fits(load: Group, buses: Sequence[Group]) -> bool:
-    return len(load.numbers) == 3 or any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
 
 
 def _feeders(

@@ -12,10 +12,6 @@ from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
-KINDS = (
-    "dip", "swell", "interruption", "step", "ramp", "open pole", "dead line", "pole slip", "inrush",
-    "blown fuse", "load loss", "load step",
-)  # fmt: skip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
 SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
@@ -42,7 +38,7 @@ CARRIES = 0.05  # of the record's greatest current: what is less is no load
 class Happening:
     """One event of a feeder. Voltages relative to that before it, powers in MW and Mvar."""
 
-    kind: str  # of `KINDS`
+    kind: str  # dip, or one of `NO_FIT`
     start: float  # s
     end: float  # s
     depth: float  # 1 - residual voltage over that before: negative for a swell
@@ -80,7 +76,8 @@ def _happenings(trace: Trace) -> list[Happening]:
     spans += _open_alone(trace, spans)
     spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
     changes = _own_changes(trace, [e for _, e in spans])
-    spans += [(_load_kind(c), _beside(trace, c.first + 1, c.stop)) for c in changes if abs(c.ratio - 1) > LISTED]
+    listed = (c for c in changes if abs(c.ratio - 1) > LISTED)
+    spans += [("load loss" if c.ratio < SMALL else "load step", _beside(trace, c.first + 1, c.stop)) for c in listed]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
     return [_describe(trace, kind, e, bounds) for kind, e in _merged(spans)]
@@ -105,10 +102,6 @@ def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
     return [c for c in changes if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)]
 
 
-def _load_kind(change: Change) -> str:
-    return "load loss" if change.ratio < SMALL else "load step"
-
-
 def _no_system(trace: Trace) -> bool:
     """Whether three voltages never turn as three phases do: pick-up on a dead line, or one quantity three times."""
     if len(trace.phases) < 3:
@@ -126,7 +119,8 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     """The kind of an excursion; two parts of a fault that leaves a pole open."""
     if (fuse := _fuse(trace, e)) is not None:
         return [("blown fuse", fuse)]
-    if e.dead or _all_dead(trace, e):
+    until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)  # with the level that it leads to
+    if e.dead or _dead(trace, e)[e.start : until].any():
         return [("interruption", e)] if e.returned and not e.dead else [("dead line", _until_alive(trace, e))]
     opened = _open(trace, e)
     if opened is not None:
@@ -139,11 +133,6 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if not e.returned and e.new_level and e.worst > 0:
         return [("step", e)]
     return [("dip" if e.worst < 0 else "swell", e)]
-
-
-def _all_dead(trace: Trace, e: Excursion) -> bool:
-    """Whether every phase is gone at some time of the excursion, or at the new level that it leads to."""
-    return bool(_dead(trace, e)[e.start : e.end + 2 * e.new_level * round(trace.cycle / trace.step)].any())
 
 
 def _until_alive(trace: Trace, e: Excursion) -> Excursion:
@@ -305,17 +294,14 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     inside = slice(e.start, max(e.end, e.start + 1))
     edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
-    depth = -e.worst if e.new_level or e.dead else 1 - _extreme(trace.U[inside], e.worst) / e.reference
+    extreme = np.max if e.worst > 0 else np.min
+    depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, (before, after))
     return Happening(
         kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
         float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
     )  # fmt: skip
-
-
-def _extreme(U: np.ndarray, side: float) -> float:
-    return float(U.max() if side > 0 else U.min())
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:

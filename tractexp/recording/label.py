@@ -4,11 +4,12 @@ One mark in a name stands for its phase: `Ia`, `UL1`, `VRS`. Three names equal b
 no list of naming schemes is needed: only the alphabets that number phases, and where in a name the mark may stand.
 """
 
+import functools
 import itertools
 import re
 import unicodedata
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
@@ -85,13 +86,10 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
     """The groups among channels of one quantity, without residual ones, by their names and phases."""
     free = {i: c for i, c in channels.items() if not residual(c)}
     result: list[Group] = []
-    for full, counters in ((True, True), (False, True), (True, False), (False, False)):
-        for size in (3, 2):
-            matches = _by_name(free, full, counters, size)
-            result += matches
-            free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
-    for size in (3, 2):
-        matches = _by_column(free, size)
+    readings = [(True, True), (False, True), (True, False), (False, False)]
+    searches = [functools.partial(_by_name, full=full, counters=counters) for full, counters in readings]
+    for search, size in itertools.product((*searches, _by_column), (3, 2)):
+        matches = search(free, size)
         result += matches
         free = {i: c for i, c in free.items() if not any(i in g.numbers for g in matches)}
     return sorted(result, key=lambda g: g.numbers[0])
@@ -124,7 +122,7 @@ def backward(channels: Sequence[Channel]) -> bool:
     return all(any(key.endswith("-") for key, *_ in _marks(plain(f"{c.name}"))) for c in channels)
 
 
-def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: int) -> list[Group]:
+def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: bool) -> list[Group]:
     """Groups of names that are equal but for the mark; with their circuits where `full`."""
     buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
     worth: dict[tuple[str, str, bool], float] = defaultdict(float)
@@ -142,18 +140,13 @@ def _by_name(channels: Mapping[int, Channel], full: bool, counters: bool, size: 
         places = buckets[label]
         if size == 2 and not _two_may_do(label, places, worth[label] >= SURE):
             continue
-        for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
-            have = [n for n in numbers if n is not None]
-            if len(have) != size or used & set(have):
+        for have, missing in _sets(places, size):
+            if used & set(have):
                 continue
-            missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
             used |= set(have)
             pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
-            result.append(
-                Group(
-                    tuple(have), pairs, shared_name([channels[n] for n in have]), worth[label] >= SURE, BY_NAME, missing
-                )
-            )
+            shared = shared_name([channels[n] for n in have])
+            result.append(Group(have, pairs, shared, worth[label] >= SURE, BY_NAME, missing))
     return result
 
 
@@ -210,13 +203,18 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
             rows[plain(channel.circuit), len(mark) == 2][place].append(i)
     result = []
     for (_, pairs), places in rows.items():
-        for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
-            have = tuple(n for n in numbers if n is not None)
-            if len(have) == size:
-                missing = None if size == 3 else next(k for k in range(3) if numbers[k] is None)
-                shared = shared_name([channels[n] for n in have])
-                result.append(Group(have, pairs, shared, False, "the file's phases say so", missing))
+        for have, missing in _sets(places, size):
+            shared = shared_name([channels[n] for n in have])
+            result.append(Group(have, pairs, shared, False, "the file's phases say so", missing))
     return result
+
+
+def _sets(places: Mapping[int, list[int]], size: int) -> Iterator[tuple[tuple[int, ...], int | None]]:
+    """Channels, one of each phase, so many together, in the order in which they stand; the phase that is missing."""
+    for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
+        have = tuple(n for n in numbers if n is not None)
+        if len(have) == size:
+            yield have, next((k for k in range(3) if numbers[k] is None), None)
 
 
 def shared_name(channels: list[Channel]) -> str:

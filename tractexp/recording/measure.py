@@ -72,11 +72,6 @@ class FeederWaves:
         return np.array(delays)
 
 
-def waves_of(recording: Recording, feeder: Feeder, segment: Segment) -> np.ndarray:
-    """The load's voltages [kV] and as many currents [kA] into it, (2 K, M), all of a segment at once."""
-    return FeederWaves.of(recording, feeder, segment)[:, :]
-
-
 def phasors_of(
     recording: Recording,
     feeder: Feeder,

@@ -299,15 +299,11 @@ def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int 
     """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
     numbers: list[int | None] = [None] * len(changes)
     for dip in dips:
-        shared = [_common(what, dip.start, dip.end) for what in changes]
+        # a cycle more on either side, for windows blur both
+        shared = [min(what.end, dip.end) - max(what.start, dip.start) + 0.02 for what in changes]
         if shared and max(shared) > 0 and numbers[int(np.argmax(shared))] is None:
             numbers[int(np.argmax(shared))] = dip.number
     return numbers
-
-
-def _common(what: Happening, start: float, end: float) -> float:
-    """Seconds that two spans share; a cycle more on either side, for windows blur them."""
-    return min(what.end, end) - max(what.start, start) + 0.02
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:

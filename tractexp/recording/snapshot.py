@@ -48,19 +48,14 @@ class Snapshots:
         return float(np.percentile(spans, 25, axis=1).max())
 
 
-def segments(recording: Recording, f: float) -> list[Segment]:
-    """The segments that hold two cycles or more of waveforms of frequency f [Hz]; none is no error."""
-    fast = [s for s in recording.segments if s.rate >= FEWEST_PER_CYCLE * f]
-    return [s for s in fast if s.stop - s.first >= 2 * s.rate / f + 1]
-
-
 def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | None = None) -> Snapshots | None:
-    """Windows of all segments that hold waveforms, one after another; None where there is no such segment.
+    """Windows of all segments that hold two cycles or more of waveforms, one after another; None where there is none.
 
     In each the least-squares fit of a mean and a sinusoid of `frequency` [Hz] (by default the nominal one).
     """
     f = frequency or recording.frequency
-    parts = [_windows(recording, numbers, segment, f) for segment in segments(recording, f)]
+    fast = [s for s in recording.segments if s.rate >= FEWEST_PER_CYCLE * f and s.stop - s.first >= 2 * s.rate / f + 1]
+    parts = [_windows(recording, numbers, segment, f) for segment in fast]
     if not parts:
         return None
     t, X, rest = (np.concatenate(each, axis=-1) for each in zip(*parts, strict=True))
