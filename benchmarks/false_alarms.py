@@ -43,7 +43,7 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     made = make(planned.make().case, planned.seed)[:FITTED]
     events = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(made)]
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    missing = catalogue(model.motor, model.static, (), events, ())
+    missing = catalogue(model, events)
     first = disagreement(base_fit(Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0)
     drawn, best = first.chance.least_p, first.scores[0]
     rank = (np.count_nonzero(drawn < best.p) + 1) / (len(drawn) + 1)

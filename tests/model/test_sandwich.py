@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import uncertainty as study
+from written_out import dense
 
 from tractexp.identification.blocks import LENGTH, blocks_of, quantile
 from tractexp.identification.descent import descend
@@ -103,7 +104,7 @@ def test_intervals_hold_the_truth_under_a_correlated_error_that_the_usual_ones_m
         known = conclude(squares, unit, squares.with_initial_power)
         off = np.abs(known.values - study.TYPICAL)[own]
         told.append(off <= known.half[own])
-        rows, J = squares.jacobian(unit)[0], squares.jacobian(unit)[1].dense
+        rows, J = squares.jacobian(unit)[0], dense(squares.jacobian(unit)[1])
         plain = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * np.mean(rows**2)) * (case.upper - case.lower)
         usual.append(off <= 1.96 * plain[own])
     assert np.mean(told) > 0.8

@@ -10,6 +10,7 @@ import symmetries
 import uncertainty as study
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
+from written_out import dense, dense_normal
 
 import tractexp
 from tractexp.identification import advice, agreement
@@ -340,7 +341,7 @@ def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(
     """Over every row and every P0 and Q0 at once, as the least squares of the whole have them."""
     known = study.judged(Problem(model, records((0.3, 0.4, 0.5), 0.003)), study.TYPICAL).uncertainty
     likelihood, gains = known.likelihood, compare_events(known).gains
-    J = likelihood.jacobian(known.unit)[1].dense
+    J = dense(likelihood.jacobian(known.unit)[1])
 
     def errors(rows):
         own, nuisances = J[rows][:, : likelihood.free], J[rows][:, likelihood.free :]
@@ -360,9 +361,9 @@ def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_its
     unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
     base = likelihood.rows(unit)
     alone, together = (normal(likelihood.rows, unit, base, lanes, apart) for apart in (NOT_SEPARABLE, likelihood.apart))
-    for one, other in (alone[0], together[0]), (alone[1].dense, together[1].dense):
+    for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
-    assert (together[1].dense == np.swapaxes(together[1].dense, 1, 2)).all()
+    assert (dense_normal(together[1]) == np.swapaxes(dense_normal(together[1]), 1, 2)).all()
 
 
 def test_a_fit_at_a_bound_says_so(model):

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from command_line import run_command
 from scipy.special import chdtrc
+from written_out import dense_normal
 
 from hidden_effects import Case, Noise, Recorder, make, write
 from tractexp import store
@@ -66,7 +67,7 @@ def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, recorder=SLOW, *
 
 
 def bench(model, made, only=FEW, bounds=None):
-    missing = catalogue(model.motor, model.static, model.effects, made, only)
+    missing = catalogue(model, made, only)
     return Context.of(model, missing, Records.of(made), bounds or {}, {}, Criteria(), Effort())
 
 
@@ -156,7 +157,7 @@ def test_every_effect_is_judged_and_what_cannot_be_seen_is_said(planted):
     judged = {j.name: j for j in judgements(planted)}
     assert judged["stator_resistance"].status == "relevant"
     assert {"time_skew", "measurement_window", "load_drift"} <= judged.keys()
-    silent_channels = catalogue(base().motor, base().static, (), planted.context.events).untestable
+    silent_channels = catalogue(base(), planted.context.events).untestable
     assert "not recorded" in silent_channels["frequency_dependence"]
     assert "U2" in silent_channels["negative_sequence_braking"]
 
@@ -499,7 +500,7 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
     apart = SeparableColumns(np.array([[1], [2]]), (np.arange(20), np.arange(20, 40)))
     alone = normal(rows, unit, rows(unit, lanes), lanes)
     together = normal(rows, unit, rows(unit, lanes), lanes, apart)
-    for one, other in (alone[0], together[0]), (alone[1].dense, together[1].dense):
+    for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-9)
     assert calls == [2, 6, 2, 4]
 

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
-from tractexp.discrepancy import families, fitting, held_out, survivors
+from tractexp.discrepancy import families, fit_effort, fitting, held_out, survivors
 from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
@@ -306,7 +306,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
-    assert len(turns) == 1 + fitting.MOST_TURNS
+    assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
 def test_a_second_stage_is_named_though_one_stage_leaves_nothing_of_the_fitted_dips():
@@ -353,14 +353,14 @@ def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, de
 
 def test_members_belong_to_the_effects_that_are_asked_for():
     made = events(count=1)
-    names = lambda only: {m.name for m in catalogue(base().motor, base().static, (), made, only).members}  # noqa: E731
+    names = lambda only: {m.name for m in catalogue(base(), made, only).members}  # noqa: E731
     assert names(("magnetic_saturation",)) == {"saturation_curve"}
     assert names(("stator_resistance",)) == set()
     assert names(()) == set(MEMBERS)
 
 
 def test_a_member_is_no_candidate_of_the_first_search():
-    missing = catalogue(base().motor, base().static, (), events(count=1))
+    missing = catalogue(base(), events(count=1))
     assert not {c.name for c in missing.candidates} & set(MEMBERS)
     assert missing.textbook(("saturation_curve", "load_drift")) == ("magnetic_saturation", "load_drift")
 

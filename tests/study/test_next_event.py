@@ -78,7 +78,7 @@ def tied():
 def alike():
     """A bench of three effects, of which two are one, fitted to events with stator resistance."""
     events, model = recorded(hidden(*MILD, effect="stator_resistance", size=1.0)), base()
-    known = catalogue(model.motor, model.static, (), events, ("stator_resistance", "speed_dependent_torque"))
+    known = catalogue(model, events, ("stator_resistance", "speed_dependent_torque"))
     bench = Context.of(
         model, Catalogue((*known.candidates, candidate(LeakageLoss())), {}), Records.of(events), {}, {}, Criteria(),
         Effort(),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_discrepancy import FAST, LOUD, base, bench, events
 
-from tractexp.discrepancy import fitting
+from tractexp.discrepancy import fit_effort, fitting
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.promising import promising
@@ -26,11 +26,11 @@ def planted():
 
 def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
     at, noise, units, nuisances = planted
-    kept = promising(at, noise, TRIP, units, nuisances, fitting.MOST_STARTS)
-    assert len(units) == 2 * fitting.MOST_STARTS
-    assert len(kept) == fitting.MOST_STARTS
+    kept = promising(at, noise, TRIP, units, nuisances, fit_effort.MOST_STARTS)
+    assert len(units) == 2 * fit_effort.MOST_STARTS
+    assert len(kept) == fit_effort.MOST_STARTS
     best = lambda these: min(  # noqa: E731
-        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fitting.ROUGH_DESCENT)
+        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT)
     )
     assert best(kept) == pytest.approx(best(units), abs=1.0)
 

@@ -56,7 +56,7 @@ def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003, recorder=SL
 
 def fitted_base(made):
     model = base()
-    missing = catalogue(model.motor, model.static, (), made, ["stator_resistance"])
+    missing = catalogue(model, made, ["stator_resistance"])
     return base_fit(Context.of(model, missing, Records.of(made), {}, {}, Criteria(), Effort()))
 
 

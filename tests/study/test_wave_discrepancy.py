@@ -180,5 +180,5 @@ def test_a_record_without_samples_is_refused_in_a_sentence(given, role):
 def test_an_effect_that_makes_no_sense_of_waveforms_says_why(given):
     motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
     made = tuple(map(in_waves, given))
-    refused = catalogue(motor, static, (), made, ("stator_resistance",), domain="waves").untestable
+    refused = catalogue(compose(motor, static, domain="waves"), made, ("stator_resistance",)).untestable
     assert "R_s" in refused["stator_resistance"]

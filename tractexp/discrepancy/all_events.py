@@ -18,14 +18,12 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.explanations import explanations
-from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refit
+from tractexp.discrepancy.fitting import Names, Refit, best_of, refit, wide_refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
-
-Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,9 @@ class AllEvents:
         return each_apart(both, again, self.context.effort.parts)
 
     def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
-        at, settings = self.context.coordinates, _settings(self.context, alone.names) if anew else [{}]
+        at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])
+        if anew:  # from every setting of the scanned parameters of one of the effects, too
+            settings += itertools.chain.from_iterable(self.context.catalogue[name].settings for name in alone.names)
         wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
         return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 
@@ -121,8 +121,3 @@ class AllEvents:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
         return JointFit(replace(fit, unit=self._narrowed(fit)), louder, p_left)
-
-
-def _settings(context: Context, names: Sequence[str]) -> list[Mapping[str, float]]:
-    """No change, and every setting of the scanned parameters of one of the effects."""
-    return [{}, *itertools.chain.from_iterable(context.catalogue[name].settings for name in names)]

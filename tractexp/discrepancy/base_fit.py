@@ -9,7 +9,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.local_minima import best_fits
+from tractexp.identification.local_minima import distinct, explored
 from tractexp.noise import Noise
 
 ROUNDS = 2  # of noise and fit in turn
@@ -33,9 +33,12 @@ class BaseFit:
 
 
 def base_fit(context: Context) -> BaseFit:
-    """Fit the base model from all over its box."""
-    local_minima = _local_minima(context)
-    return fitted_from(context, local_minima, local_minima)
+    """Fit the base model from all over its box, where its own fast kernel fits it best."""
+    at, alone = context.coordinates, Likelihood.of(context.kernels.bare)
+    ends = distinct(explored(alone), alone.free)  # the best may not stay so once what the recorder did is free
+    local_minima = np.tile(at.null, (len(ends), 1))
+    local_minima[:, [*at.base, *at.before]] = ends
+    return fitted_from(context, list(local_minima), list(local_minima))
 
 
 def fitted_from(context: Context, starts: Sequence[np.ndarray], local_minima: Sequence[np.ndarray]) -> BaseFit:
@@ -47,12 +50,3 @@ def fitted_from(context: Context, starts: Sequence[np.ndarray], local_minima: Se
         noise = quiet.of_fit(fit.unit)
         fit = refit(context, noise, [((), fit.unit)])[0]
     return BaseFit(context, fit, noise, quiet, tuple(local_minima))
-
-
-def _local_minima(context: Context) -> list[np.ndarray]:
-    """The best fits (D,) of the base model alone, by its own fast kernel."""
-    at = context.coordinates
-    ends = best_fits(Likelihood.of(context.kernels.bare))
-    starts = np.tile(at.null, (len(ends), 1))
-    starts[:, [*at.base, *at.before]] = ends
-    return list(starts)

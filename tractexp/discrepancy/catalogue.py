@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import TASK, UserError, among
-from tractexp.model.drive import PHASORS
-from tractexp.model.model import compose
-from tractexp.model.parts import COMPARED, Effect, Measurement, Motor, Static
+from tractexp.model.model import Model
+from tractexp.model.parts import COMPARED, Effect, Measurement
 from tractexp.parameter import Parameter
 from tractexp.plugin import discover, get
 from tractexp.record import Event
@@ -62,6 +61,14 @@ class Catalogue:
     def _named(self) -> dict[str, Candidate]:
         return {c.name: c for c in (*self.candidates, *self.members)}
 
+    def parameters(self, names: Sequence[str]) -> list[Parameter]:
+        """What effects bring with them."""
+        return [p for name in names for p in self[name].effect.parameters]
+
+    def sizes(self, names: Sequence[str]) -> list[Parameter]:
+        """Those of them that have a null."""
+        return [p for name in names for p in self[name].sizes]
+
     def family(self, name: str) -> str:
         """The textbook effect whose family an effect belongs to: itself, where it is one."""
         return self[name].effect.family or name
@@ -90,10 +97,7 @@ class Catalogue:
         return tuple(c.name for c in self.candidates if c.measurement)
 
 
-def catalogue(
-    motor: Motor, static: Static, present: Sequence[Effect], events: Sequence[Event], only: Sequence[str] = (),
-    swing: float = 0.05, domain: str = PHASORS,
-) -> Catalogue:  # fmt: skip
+def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = (), swing: float = 0.05) -> Catalogue:
     """The registered effects that the model lacks. `only` restricts it; faults of the measurement always stay.
     `swing` [Hz] is the change of the frequency that shows an effect of it.
 
@@ -103,19 +107,18 @@ def catalogue(
     for name in only:
         if name not in registered:
             raise UserError(f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}")
-    here = {effect.name for effect in present}
-    base = compose(motor, static, present, domain=domain)
+    here = {effect.name for effect in model.effects}
     testable, untestable, members = [], {}, []
     for name in sorted(registered):
         effect = get("effect", name)()
         if effect.family:
             wanted = not only or name in only or effect.family in only
-            if wanted and not here & {name, effect.family} and not base.acceptance(effect).refusal:
+            if wanted and not here & {name, effect.family} and not model.acceptance(effect).refusal:
                 members.append(candidate(effect))
             continue
         if name in here or (only and name not in only and not isinstance(effect, Measurement)):
             continue
-        if why := missing_channel(effect, events, swing) or base.acceptance(effect).refusal:
+        if why := missing_channel(effect, events, swing) or model.acceptance(effect).refusal:
             untestable[name] = why
         else:
             testable.append(candidate(effect))

@@ -48,7 +48,7 @@ class Chance:
 
 
 def chance_at(
-    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int = DRAWS
+    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:  # fmt: skip
     """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
 
@@ -60,13 +60,13 @@ def chance_at(
     plain = plain or is_noise_exact(context, noise)
 
     def draw() -> tuple[np.ndarray, ...]:
-        chance = _drawn(t, own, noise, quiet, seed, plain, draws)
+        chance = _drawn(t, own, noise, quiet, seed, plain)
         return chance.least_p, np.array([*chance.left]), *chance.left.values()
 
     if plain or not context.digest:
-        return _drawn(t, own, noise, quiet, seed, plain, draws)
+        return _drawn(t, own, noise, quiet, seed, plain)
     fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "context"}
-    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, draws)
+    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, DRAWS)
     least, names, *left = store.DRAWS.arrays(key, draw)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
@@ -79,7 +79,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = own.of(t.context.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)), DRAWS)))
+        drawn = own.of(t.context.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)))))
         by_test = surprises.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
@@ -89,9 +89,9 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 
 
 def _drawn(
-    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool, draws: int
+    t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:  # fmt: skip
-    drawn = _noise(t, noise, np.random.default_rng(seed), draws)
+    drawn = _noise(t, noise, np.random.default_rng(seed))
     if plain:
         return _chance(t, own.of(t.context.whiten(noise, drawn)), noise)
     rest = rich_residuals(t, drawn)
@@ -100,14 +100,14 @@ def _drawn(
         seen = quiet.of(t.unit, rest[b])
         return _chance(t, t.whitened(seen).of(t.context.whiten(seen, drawn[b : b + 1])), noise)
 
-    each = each_apart(anew, range(draws), t.context.effort.parts)
+    each = each_apart(anew, range(DRAWS), t.context.effort.parts)
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
     return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
-def _noise(t: Linearization, noise: Noise, rng: np.random.Generator, draws: int) -> np.ndarray:
+def _noise(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
     """Noise (b, C, N) [pu] where the events have samples that count."""
-    return noise.draw(rng, draws, np.diff(t.context.drive.first).tolist()) * t.context.valid
+    return noise.draw(rng, DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
 
 
 def is_noise_exact(context: Context, noise: Noise) -> bool:

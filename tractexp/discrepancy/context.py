@@ -68,13 +68,7 @@ class Context:
         return store.key(store.environment(), repr(parts), self.records.window, *content)
 
     @property
-    def waves(self) -> bool:
-        """Whether currents are compared, sample by sample, not the power of phasors."""
-        return self.load.waves
-
-    @property
     def domain(self) -> Domain:
-        """What the load is compared with."""
         return domain_of(self.load)
 
     @property

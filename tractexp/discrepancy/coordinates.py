@@ -62,7 +62,6 @@ class Coordinates:
         return {name: k for k, name in enumerate(self.names)}
 
     def width(self, name: str) -> float:
-        """Range of a parameter."""
         k = self.column[name]
         return float(self.upper[k] - self.lower[k])
 
@@ -78,11 +77,16 @@ class Coordinates:
 
     def sizes(self, effects: Sequence[str]) -> list[int]:
         """Columns of the effects' sizes."""
-        return [self.column[p.name] for n in effects for p in self.catalogue[n].sizes]
+        return [self.column[p.name] for p in self.catalogue.sizes(effects)]
 
     def parameters(self, effects: Sequence[str]) -> list[int]:
         """Columns of all the effects' parameters."""
-        return [self.column[p.name] for n in effects for p in self.catalogue[n].effect.parameters]
+        return [self.column[p.name] for p in self.catalogue.parameters(effects)]
+
+    def nuisances(self, effects: Sequence[str]) -> list[int]:
+        """Columns of what is free in a fit with these effects, then of the sizes of the faults of the measurement."""
+        free = [*self.base, *self.before, *self.parameters(effects)]
+        return free + self.sizes(self.catalogue.of_measurement)
 
     def settings(self, effects: Sequence[str]) -> list[int]:
         """Columns of what the effects have beside their sizes, such as thresholds and times."""

@@ -85,12 +85,16 @@ class Disagreement:
     @property
     def asks_for_more(self) -> bool:
         """Whether any further effect of the load helps more than chance does."""
-        level = self.chance.critical_p(self.criteria.naming)
-        if self.fit.names:
-            level = min(level, self.criteria.further_name(len(self.fit.names)))
-        elif self.faults:
+        level = self.level
+        if self.faults and not self.fit.names:
             level *= self.criteria.beside_measurement  # small p are uniform where nothing is missing
         return bool(self.scores) and self.scores[0].p < level
+
+    @property
+    def level(self) -> float:
+        """The p that one more name must undercut."""
+        level = self.chance.critical_p(self.criteria.naming)
+        return min(level, self.criteria.further_name(len(self.fit.names))) if self.fit.names else level
 
     @property
     def suffices(self) -> bool:
@@ -110,14 +114,10 @@ class Disagreement:
         """
         if self.noise.loudest_input_mode > self.criteria.blurred:
             return ()
-        level = self.chance.critical_p(self.criteria.naming)
-        if self.fit.names:
-            level = min(level, self.criteria.further_name(len(self.fit.names)))
-        return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < level))
+        return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < self.level))
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
-    """The tests of the base model."""
     return examined(base.quiet, base.fit, base.noise, seed)
 
 

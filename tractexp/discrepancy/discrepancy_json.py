@@ -10,7 +10,7 @@ from tractexp.discrepancy.forms import by_name, forms
 from tractexp.discrepancy.gap import Curves, GapTest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import estimates, own_parameters
+from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
@@ -39,7 +39,9 @@ def content(investigation: Findings) -> dict[str, Any]:
             "validate": None if investigation.validate is None else _gap(investigation.validate),
             "fitted_to_both": investigation.fitted_to_both,
         },
-        "contributions": contributions(investigation),
+        "contributions": [
+            {"effects": list(names), "model_error": files.plain(error)} for names, error in investigation.contributions
+        ],
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
         "candidates": [*sets(investigation), *_singles(investigation)],
@@ -96,8 +98,7 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
     if near is None:
         return None
     assert near.rival.tests is not None
-    unit, own = near.rival.fit.unit, own_parameters(investigation.context, near.names)
-    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, unit, near.names)}
+    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
     on = {"train": near.curves, "validate": near.carried}
     gaps = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
@@ -106,7 +107,7 @@ def _nearest(investigation: Findings) -> dict[str, Any] | None:
         "explained_held_out": files.plain(near.held_out),
         "gap": gaps,
         "others": [{"effects": list(names), "explained": files.plain(share)} for names, share in near.others],
-        "parameters": {name: by_name[name].plain() for name in own},
+        "parameters": {p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)},
     }
 
 
@@ -131,12 +132,6 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     }
 
 
-def contributions(investigation: Findings) -> list[dict[str, Any]]:
-    """The model's error with the names added one at a time, the one that helps most first; on held-out events."""
-    steps = investigation.contributions
-    return [{"effects": list(names), "model_error": files.plain(error)} for names, error in steps]
-
-
 def _error(error: ModelError) -> dict[str, Any]:
     return files.plain({"value": error.value, "interval": error.interval})
 
@@ -154,7 +149,6 @@ def write_left(investigation: Findings, path: Path) -> Path:
 
 
 def write_plugin(investigation: Findings, path: Path) -> Path:
-    """Write the plugin file of a proposal."""
     proposal = investigation.proposed.proposal
     assert proposal is not None
     return files.write(path, proposal.source)
@@ -174,8 +168,8 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
         if not names:
             continue
         status = "rejected" if rival.rejected else "adequate" if rival.adequate else "not adequate"
-        labels = [p.name for n in names for p in investigation.catalogue[n].effect.parameters]
-        values = {n: {"value": at.value(n, rival.fit.unit), "standard_error": None} for n in labels}
+        own = investigation.catalogue.parameters(names)
+        values = {p.name: {"value": at.value(p.name, rival.fit.unit), "standard_error": None} for p in own}
         ratio = files.plain(rival.lowered)
         rows.append({"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values})
     return rows

@@ -29,8 +29,6 @@ class Parts:
 class Effort:
     """Counts simulations and passes on what each step says. Used by many threads at once."""
 
-    simulations: int
-
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
         self.simulations, self._lock = 0, Lock()
         self._tell, self._all = tell, list[Effort]((self,))
@@ -59,7 +57,6 @@ class Effort:
             self._parts.remove(counted)
 
     def spend(self, simulations: int) -> None:
-        """Count simulations that are about to run."""
         with self._lock:
             self.simulations += simulations
 

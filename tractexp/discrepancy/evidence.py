@@ -37,7 +37,7 @@ class Evidence:
 
 def evidence(findings: Findings) -> list[Evidence]:
     """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
-    sets = [_of_set(findings, rival) for rival in findings.survivors.rivals if _names(findings, rival)]
+    sets = [_of_set(findings, rival) for rival in findings.survivors.rivals if findings.held_out.names_of(rival)]
     tested = {row.names for row in sets}  # of the chosen size
     rows = [*sets, *(row for row in _singles(findings) if row.names not in tested)]
     return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
@@ -90,10 +90,6 @@ def _verdict_on(findings: Findings, name: str) -> str:
     return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
 
 
-def _names(findings: Findings, rival: Rival) -> tuple[str, ...]:
-    return tuple(sorted((*rival.fit.names, *findings.held_out.faults)))
-
-
 def _of_set(findings: Findings, rival: Rival) -> Evidence:
     """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
     weighed, names = findings.held_out, rival.fit.names or findings.held_out.faults
@@ -102,21 +98,21 @@ def _of_set(findings: Findings, rival: Rival) -> Evidence:
     unit = weighed.extended.get(rival.fit.names, rival.fit).unit
     errors = {} if rival.tests is None else standard_errors(rival.tests)
     at = findings.context.coordinates
-    own = [p for name in names for p in findings.catalogue[name].sizes]
+    own = findings.catalogue.sizes(names)
     sizes = tuple(ParameterEstimate(p, at.value(p.name, unit), errors.get(p.name, np.nan)) for p in own)
     return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
 
 
 def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     """What became of a refitted set, and why."""
-    names = _names(findings, rival)
+    names = findings.held_out.names_of(rival)
     assessment = findings.held_out.assessments.get(rival.fit.names)
     if names in findings.verdict.sets:
         helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
         left = f"leaves no more than chance does{helps}"
         return (CHOSEN, left) if names == findings.names else (TIED, left)
     if rival.rejected:
-        names = _names(findings, findings.survivors.rivals[0])
+        names = findings.held_out.names_of(findings.survivors.rivals[0])
         best = names[0] if len(names) == 1 else "the best set"
         return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
     if rival.tests is None:

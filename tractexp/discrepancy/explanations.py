@@ -15,9 +15,9 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.discrepancy.families import against_members
+from tractexp.discrepancy.fit_effort import NEAR_BEST, NESTED_TOLERANCE
 from tractexp.discrepancy.fitting import (
-    NEAR_BEST,
-    NESTED_TOLERANCE,
+    Names,
     Refit,
     Start,
     best_of,
@@ -27,7 +27,6 @@ from tractexp.discrepancy.fitting import (
     rough_refit,
     wide_refits,
 )  # fmt: skip
-from tractexp.discrepancy.linearization import CandidateColumn
 from tractexp.discrepancy.score_test import Score
 from tractexp.discrepancy.window_search import behind_window
 from tractexp.identification.local_minima import DISTINCT
@@ -44,7 +43,6 @@ RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
 
-Names = tuple[str, ...]
 Refits = Mapping[Names, Refit]
 
 
@@ -280,23 +278,11 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
 
 def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
-    ranked, to = ranked_settings(at, name), at.context.coordinates
-    column, sizes = ranked[min(rank, len(ranked) - 1)]
-    values = dict(column.setting)
-    for p, size in zip(column.candidate.sizes, sizes, strict=True):
-        sign = column.candidate.sign(p)
-        moved = max(size * sign, column.candidate.relevant(p) * LEAST_START) * sign if sign else size
-        low, high = p.bounds
-        values[p.name] = float(np.clip(p.null + moved, low, high))
-    return to.placed(unit, values)
-
-
-def ranked_settings(at: Disagreement, name: str) -> list[tuple[CandidateColumn, np.ndarray]]:
-    """A candidate's settings by how much they lower the deviance, each with its one-step sizes."""
-    drops, _ = at.projection.drops
-    rows = []
-    for k, (column, block) in enumerate(zip(at.tangent.columns, at.projection.blocks, strict=True)):
-        if column.candidate.name == name:
-            size = -np.linalg.pinv(block @ block.T, rcond=1e-10, hermitian=True) @ (block @ at.projection.r[0])
-            rows.append((float(drops[k, 0]), column, size))
-    return [(c, s) for _, c, s in sorted(rows, key=lambda row: -row[0])]
+    ranked, candidate = at.projection.ranked[name], at.context.catalogue[name]
+    score = ranked[min(rank, len(ranked) - 1)]
+    values = dict(score.setting)
+    for p in candidate.sizes:
+        size, sign = score.size[p.name], candidate.sign(p)
+        moved = max(size * sign, candidate.relevant(p) * LEAST_START) * sign if sign else size
+        values[p.name] = float(np.clip(p.absent + moved, *p.bounds))
+    return at.context.coordinates.placed(unit, values)

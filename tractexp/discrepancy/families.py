@@ -16,14 +16,12 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fitting import Refit, Start, off_bounds, wide_refits
+from tractexp.discrepancy.fitting import Names, Refit, Start, off_bounds, wide_refits
 from tractexp.noise import Noise
 
 NEAREST = 4  # members that are searched to the end
 EXAMINED = 3  # members whose remainder is tested
 BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value starts
-
-Names = tuple[str, ...]
 
 
 def against_members(

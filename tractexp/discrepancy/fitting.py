@@ -7,31 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp import store
+from tractexp.discrepancy import fit_effort
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.fit_effort import (
-    BOUND_MARGIN,
-    EXACT_DESCENT,
-    FAR_BEHIND,
-    FAR_SHARE,
-    FIRST_ITERATIONS,
-    LEAST_GAIN,
-    MOST_MOVES,
-    MOST_STARTS,
-    MOST_TURNS,
-    MOVE_REACHES,
-    NEAR_BEST,
-    NESTED_TOLERANCE,
-    ROUGH_DESCENT,
-    SCATTER_POINTS,
-    SCATTER_REACH,
-    SCATTER_ROUNDS,
-    STARTS_IN_TURNS,
-)
 from tractexp.discrepancy.promising import promising
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
 
+Names = tuple[str, ...]
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
 
 
@@ -39,7 +22,7 @@ Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D
 class Refit:
     """The best fit of one set of effects: coordinates (D,) of the whole context and deviance."""
 
-    names: tuple[str, ...]
+    names: Names
     unit: np.ndarray
     deviance: float
     parameters: int  # of the effects
@@ -50,13 +33,9 @@ class Refit:
         return self.deviance + 2 * self.parameters
 
 
-def _cost(fit: Refit) -> float:
-    return fit.cost
-
-
 def best_of(fits: Iterable[Refit]) -> list[Refit]:
     """The best fit of each set, in order of cost."""
-    best: dict[tuple[str, ...], Refit] = {}
+    best: dict[Names, Refit] = {}
     for fit in sorted(fits, key=lambda r: (r.cost, r.names)):
         best.setdefault(fit.names, fit)
     return list(best.values())
@@ -67,12 +46,12 @@ def refit(context: Context, noise: Noise, wanted: Sequence[Start], faults: Seque
 
     Of several starts of one set the best is returned; the result is in order of cost.
     """
-    return best_of(_descended(context, noise, wanted, faults, EXACT_DESCENT))
+    return best_of(_descended(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
 
 
 def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
     """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
-    begun = _descended(context, noise, wanted, None, (FIRST_ITERATIONS, ROUGH_DESCENT[1]))
+    begun = _descended(context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]))
     best = best_of(begun)
     far = _far([r.cost for r in best])
     promising = [r.names for r in best if r.cost <= best[0].cost + far]
@@ -81,18 +60,27 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
         starts = sorted((r for r in begun if r.names == names), key=lambda r: r.deviance)
         again += [(names, r.unit) for r in starts[: -(-len(starts) // 2)]]
     return best_of(
-        [*best, *_descended(context, noise, again, None, (ROUGH_DESCENT[0] - FIRST_ITERATIONS, ROUGH_DESCENT[1]))]
+        [
+            *best,
+            *_descended(
+                context,
+                noise,
+                again,
+                None,
+                (fit_effort.ROUGH_DESCENT[0] - fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]),
+            ),
+        ]
     )
 
 
 def _far(costs: Sequence[float]) -> float:
     """How far behind the best of these a rough fit is given up."""
-    return max(FAR_BEHIND, FAR_SHARE * (max(costs) - min(costs)))
+    return max(fit_effort.FAR_BEHIND, fit_effort.FAR_SHARE * (max(costs) - min(costs)))
 
 
 def wide_refit(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None,
-    again: int = SCATTER_ROUNDS,
+    again: int = fit_effort.SCATTER_ROUNDS,
 ) -> list[Refit]:  # fmt: skip
     """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
 
@@ -102,22 +90,25 @@ def wide_refit(
     fits = _in_turns(context, noise, wanted, faults)
     for _ in range(again if context.coordinates.settings(fits[0].names) else 0):
         others = _in_turns(context, noise, scattered(context, fits[0]), faults)
-        if others[0].deviance > fits[0].deviance - LEAST_GAIN:
+        if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
             break
         fits = others
-    return refit(context, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + NEAR_BEST], faults)
+    return refit(
+        context, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + fit_effort.NEAR_BEST], faults
+    )
 
 
 def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
     """The best of these starts, moved and descended in turn until none gains that may end best; the best first."""
     fits = _begun(context, noise, wanted, faults)
-    for _ in range(MOST_TURNS):
+    for _ in range(fit_effort.MOST_TURNS):
         moved = [(f.names, moved_across(context, noise, f, faults)) for f in fits]
-        ended = _descended(context, noise, moved, faults, ROUGH_DESCENT)
+        ended = _descended(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
         best = min(f.deviance for f in (*fits, *ended))
         gains = [before.deviance - after.deviance for before, after in zip(fits, ended, strict=True)]
-        promising = [gain > max(LEAST_GAIN, f.deviance - best) for gain, f in zip(gains, ended, strict=True)]
-        fits = sorted((min(pair, key=lambda f: f.deviance) for pair in zip(fits, ended, strict=True)), key=_cost)
+        promising = [gain > max(fit_effort.LEAST_GAIN, f.deviance - best) for gain, f in zip(gains, ended, strict=True)]
+        better = [min(pair, key=lambda f: f.deviance) for pair in zip(fits, ended, strict=True)]
+        fits = sorted(better, key=lambda f: f.cost)
         if not any(promising):
             break
     return fits
@@ -133,27 +124,26 @@ def scattered(context: Context, fit: Refit) -> list[Start]:
     phi = 2.0
     for _ in range(50):
         phi = (1 + phi) ** (1 / (len(columns) + 1))
-    parts = np.outer(np.arange(1, SCATTER_POINTS + 1), phi ** -np.arange(1.0, len(columns) + 1)) % 1.0
-    units = np.repeat(fit.unit[None], SCATTER_POINTS, axis=0)
-    units[:, columns] = np.clip(units[:, columns] + SCATTER_REACH * (2 * parts - 1) ** 3, 0.0, 1.0)
+    parts = np.outer(np.arange(1, fit_effort.SCATTER_POINTS + 1), phi ** -np.arange(1.0, len(columns) + 1)) % 1.0
+    units = np.repeat(fit.unit[None], fit_effort.SCATTER_POINTS, axis=0)
+    units[:, columns] = np.clip(units[:, columns] + fit_effort.SCATTER_REACH * (2 * parts - 1) ** 3, 0.0, 1.0)
     return [(fit.names, unit) for unit in units]
 
 
 def wide_refits(
-    context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, others: Iterable[Refit] = (),
-    faults: Sequence[str] | None = None,
+    context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, others: Iterable[Refit] = ()
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations.
 
     What is far behind the best of `others` then is given up.
     """
-    begun = each_apart(lambda starts: _begun(context, noise, starts, faults), list(wanted), context.effort.parts)
+    begun = each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort.parts)
     begun.sort(key=lambda fits: fits[0].cost)
     if costs := [fit.cost for fit in others]:
         begun = [fits for fits in begun if fits[0].cost <= min(costs) + _far(costs)]
     begun = begun[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
-    search = lambda starts: wide_refit(context, noise, starts, faults)  # noqa: E731
+    search = lambda starts: wide_refit(context, noise, starts)  # noqa: E731
     return best_of(itertools.chain(*each_apart(search, again, context.effort.parts)))
 
 
@@ -161,10 +151,10 @@ def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequ
     """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
     names = wanted[0][0]
     nuisances = [*context.coordinates.base, *context.coordinates.before, *_with_prior(context, [names], faults)[0]]
-    units = promising(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, MOST_STARTS)
-    return sorted(
-        _descended(context, noise, [(names, u) for u in units], faults, (FIRST_ITERATIONS, ROUGH_DESCENT[1])), key=_cost
-    )[:STARTS_IN_TURNS]
+    units = promising(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, fit_effort.MOST_STARTS)
+    effort = fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]
+    begun = _descended(context, noise, [(names, u) for u in units], faults, effort)
+    return sorted(begun, key=lambda f: f.cost)[: fit_effort.STARTS_IN_TURNS]
 
 
 def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
@@ -174,27 +164,27 @@ def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[st
         return fit.unit
     prior = _with_prior(context, [fit.names], faults)[1]
     unit, deviance = fit.unit, fit.deviance
-    for _ in range(MOST_MOVES):
-        trials = np.repeat(unit[None], 2 * len(columns) * len(MOVE_REACHES), axis=0)
+    for _ in range(fit_effort.MOST_MOVES):
+        trials = np.repeat(unit[None], 2 * len(columns) * len(fit_effort.MOVE_REACHES), axis=0)
         for k, mine in zip(columns, np.split(trials, len(columns)), strict=True):
-            mine[:, k] = np.clip(mine[:, k] + np.r_[MOVE_REACHES, -MOVE_REACHES], 0.0, 1.0)
+            mine[:, k] = np.clip(mine[:, k] + np.r_[fit_effort.MOVE_REACHES, -fit_effort.MOVE_REACHES], 0.0, 1.0)
         rows = context.rows(trials, noise, prior, [fit.names] * len(trials))
         deviances = np.nan_to_num(np.einsum("nr,nr->n", rows, rows), nan=np.inf)
-        if not deviances.min() < deviance - LEAST_GAIN:
+        if not deviances.min() < deviance - fit_effort.LEAST_GAIN:
             break
         unit, deviance = trials[deviances.argmin()], float(deviances.min())
     return unit
 
 
 def no_worse_than_subsets(
-    context: Context, noise: Noise, refits: Mapping[tuple[str, ...], Refit], fits: Sequence[Refit]
+    context: Context, noise: Noise, refits: Mapping[Names, Refit], fits: Sequence[Refit]
 ) -> list[Refit]:  # fmt: skip
     """Refit from its best subset any set that came out worse than that subset."""
     again = []
     for fit in fits:
         subsets = [refits[s] for s in refits if set(s) < set(fit.names)]
         best = min(subsets, key=lambda r: r.deviance, default=None)
-        if best is not None and fit.deviance > best.deviance + NESTED_TOLERANCE:
+        if best is not None and fit.deviance > best.deviance + fit_effort.NESTED_TOLERANCE:
             again.append((fit.names, best.unit))
     if not again:
         return list(fits)
@@ -249,11 +239,18 @@ def _with_prior(
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
+def distances(context: Context, noise: Noise, fits: Sequence[Refit]) -> np.ndarray:
+    """Squared distances (n,) of fits from the first of them, in standard deviations; the faults' priors count."""
+    prior = context.coordinates.parameters(context.catalogue.of_measurement)
+    rows = context.rows(np.array([f.unit for f in fits]), noise, prior, [f.names for f in fits])
+    return ((rows - rows[0]) ** 2).sum(axis=1)
+
+
 def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
     """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`: there it has no
     slope. None where nothing rests."""
     moved, base = unit.copy(), context.coordinates.base
-    resting = base[(unit[base] <= BOUND_MARGIN) | (unit[base] >= 1 - BOUND_MARGIN)]
+    resting = base[(unit[base] <= fit_effort.BOUND_MARGIN) | (unit[base] >= 1 - fit_effort.BOUND_MARGIN)]
     moved[resting] = context.coordinates.null[resting] if to is None else to
     return [moved] if len(resting) else []
 

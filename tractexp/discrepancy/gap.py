@@ -83,12 +83,6 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
     measured = context.drive.measured
     calculated = residual[0] + measured
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
-    P, Q, error, i = _errors(context, calculated)
-    return Curves(calculated, P, Q, deviance, deviance / max(context.samples, 1), error, i)
-
-
-def _errors(context: Context, calculated: np.ndarray) -> tuple[float, float, ModelError, float | None]:
-    """epsilon_p, epsilon_q, the model's error and, of waveforms, epsilon_i of what is calculated (C, N) [pu]."""
     each = [
         context.domain.comparison(event, calculated[:, context.drive.part(e)]) for e, event in enumerate(context.events)
     ]
@@ -96,7 +90,8 @@ def _errors(context: Context, calculated: np.ndarray) -> tuple[float, float, Mod
     power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
     P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
     currents = [one.epsilon_i**2 for one in each if one.epsilon_i is not None]
-    return P, Q, model_error(each), float(np.sqrt(np.mean(currents))) if currents else None
+    i = float(np.sqrt(np.mean(currents))) if currents else None
+    return Curves(calculated, P, Q, deviance, deviance / max(context.samples, 1), model_error(each), i)
 
 
 def gap(
@@ -108,21 +103,12 @@ def gap(
     Coordinates `fitted` were fitted to these events in the extended model.
     """
     before, after = curves(context, base, noise, ()), curves(context, extended, noise, names)
-    gained, left = before.deviance - after.deviance, left_over(context, extended, names, noise, fitted)
+    gained, pushes = before.deviance - after.deviance, pushed(context, extended, names, noise)
+    left = beyond_chance(context, extended, names, noise, fitted, pushes)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = context.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
     return GapTest(before, after, float(gained), left, expected, context.criteria.shown, noise)
-
-
-def left_over(
-    context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray
-) -> float:
-    """How much more than chance pushes into all balances would still lower the deviance at coordinates (D,).
-
-    What is `fitted` is projected out.
-    """
-    return beyond_chance(context, unit, names, noise, fitted, pushed(context, unit, names, noise))
 
 
 def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
@@ -140,8 +126,7 @@ def beyond_chance(
 
     Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
     """
-    up, down = two_sided(unit, fitted)
-    raw = context.residuals(np.concatenate([unit[None], up, down]), names)
+    raw = context.residuals(np.concatenate([unit[None], two_sided(unit, fitted)[0]]), names)
     rows = np.nan_to_num(context.whiten(noise, raw))
     r, k = rows[0], len(fitted)
     nuisance = rows[1 : 1 + k] - rows[1 + k :]

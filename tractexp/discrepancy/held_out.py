@@ -6,12 +6,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.all_events import AllEvents, JointFit
+from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, refit, settled
+from tractexp.discrepancy.fitting import Names, Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.prediction import Predictions
@@ -19,8 +18,6 @@ from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
-
-Names = tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +89,10 @@ class HeldOut:
         for rival in (s for s in adequate if s.fit.names in helping):  # places and laws of a family: by the best's name
             of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
         return tuple(of_family.values())
+
+    def names_of(self, rival: Rival) -> Names:
+        """The effects of an explanation, with the faults of the measurement beside it."""
+        return tuple(sorted((*rival.fit.names, *self.faults)))
 
     def fitted_to_all(self, fits: Sequence[Refit]) -> "HeldOut":
         """With explanations that were fitted to all events."""
@@ -192,7 +193,11 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     plain = refit(both.context, search.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
     both = replace(both, faults=telling(search.explanations, plain))
     tried = both.carried_back([s.fit for s in of_all.values()], seed)
-    fits = [(alone, fitted.fit) for alone, fitted in tried if _borne_out(fitted, context.criteria)]
+    criteria, fits = context.criteria, list[tuple[Refit, Refit]]()
+    for alone, fitted in tried:  # several effects, chosen among hundreds of sets, must leave nothing
+        least = criteria.stands if len(fitted.fit.names) > 1 else criteria.adequate_p
+        if fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least:
+            fits.append((alone, fitted.fit))
     if not fits:
         return result
     quiet = surviving.explanations.base.quiet
@@ -206,13 +211,6 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     assessments = {**result.assessments, **judged_on(context, both.events, both.bare, [fit for _, fit in fits])}
     result = replace(result, survivors=surviving, assessments=assessments, faults=both.faults)
     return result.fitted_to_all([fit for _, fit in fits])
-
-
-def _borne_out(fitted: JointFit, criteria: Criteria) -> bool:
-    """Whether all events bear out what a search in them found; several effects, chosen among hundreds of sets, must
-    leave nothing."""
-    least = criteria.stands if len(fitted.fit.names) > 1 else criteria.adequate_p
-    return fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least
 
 
 def judged_on(

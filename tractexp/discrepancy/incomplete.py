@@ -12,7 +12,6 @@ from tractexp.discrepancy.gap import Curves, curves, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, carried, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import (
-    ErrorPredictions,
     Prediction,
     PredictionError,
     Predictions,
@@ -118,8 +117,13 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
         tests = None if rejected else least_squares_tests(explained.base.quiet, fit, predicted.noise, seed)
         return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, rejected, tests)
 
+    def assessed(one: PredictionError) -> Assessment:
+        other, units = predicted.context, (predicted.bare.unit, one.unit)
+        judged = gap(other, *units, one.names, predicted.noise, other.coordinates.before)
+        return Assessment(judged, other, units)
+
     retained, rejected = [rival(p, False) for p in explaining], [rival(p, True) for p in others]
-    assessments = {p.names: _assessed(predicted, p) for p in explaining}
+    assessments = {p.names: assessed(p) for p in explaining}
     own = {"noise": predicted.noise, "faults": (), "bare": bare}
     return _named(weighed, retained, rejected, assessments, predicted, **own)
 
@@ -135,9 +139,3 @@ def _named(
         weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted,
         **own,
     )  # fmt: skip
-
-
-def _assessed(predicted: ErrorPredictions, one: PredictionError) -> Assessment:
-    other, units = predicted.context, (predicted.bare.unit, one.unit)
-    judged = gap(other, *units, one.names, predicted.noise, other.coordinates.before)
-    return Assessment(judged, other, units)

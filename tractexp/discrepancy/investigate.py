@@ -189,9 +189,7 @@ def investigate(
     train, validate = (domain_of(model).events(events) for events in (train, validate))
     check_events(train, validate)
     with Effort(tell).audible() as effort:
-        missing = catalogue(
-            model.motor, model.static, model.effects, train, only, criteria.frequency_swing, model.domain
-        )
+        missing = catalogue(model, train, only, criteria.frequency_swing)
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 

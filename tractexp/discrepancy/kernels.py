@@ -71,14 +71,6 @@ class Family:
 class Kernels:
     """Simulates coordinates (n, D) by the kernel of a set of effects."""
 
-    family: Family
-    events: tuple[Event, ...]
-    bounds: Mapping[str, Sequence[float]]
-    fixed: Mapping[str, float]
-    bare: Problem
-    whole: Problem
-    substeps: int
-
     def __init__(
         self,
         family: Family,
@@ -129,12 +121,9 @@ class Kernels:
                 model = self.family.of(key)
                 bounds = {n: v for n, v in self.bounds.items() if n in model.names}
                 fixed = {n: v for n, v in self.fixed.items() if n in model.names}
-                self._likelihoods[key] = self._simulator(Problem(model, self.events, bounds, fixed, self.substeps))
+                problem = Problem(model, self.events, bounds, fixed, self.substeps)
+                unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
+                own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
+                columns = np.r_[own, len(self._column) + before].astype(int)
+                self._likelihoods[key] = Likelihood.of(problem, unweighted), columns
             return self._likelihoods[key]
-
-    def _simulator(self, problem: Problem) -> tuple[Likelihood, np.ndarray]:
-        before = len(self._column) + np.arange(2 * len(self.events))
-        unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
-        return Likelihood.of(problem, unweighted), np.r_[[self._column[n] for n in problem.space.names], before].astype(
-            int
-        )

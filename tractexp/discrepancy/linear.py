@@ -11,12 +11,17 @@ STEP = 1e-4  # of a coordinate's range
 
 
 def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (k, D) a small step above and below in each of the columns."""
-    up, down = (np.tile(unit, (len(columns), 1)) for _ in "ud")
-    for row, k in enumerate(columns):
-        up[row, k] = min(unit[k] + STEP, 1.0)
-        down[row, k] = max(unit[k] - STEP, 0.0)
-    return up, down
+    """Points (2 k, D) a small step above in each of the columns, then below, and how far they are apart (k,)."""
+    points, at = np.tile(unit, (2, len(columns), 1)), (np.arange(len(columns)), np.asarray(columns, dtype=int))
+    points[0][at] = np.minimum(unit[at[1]] + STEP, 1.0)
+    points[1][at] = np.maximum(unit[at[1]] - STEP, 0.0)
+    return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
+
+
+def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Difference quotients (k, ...) of what there is (2 k, ...) at such points."""
+    k = len(width)
+    return (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))
 
 
 def linearised(
@@ -27,12 +32,10 @@ def linearised(
     R = C N rows of the records, then those of the priors of the faults of the measurement.
     """
     at = context.coordinates
-    up, down = two_sided(unit, columns)
-    raw = context.residuals(np.concatenate([unit[None], up, down]), names)
+    points, width = two_sided(unit, columns)
+    raw = context.residuals(np.concatenate([unit[None], points]), names)
     k = len(columns)
-    width = np.array([u[c] - d[c] for u, d, c in zip(up, down, columns, strict=True)])
-    moved = np.nan_to_num((raw[1 : 1 + k] - raw[1 + k :]) / width[:, None, None])
-    white = context.whiten(noise, np.concatenate([raw[:1], moved]))
+    white = context.whiten(noise, np.concatenate([raw[:1], np.nan_to_num(slopes(raw[1:], width))]))
     held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
     prior = np.zeros((1 + k, len(held)))
     for row, (i, c) in enumerate(held):

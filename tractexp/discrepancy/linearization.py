@@ -10,7 +10,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fit_effort import BOUND_MARGIN
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.injection import perturbations
-from tractexp.discrepancy.linear import two_sided
+from tractexp.discrepancy.linear import slopes, two_sided
 from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
@@ -68,23 +68,20 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     explain is left. Those of effects are not: they belong to a formula, not to the load.
     """
     at = context.coordinates
-    inside = [*at.base, *at.before, *at.parameters(fit.names)]
     faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
-    nuisances = [*inside, *(k for members in faults.values() for k in members)]
-    up, down = two_sided(fit.unit, nuisances)
+    nuisances = at.nuisances(fit.names)
+    moved, width = two_sided(fit.unit, nuisances)
     points, spans, labels = _candidate_points(context, fit)
     injected, groups = perturbations(context, fit.unit)
     k, m = len(nuisances), len(points)
     sets = [(fit.names, False)] * (1 + 2 * k)
     sets += [(fit.names, True)] * (m + len(injected))
-    raw = context.residuals_of(np.concatenate([fit.unit[None], up, down, points, injected]), sets)
+    raw = context.residuals_of(np.concatenate([fit.unit[None], moved, points, injected]), sets)
     base = raw[0]
-    up_rows, down_rows = raw[1 : 1 + k], raw[1 + k : 1 + 2 * k]
-    width = np.array([u[c] - d[c] for u, d, c in zip(up, down, nuisances, strict=True)])
-    nuisance = np.nan_to_num((up_rows - down_rows) / width[:, None, None])
-    moved = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
+    nuisance = np.nan_to_num(slopes(raw[1 : 1 + 2 * k], width))
+    further = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
     perturbed = np.nan_to_num(raw[1 + 2 * k + m :] - base)
-    columns = [CandidateColumn(c, s, moved[a:b]) for c, s, a, b in labels]
+    columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))
     held = set(np.flatnonzero(resting(context, fit.unit, nuisances, white[:k] @ white[k])).tolist())
@@ -98,18 +95,7 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     split = _by_event(context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
     active_bounds = tuple(nuisances[i] for i in sorted(held))
     return Linearization(
-        context,
-        fit.unit,
-        base,
-        nuisance,
-        prior,
-        departure,
-        members,
-        tuple(columns),
-        split,
-        perturbed,
-        groups,
-        active_bounds,
+        context, fit.unit, base, nuisance, prior, departure, members, columns, split, perturbed, groups, active_bounds
     )
 
 

@@ -60,12 +60,12 @@ def on_held_out(
         return _each(
             assessment.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True
         )
-    other, units, noise = carried(context, withheld, [bare, *([nearest.rival.fit] if nearest else [])])
-    sets = [(), *([nearest.names] if nearest else [])]
-    curves = [
-        other.residuals(unit[None], names)[0] + other.drive.measured for unit, names in zip(units, sets, strict=True)
+    fits = [bare, *([nearest.rival.fit] if nearest else [])]
+    other, units, noise = carried(context, withheld, fits)
+    before, *near = [
+        other.residuals(unit[None], fit.names)[0] + other.drive.measured for unit, fit in zip(units, fits, strict=True)
     ]
-    return _each(other, noise, (curves[0], None, curves[1] if nearest else None), (), held_out=True)
+    return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
 
 
 def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:

@@ -8,7 +8,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from tractexp import files
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.identification.information import Information
 from tractexp.identification.uncertainty import LEVEL
@@ -57,13 +56,14 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     inverse = np.linalg.pinv(tests.root, rcond=1e-10)
     spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
-    columns = _columns(tests)
+    columns = at.nuisances(tests.fit.names)
     return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
 
 
 def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
     """Covariance (k, k) of those of the named parameters that the fit tells, and which they are."""
-    at, columns = tests.context.coordinates, _columns(tests)
+    at = tests.context.coordinates
+    columns = at.nuisances(tests.fit.names)
     inverse = np.linalg.pinv(tests.root, rcond=1e-10)
     identified = [n for n in names if at.column[n] in columns]
     rows = inverse[[columns.index(at.column[n]) for n in identified]]
@@ -78,9 +78,9 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     """
     context = tests.context
     at, errors = context.coordinates, standard_errors(tests)
-    own = [p for name in effects for p in context.catalogue[name].effect.parameters]
+    own = context.catalogue.parameters(effects)
     declared = {p.name: p for p in (*context.problem.parameters, *own)}
-    names = [*(at.names[k] for k in at.base), *own_parameters(context, effects)]
+    names = [*(at.names[k] for k in at.base), *(p.name for p in own)]
     seen = [n for n in names if n in errors]
     values = {n: at.value(n, unit) for n in names}
     words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
@@ -89,23 +89,12 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     return [ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
 
 
-def own_parameters(context: Context, effects: Sequence[str]) -> list[str]:
-    """Names of the parameters that effects bring with them."""
-    return [p.name for name in effects for p in context.catalogue[name].effect.parameters]
-
-
-def _columns(tests: Disagreement) -> list[int]:
-    """The coordinates of the nuisances, in the order of the projection's columns."""
-    at = tests.context.coordinates
-    inside = [*at.base, *at.before, *at.parameters(tests.fit.names)]
-    return inside + [k for name in at.catalogue.of_measurement for k in at.sizes([name])]
-
-
 def _words(
     tests: Disagreement, names: Sequence[str], values: Sequence[float], errors: Sequence[float]
 ) -> dict[str, str]:
     """The verdict of each parameter, with all other coordinates left free beside them."""
-    at, R, columns = tests.context.coordinates, tests.root, _columns(tests)
+    at, R = tests.context.coordinates, tests.root
+    columns = at.nuisances(tests.fit.names)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]
     lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))

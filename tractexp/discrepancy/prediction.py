@@ -113,7 +113,6 @@ class Predictions(Generic[OneSet]):
 
     @property
     def bare(self) -> OneSet:
-        """The base model."""
         return self.sets[()]
 
     def ranked(self, most: int, factor: float) -> list[OneSet]:
@@ -134,11 +133,9 @@ class Predictions(Generic[OneSet]):
                 chosen = best
         if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
             return []
-        others = [p for p in self.ranked(len(chosen.names), criteria.ahead) if p is not chosen]
-        return [chosen, *(p for p in others if self._rivals(p, chosen, criteria.ahead))]
-
-    def _rivals(self, one: OneSet, chosen: OneSet, factor: float) -> bool:
-        return one.ahead_of(self.bare, factor) and not chosen.ahead_of(one, factor)
+        factor = criteria.ahead
+        others = [p for p in self.ranked(len(chosen.names), factor) if p is not chosen]
+        return [chosen, *(p for p in others if p.ahead_of(self.bare, factor) and not chosen.ahead_of(p, factor))]
 
     def contributions(self, names: Names) -> list[OneSet]:
         """The base model, then with one member more at a time, the one that helps most: what each is good for."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.verdict import NONE, TIED
-from tractexp.identification.adequacy import Adequacy, Surprise, graded, loudest_stretch
+from tractexp.identification.adequacy import Adequacy, Grade, Surprise, graded, loudest_stretch
 from tractexp.identification.verdict import UNIDENTIFIED, size
 
 
@@ -20,7 +20,7 @@ def adequacy(findings: Findings) -> Adequacy:
     surprise = Surprise(p, tests.loudest, ratio, where)
     held_out = findings.validate and findings.validate.after.error
     grade = graded(surprise, findings.train.after.error, held_out, least_p=findings.context.criteria.adequate_p)
-    if grade.good and findings.verdict.word == TIED:
+    if grade.grade is Grade.ADEQUATE and findings.verdict.word == TIED:
         return replace(grade, sentence="it describes these events with any of the sets named; which is missing is open")
     return grade
 

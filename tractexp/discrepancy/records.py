@@ -32,7 +32,6 @@ class Records:
 
     @functools.cached_property
     def events(self) -> tuple[Event, ...]:
-        """What drives the simulation."""
         return tuple(s.event for s in self.smoothed)
 
     @property

@@ -133,7 +133,6 @@ class _Stretch:
 
     @property
     def size(self) -> int:
-        """Values that count."""
         return domain_of(self.event).values(self.drive)
 
     def white(self, rows: np.ndarray) -> np.ndarray:

@@ -15,7 +15,8 @@ from scipy.special import chdtrc
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.identification import surprises
 from tractexp.identification.problem import Problem
-from tractexp.identification.surprises import PER_EVENT, SMALLEST_P
+from tractexp.identification.surprises import DISTINCT, PER_EVENT, SMALLEST_P
+from tractexp.noise.span import spanned
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +30,7 @@ class CandidateColumn:
 
 @dataclass(frozen=True)
 class Score:
-    """What the score test says of one candidate, at its best setting."""
+    """What the score test says of one candidate at one setting."""
 
     name: str
     drop: float  # of the deviance
@@ -52,7 +53,7 @@ class ScoreTest:
     along: np.ndarray  # (b, k) the residuals' part along the nuisances
     departure: np.ndarray  # (k,) where the nuisances stand, off their prior mean
     blocks: list[np.ndarray]  # per column (k, R)
-    split: np.ndarray  # (e, R)
+    split: np.ndarray  # (e, R) what each parameter changes in one event alone
     perturbed: np.ndarray  # (c, R)
 
     def of(self, white: np.ndarray) -> "ScoreTest":
@@ -74,25 +75,24 @@ class ScoreTest:
         shape = (len(self.blocks), len(self.r))
         return np.array(drops).reshape(shape), np.array(ps).reshape(shape)
 
-    def scores(self) -> list[Score]:
-        """The candidates by drop, each at its best setting, for the fit's own residual."""
-        best: dict[str, Score] = {}
-        drops, ps = self.drops
-        for k, (column, block) in enumerate(zip(self.columns, self.blocks, strict=True)):
-            name = column.candidate.name
-            if name in best and best[name].drop >= drops[k, 0]:
-                continue
+    @functools.cached_property
+    def ranked(self) -> dict[str, list[Score]]:
+        """Each candidate at all its settings, the best first, for the fit's own residual."""
+        by_name: dict[str, list[Score]] = {}
+        drops, ps = (row[:, 0].tolist() for row in self.drops)
+        for column, block, drop, p in zip(self.columns, self.blocks, drops, ps, strict=True):
             gram = block @ block.T
             inverse = np.linalg.pinv(gram, rcond=1e-10, hermitian=True)
             size = -inverse @ (block @ self.r[0])
-            labels = [p.name for p in column.candidate.sizes]
-            spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-            spread = np.where(np.diag(gram) > 0, spread, np.inf)
-            best[name] = Score(
-                name, float(drops[k, 0]), float(ps[k, 0]), dict(zip(labels, size.tolist(), strict=True)),
-                dict(zip(labels, spread.tolist(), strict=True)), column.setting,
-            )  # fmt: skip
-        return sorted(best.values(), key=lambda s: (s.p, -s.drop))
+            spread = np.where(np.diag(gram) > 0, np.sqrt(np.maximum(np.diag(inverse), 0.0)), np.inf)
+            labels, name = [p.name for p in column.candidate.sizes], column.candidate.name
+            sizes, deviations = (dict(zip(labels, row.tolist(), strict=True)) for row in (size, spread))
+            by_name.setdefault(name, []).append(Score(name, drop, p, sizes, deviations, column.setting))
+        return {name: sorted(scores, key=lambda s: -s.drop) for name, scores in by_name.items()}
+
+    def scores(self) -> list[Score]:
+        """The candidates by p, each at its best setting, for the fit's own residual."""
+        return sorted((scores[0] for scores in self.ranked.values()), key=lambda s: (s.p, -s.drop))
 
     def fault_p(self) -> dict[str, np.ndarray]:
         """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior included."""
@@ -133,7 +133,7 @@ class ScoreTest:
             **surprises.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
-            by_test[PER_EVENT] = surprises.of_each_event(self.r, self.split, least=1e-12)
+            by_test[PER_EVENT] = ((self.r @ spanned(self.split, DISTINCT, 1e-12).T) ** 2).sum(axis=1)
         return by_test
 
 

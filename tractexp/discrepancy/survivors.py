@@ -10,12 +10,10 @@ event, would still explain.
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.discrepancy.fitting import Refit, distances, refit
 
 MOST = 6  # survivors whose adequacy is tested
 
@@ -72,11 +70,8 @@ def rivals(explained: Explanations) -> list[Rival]:
     fits = sorted(refit(context, noise, wanted), key=lambda fit: fit.names != chosen)
     base = refit(context, noise, [((), explained.steps[0].fit.unit)])[0]
     best = fits[0]
-    faults = context.coordinates.parameters(context.catalogue.of_measurement)
-    rows = context.rows(np.array([f.unit for f in fits]), noise, faults, [f.names for f in fits])
-    distances = ((rows - rows[0]) ** 2).sum(axis=1)
     ranked = []
-    for fit, distance in zip(fits, distances.tolist(), strict=True):
+    for fit, distance in zip(fits, distances(context, noise, fits).tolist(), strict=True):
         behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
         rejected = fit is not best and context.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
         ranked.append(Rival(fit, base.deviance - fit.deviance, behind, rejected))

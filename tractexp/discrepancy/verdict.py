@@ -61,13 +61,12 @@ class Verdict:
 
 
 def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
-    """Weigh what remains."""
     left = weighed.survivors
     explained = left.explanations
     context, first = explained.base.context, explained.steps[0]
     word = word_of(weighed)
     nearest = _nearest(context, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
-    sets = _sets(weighed) if word in (NAMED, TIED) else ()
+    sets = tuple(map(weighed.names_of, weighed.retained)) if word in (NAMED, TIED) else ()
     reason = _reason(word, weighed, sets, nearest)
     if weighed.together and weighed.retained:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
@@ -99,7 +98,6 @@ def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
 
 
 def word_of(weighed: HeldOut) -> str:
-    """What it comes to."""
     explained, left = weighed.survivors.explanations, weighed.survivors
     first = explained.steps[0]
     if explained.empty and first.adequate:
@@ -111,23 +109,13 @@ def word_of(weighed: HeldOut) -> str:
     return NAMED if len(weighed.retained) == 1 else TIED
 
 
-def _sets(weighed: HeldOut) -> tuple[tuple[str, ...], ...]:
-    """The effects of each explanation that is kept, with the faults of the measurement beside it."""
-    return tuple(_with_faults(s, weighed) for s in weighed.retained)
-
-
 def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
     """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
     catalogue = weighed.survivors.explanations.base.context.catalogue
     return [catalogue.spoken(name) for name in names]
 
 
-def _with_faults(rival: Rival, weighed: HeldOut) -> tuple[str, ...]:
-    return tuple(sorted((*rival.fit.names, *weighed.faults)))
-
-
 def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest: Nearest | None) -> str:
-    """The sentence behind the word."""
     left = weighed.survivors
     first = left.explanations.steps[0]
     if weighed.leaves_more:
@@ -139,7 +127,7 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     if word == UNEXPLAINED and not left.adequate:
         return _unexplained(weighed, nearest)
     if not weighed.retained and left.adequate and not left.explanations.empty:
-        seemed = " or ".join(joined(_spoken(_with_faults(s, weighed), weighed)) for s in left.adequate)
+        seemed = " or ".join(joined(_spoken(weighed.names_of(s), weighed)) for s in left.adequate)
         if word == UNEXPLAINED:
             return f"what explains the fitted events, {seemed}, does not hold on the held-out ones: {_denied(weighed)}"
         return (

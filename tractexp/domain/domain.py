@@ -10,7 +10,7 @@ import numpy as np
 from tractexp.domain.playback import Playback
 from tractexp.domain.port import Complex, Port
 from tractexp.errors import UserError
-from tractexp.model.drive import IN_WORDS, OUTPUTS, Drive, Excitation, WaveformDrive
+from tractexp.model.drive import OUTPUTS, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import RandomWalk
@@ -39,7 +39,6 @@ class Domain(ABC):
     setting: ClassVar[str]  # what a command needs to choose it, with a space behind it
     compared: ClassVar[str]  # in a sentence
     epsilons: ClassVar[tuple[str, ...]]  # relative errors of each event, as result.json has them
-    unit: ClassVar[str] = "pu"
     # integration
     finest: ClassVar[float]  # pu, largest error of the automatic Runge-Kutta step
     probed: ClassVar[float]  # share of the candidates across the box on which that is judged
@@ -64,11 +63,6 @@ class Domain(ABC):
     def channels(self) -> tuple[str, ...]:
         """Names of what is compared."""
         return OUTPUTS[self.name]
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        """The same as pages say it."""
-        return tuple(IN_WORDS.get(name, name) for name in self.channels)
 
     @abstractmethod
     def event(self, event: Event) -> Event:

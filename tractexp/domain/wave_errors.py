@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.domain.excitation import waveforms
 from tractexp.model.drive import Drive
 from tractexp.noise.color import SMALLEST
-from tractexp.record import WaveEvent
+from tractexp.record import Event, WaveEvent
 
 if TYPE_CHECKING:
     from tractexp.identification.problem import Problem
@@ -37,15 +36,10 @@ def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarra
     assert isinstance(event, WaveEvent)
     noise = max(event.noise_U, SMALLEST)
     shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]  # the zero's is a third
-    events: Sequence[WaveEvent] = [event, *(_struck(event, *shock) for shock in shocks)]
-    drive = Drive.of([waveforms(e) for e in events])
-    own = np.tile(problem.by_event(values)[:1], (len(events), 1, 1))
-    response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[:1], len(events)))
-    seen = response.outputs[:, 0].reshape(drive.channels, len(events), -1)[:, :, : event.start]
-    off = _finite(seen[:, 1:] - seen[:, :1])
+    off = _differences(problem, values, 0, [_struck(event, *shock) for shock in shocks])[:, :, : event.start]
     if event.phases == 1:
         return off[0, 0], np.zeros(1)
-    return (off[0, 0] + 1j * off[1, 0] - 1j * (off[0, 1] + 1j * off[1, 1])) / 2, off[2, 2]
+    return (off[0, 0] + 1j * off[0, 1] - 1j * (off[1, 0] + 1j * off[1, 1])) / 2, off[2, 2]
 
 
 def input_errors(problem: "Problem", values: np.ndarray) -> np.ndarray:
@@ -62,17 +56,19 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
     assert isinstance(plain, WaveEvent)
-    one = Drive.of([waveforms(e) for e in (plain, *_shifted(plain), *_between(plain))])
-    own = np.tile(problem.by_event(values)[[event]], (one.events, 1, 1))
-    outputs = problem.model.simulate(one, own, np.tile(problem.step.substeps[[event]], one.events)).outputs[:, 0]
-    outputs = outputs.reshape(one.channels, one.events, -1).swapaxes(0, 1)
-    shapes = np.zeros((len(outputs) - 1, *drive.measured.shape))
-    shapes[:, :, part] = _finite(outputs[1:] - outputs[0]) * (drive.weights[:, part] > 0)
+    off = _differences(problem, values, event, [*_shifted(plain), *_between(plain)])
+    shapes = np.zeros((len(off), *drive.measured.shape))
+    shapes[:, :, part] = off * (drive.weights[:, part] > 0)
     return shapes
 
 
-def _finite(off: np.ndarray) -> np.ndarray:
-    """Differences of responses [pu]; what diverged tells nothing."""
+def _differences(problem: "Problem", values: np.ndarray, event: int, variants: Sequence[Event]) -> np.ndarray:
+    """What variants of an event's voltage change in its currents, (n, 3, N) [pu]; what diverged tells nothing."""
+    drive = Drive.of([problem.domain.excitation(e) for e in (problem.events[event], *variants)])
+    own = np.tile(problem.by_event(values)[[event]], (drive.events, 1, 1))
+    response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[[event]], drive.events))
+    outputs = response.outputs[:, 0].reshape(drive.channels, drive.events, -1).swapaxes(0, 1)
+    off = outputs[1:] - outputs[0]
     return np.where(np.abs(off) < DIVERGED, off, 0.0)
 
 

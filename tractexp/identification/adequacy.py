@@ -21,6 +21,7 @@ from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import ModelError
 from tractexp.identification.observed import Observed
 from tractexp.identification.problem import Problem
+from tractexp.identification.sandwich import off_walls
 from tractexp.identification.separable import Sensitivities, SeparableBasis
 from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, tail
 
@@ -28,7 +29,6 @@ DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
 # where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
 ADEQUATE_P = 0.001
-WALL = 1e-3  # of a range: what rests on a bound takes nothing from the residual
 SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 WRONG = 0.2  # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
@@ -70,10 +70,6 @@ class Adequacy:
     sentence: str
     p: float | None
 
-    @property
-    def good(self) -> bool:
-        return self.grade is Grade.ADEQUATE
-
     def to_dict(self) -> dict[str, Any]:
         """As `result.json` has it."""
         return {"grade": str(self.grade), "sentence": self.sentence, "p": self.p}
@@ -81,7 +77,7 @@ class Adequacy:
 
 def surprise(
     observed: Observed, likelihood: Likelihood, unit: np.ndarray, squares: Likelihood | None = None,
-    least: float = np.inf, seed: int = SEED,
+    least: float = np.inf,
 ) -> Surprise:  # fmt: skip
     """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too little quiet.
 
@@ -90,10 +86,10 @@ def surprise(
     if likelihood.noise.mix is None or not observed.problem.quiet:
         return Surprise(None, "", None, "")
     rows, J = likelihood.jacobian(unit)
-    inside = _inside(unit)
+    inside = off_walls(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(SEED)
     drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
@@ -144,7 +140,7 @@ class Excess:
         """Of the fit at coordinates (D,), where `least` is the least sum of squares."""
         likelihood = squares.with_initial_power
         rows, plain = likelihood.jacobian(unit)
-        inside, of_records = _inside(unit), np.array([rows @ rows / max(least, 1e-300)])
+        inside, of_records = off_walls(unit), np.array([rows @ rows / max(least, 1e-300)])
         free = plain.only(inside & (np.arange(len(inside)) < plain.k))
         return cls(of_records, likelihood, J, plain, plain.only(inside), free.basis())
 
@@ -155,11 +151,6 @@ class Excess:
         shifted = raw + self.plain.times(np.pad(_means(self.likelihood, drawn), ((0, 0), (k, 0))))
         rest = self.squares.without(shifted)
         return (likely**2).sum(axis=1) / np.maximum((rest**2).sum(axis=1), 1e-300)
-
-
-def _inside(unit: np.ndarray) -> np.ndarray:
-    """Which coordinates (D,) rest on no bound."""
-    return (unit > WALL) & (unit < 1 - WALL)
 
 
 def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@ from tractexp import files
 from tractexp.identification.descent import MOST_NUMBERS, Rows, descend
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
+from tractexp.identification.separable import Sensitivities
 from tractexp.identification.uncertainty import Uncertainty
 
 DISAGREES = 0.01  # p-value below which an event does not fit with the others
@@ -33,7 +34,7 @@ class EventAgreement:
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
     likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
-    _, J = likelihood.of_records.jacobian(uncertainty.unit)
+    _, J = uncertainty.sensitivities
     own = J.without_own
 
     def errors(triangle: np.ndarray) -> np.ndarray:
@@ -72,7 +73,7 @@ def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     left, odd, notes = list(range(likelihood.problem.drive.events)), list[str](), list[str]()
     freedom = max(int(np.count_nonzero(uncertainty.information.identifiable)), 1)
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
-    linear = _linear(likelihood, uncertainty.unit)
+    linear = _linear(*uncertainty.sensitivities)
     while len(left) > 1:
         suspects = [left[k] for k in np.argsort(-_excess([linear[e] for e in left]), kind="stable")[:SUSPECTS]]
         groups = [left, *([o for o in left if o != e] for e in suspects), *([e] for e in suspects)]
@@ -94,9 +95,8 @@ def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     return odd, notes
 
 
-def _linear(likelihood: Likelihood, unit: np.ndarray) -> list[np.ndarray]:
-    """Sensitivities and, last, the rows of each event at coordinates (D,), less what its own P0 and Q0 take."""
-    rows, J = likelihood.of_records.jacobian(unit)
+def _linear(rows: np.ndarray, J: Sensitivities) -> list[np.ndarray]:
+    """Sensitivities and, last, the rows (R,) of each event, less what its own P0 and Q0 take."""
     both = replace(J, columns=np.insert(J.columns, J.k, rows, axis=0), k=J.k + 1).without_own
     return [both[mine] for mine in J.rows]
 

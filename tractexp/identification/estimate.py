@@ -21,14 +21,13 @@ import numpy as np
 from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.blocks import blocks_of, exceeds
-from tractexp.identification.descent import Descent, descend
+from tractexp.identification.descent import Descent
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.local_minima import along_least_certain, distinct, explored, screened
 from tractexp.identification.observed import Observed
 from tractexp.identification.prior import held_in_words
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
-from tractexp.identification.verdict import elsewhere
 from tractexp.noise.color import FEWEST, SMALLEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 
@@ -103,9 +102,8 @@ class DescentEnds:
 
     def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""
-        return self.joined(
-            descend(self.likelihood.rows, along_least_certain(self.likelihood, self.best)), "beside the best"
-        )
+        beside = along_least_certain(self.likelihood, self.best)
+        return self.joined(self.likelihood.descent(beside), "beside the best")
 
     def no_worse(self, unit: np.ndarray) -> bool:
         """Whether coordinates (D,) of the likelihood fit as well by Eq. (8) as the best do, as far as chance explains.
@@ -148,7 +146,7 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     if not problem.loss.quadratic:
         return _robust(problem, values)
     ends, best = _of_box(problem)
-    own = descend(ends.likelihood.rows, ends.likelihood.to_unit(values))
+    own = ends.likelihood.descent(ends.likelihood.to_unit(values))
     whole = ends.joined(own, "search")
     if best is None or own.deviance[0] < ends.lowest - BETTER:
         return _finished(whole.looked_beside())
@@ -160,7 +158,7 @@ def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     observed = Observed.of(problem)
     squares = Likelihood.of_squares(observed.problem, _level(observed.problem, values))
     squares = cleaned(squares, squares.to_unit(values))
-    ends = DescentEnds(observed, squares, descend(squares.rows, squares.to_unit(values)), ("search",))
+    ends = DescentEnds(observed, squares, squares.descent(squares.to_unit(values)), ("search",))
     return _finished(ends.looked_beside(), robust=True)
 
 
@@ -184,7 +182,7 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
         ends = _in_own_units(ends)
         for _ in range(ROUNDS):
             ends = _without_offsets(ends)
-        refined = descend(ends.likelihood.rows, distinct(ends.descent, likelihood.free))
+        refined = ends.likelihood.descent(distinct(ends.descent, likelihood.free))
         ends = ends.joined(refined, "box").looked_beside()
         _remembered[key] = ends, _finished(ends)
         if len(_remembered) > REMEMBERED:
@@ -210,7 +208,7 @@ def _without_offsets(ends: DescentEnds) -> DescentEnds:
         return ends
     squares = ends.likelihood
     likelihood = replace(squares, noise=replace(squares.noise, input_modes=offsets))
-    return replace(ends, likelihood=likelihood, descent=descend(likelihood.rows, ends.descent.unit))
+    return replace(ends, likelihood=likelihood, descent=likelihood.descent(ends.descent.unit))
 
 
 def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
@@ -222,7 +220,7 @@ def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
         return _of_squares(ends, likelihood, surprising)
     whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
-    result = descend(likelihood.rows, units, apart=likelihood.apart)
+    result = likelihood.descent(units)
     best = int(result.deviance.argmin())
     if not ends.no_worse(result.unit[best]):
         return _of_squares(ends, likelihood, surprising)
@@ -253,8 +251,7 @@ def _held(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
     """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it and the usual."""
     space, defaults = likelihood.problem.space, likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
-    ends = descend(likelihood.rows, np.concatenate([starts, explored(likelihood).unit]))
-    return distinct(ends, likelihood.free)
+    return distinct(likelihood.descent(np.concatenate([starts, explored(likelihood).unit])), likelihood.free)
 
 
 def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
@@ -266,7 +263,7 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
         if robust:
             likelihood = cleaned(likelihood, units[:1])
         likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], input_modes))
-        result = descend(likelihood.rows, units, apart=likelihood.apart)
+        result = likelihood.descent(units)
         order = np.argsort(result.deviance, kind="stable")
         units = result.unit[order[result.deviance[order] <= result.deviance.min() + BEHIND]]
     return likelihood, units
@@ -329,5 +326,6 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals
     for minimum in local_minima:
         for j in np.flatnonzero((minimum.values < own[:, 0]) | (minimum.values > own[:, 1])):
-            verdicts[uncertainty.names[j]] = elsewhere(verdicts[uncertainty.names[j]], float(minimum.values[j]))
+            name, value = uncertainty.names[j], float(minimum.values[j])
+            verdicts[name] = verdicts[name].weakened(f"another valley, at {value:.4g}, fits as well")
     return replace(uncertainty, verdicts=verdicts, local_minima=tuple(local_minima))

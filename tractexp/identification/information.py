@@ -1,7 +1,8 @@
 """What the records say about each parameter: the information matrix, its directions, and the intervals it gives."""
 
+import functools
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,31 +34,24 @@ class Information:
         basis, _ = np.linalg.qr(active)
         return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
 
-    _directions: np.ndarray = field(init=False, repr=False)  # rows, in ranges
-    _singular: np.ndarray = field(init=False, repr=False)
-    _seen: np.ndarray = field(init=False, repr=False)
-    _blind: np.ndarray = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
+    @functools.cached_property
+    def _directions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows, in ranges: those that the records see over their singular values, those they do not; who is blind."""
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
         _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
-        seen = singular > self.structural * singular.max(initial=0.0)
-        object.__setattr__(self, "_directions", directions / scale)
-        object.__setattr__(self, "_singular", singular)
-        object.__setattr__(self, "_seen", seen & (singular > 0))
-        object.__setattr__(self, "_blind", size == 0)
+        seen, directions = singular > self.structural * singular.max(initial=0.0), directions / scale
+        return directions[seen] / singular[seen, None], directions[~seen], size == 0
 
     @property
     def blind(self) -> tuple[str, ...]:
         """Parameters that change nothing by themselves."""
-        return tuple(name for name, blind in zip(self.names, self._blind, strict=True) if blind)
+        return tuple(name for name, blind in zip(self.names, self._directions[2], strict=True) if blind)
 
     @property
     def covariance(self) -> np.ndarray:
         """(d, d) physical, of the directions that the records see. See `unseen` for those they do not."""
-        seen = self._directions[self._seen] / self._singular[self._seen, None]
-        scaled = seen * self.width
+        scaled = self._directions[0] * self.width
         return scaled.T @ scaled
 
     @property
@@ -66,9 +60,10 @@ class Information:
 
         Each is scaled to a largest component of 1. Where a value is 0 the change is in ranges.
         """
-        null = self._directions[~self._seen] * self.width / np.where(self.values == 0, self.width, self.values)
-        alone = np.eye(len(self.names))[self._blind]
-        null = null * ~self._blind
+        _, null, blind = self._directions
+        null = null * self.width / np.where(self.values == 0, self.width, self.values)
+        alone = np.eye(len(self.names))[blind]
+        null = null * ~blind
         return _echelon(np.concatenate((alone, null[np.any(null != 0, axis=1)])))
 
     @property

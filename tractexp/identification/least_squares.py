@@ -23,10 +23,6 @@ ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent tha
 class Elite:
     """The best points a search has met that lie apart from each other, best first: where a polish starts."""
 
-    box: Box
-    x: np.ndarray
-    f: np.ndarray
-
     def __init__(self, box: Box):
         self.box = box
         self.x, self.f = np.empty((0, box.dimension)), np.empty(0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.identification.descent import central_differences
+from tractexp.identification.descent import Descent, central_differences, descend
 from tractexp.identification.prior import departures
 from tractexp.identification.problem import Problem
 from tractexp.identification.separable import Sensitivities, SeparableColumns
@@ -146,6 +146,12 @@ class Likelihood:
         """Whitened rows (R,) at one point (D,) of the unit cube, and their central differences."""
         rows, J = central_differences(self.rows, unit[None], np.zeros(1, dtype=int), self.apart)
         return rows[0], Sensitivities(J[0], self.free, self.apart.rows)
+
+    def descent(
+        self, start: np.ndarray, frozen: np.ndarray | None = None, iterations: int = 40, tolerance: float = 1e-4
+    ) -> Descent:
+        """The ends of descents of the deviance from coordinates (n, D); see `descend`."""
+        return descend(self.rows, start, frozen, iterations, tolerance, self.apart)
 
     @functools.cached_property
     def apart(self) -> SeparableColumns:

@@ -5,7 +5,7 @@ What a model seems to miss in a wrong valley is not missing, and what is estimat
 
 import numpy as np
 
-from tractexp.identification.descent import Descent, descend
+from tractexp.identification.descent import Descent
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.parameter import best_distinct, even
@@ -27,20 +27,11 @@ def screened(problem: Problem) -> tuple[np.ndarray, float]:
 
 def explored(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
     """Where descents from promising `points` (n, d) of the box, by default those screened, end: at most 10."""
-    apart = likelihood.apart
     points = screened(likelihood.problem)[0] if points is None else points
-    begun = descend(likelihood.rows, likelihood.placed(points), None, FEW, TOLERANCE, apart)
+    begun = likelihood.descent(likelihood.placed(points), None, FEW, TOLERANCE)
     free = slice(points.shape[1])
     promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
-    return descend(likelihood.rows, promising, None, MORE, TOLERANCE, apart)
-
-
-def best_fits(likelihood: Likelihood) -> np.ndarray:
-    """Coordinates (at most 4, free + 2 E) of the best fits of distinct valleys: parameters, P0 and Q0 of each event.
-
-    The best of them may not stay so once what the recorder did is free.
-    """
-    return distinct(explored(likelihood), likelihood.free)
+    return likelihood.descent(promising, None, MORE, TOLERANCE)
 
 
 def distinct(ends: Descent, free: int) -> np.ndarray:

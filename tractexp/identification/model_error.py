@@ -9,24 +9,14 @@ whether something is left; this says how much it matters.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
+from tractexp.domain import Playback
 from tractexp.identification.blocks import LENGTH, quantile
 from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
-
-
-class PlayedEvent(Protocol):
-    """An event, and P and Q (N,) [pu] that a model calculates of it."""
-
-    @property
-    def event(self) -> Event: ...
-    @property
-    def P(self) -> np.ndarray: ...
-    @property
-    def Q(self) -> np.ndarray: ...
 
 
 @dataclass(frozen=True)
@@ -47,7 +37,6 @@ class ModelError:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "ModelError":
-        """From `to_dict`."""
         low, high = content["interval"]
         return cls(content["value"], (low, high), content["of_S"], content["value"] ** 2)
 
@@ -61,7 +50,7 @@ def in_percent(share: float) -> str:
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
-def model_error(played: Sequence[PlayedEvent]) -> ModelError:
+def model_error(played: Sequence[Playback]) -> ModelError:
     """The error of a model over some events together."""
     sums = np.concatenate([block_sums(one) for one in played])  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
@@ -76,7 +65,7 @@ def model_error(played: Sequence[PlayedEvent]) -> ModelError:
     return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)), ratio)
 
 
-def block_sums(played: PlayedEvent) -> np.ndarray:
+def block_sums(played: Playback) -> np.ndarray:
     """Squares of what is left, of the response, both less those of the noise, and of the power; by block (b, 3)."""
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0

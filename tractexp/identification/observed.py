@@ -75,19 +75,14 @@ class Observed:
 
         Where a record has less noise than the model has error, what is left at its end is the model's.
         """
-        before = [part for part, calm in self._stretches if calm]
-        after = [part for part, calm in self._stretches if not calm]
+        starts = [int(self.drive.first[e]) + event.start for e, event in enumerate(self.events)]
+        before = [part for part in self.problem.quiet if part.stop in starts]
+        after = [part for part in self.problem.quiet if part.stop not in starts]
         for c in np.flatnonzero(valid.any(axis=1)):
             calm, late = ([without_slow(residuals[c, p][valid[c, p]]) for p in parts] for parts in (before, after))
             if louder(late, calm):
                 return before
         return self.problem.quiet
-
-    @functools.cached_property
-    def _stretches(self) -> list[tuple[slice, bool]]:
-        """The quiet stretches, and whether each lies before its dip."""
-        starts = [int(self.drive.first[e]) + event.start for e, event in enumerate(self.events)]
-        return [(part, part.stop in starts) for part in self.problem.quiet]
 
     def input_errors(self, values: np.ndarray) -> np.ndarray | None:
         """What errors of the record do to what is compared at free values (d,): (k, C, N) [pu], None where it has none.

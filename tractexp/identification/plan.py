@@ -102,10 +102,10 @@ class Forecast:
         return self.half / np.maximum(np.abs(self.values), 1e-12)
 
 
-def normal_quantile(level: float = LEVEL) -> float:
+def normal_quantile() -> float:
     from scipy.special import ndtri
 
-    return float(ndtri((1 + level) / 2))
+    return float(ndtri((1 + LEVEL) / 2))
 
 
 def like(problem: Problem, events: Sequence[Event]) -> Problem:

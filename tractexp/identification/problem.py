@@ -152,7 +152,10 @@ class Problem:
         self.per_event = tuple(name for name in model.names if name in own)
         self.loss = loss or Loss()
         self._rest = np.array([self.fixed.get(name, np.nan) for name in model.names])
-        self._columns = np.array([self._sources(e) for e in range(len(self.events))])  # (E, d), -1: fixed
+        where = {name: k for k, name in enumerate(self.space.names)}
+        self._columns = np.array([  # (E, d), of the free values; -1: fixed
+            [where.get(n, where.get(f"{n}[{e}]", -1)) for n in model.names] for e in range(1, len(self.events) + 1)
+        ])  # fmt: skip
         self.drive = self._driven()
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
@@ -199,11 +202,6 @@ class Problem:
         """The events end to end, squared errors weighed as the loss says."""
         weights = self.loss.weight_P, self.loss.weight_Q
         return Drive.of([self.domain.excitation(e, self.model, weights) for e in self.events])
-
-    def _sources(self, event: int) -> list[int]:
-        """Which free column each parameter of the model is taken from in an event, -1 where it is fixed."""
-        where = {name: k for k, name in enumerate(self.space.names)}
-        return [where.get(n, where.get(f"{n}[{event + 1}]", -1)) for n in self.model.names]
 
     def by_event(self, values: np.ndarray) -> np.ndarray:
         """Free values (n, free) -> all parameters of the model in each event (E, n, d)."""

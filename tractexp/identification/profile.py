@@ -17,7 +17,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from tractexp.identification.descent import descend
+from tractexp.identification.descent import Descent
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import (
     BOUND,
@@ -194,19 +194,10 @@ def profiles(
         simulations += drawing.simulations
         if drawing.better is None or restarts == RESTARTS:
             return Profiles(uncertainty, tuple(drawing.curves), threshold(), simulations, restarts, drawing.region)
-        descent = descend(uncertainty.likelihood.rows, drawing.better[None], apart=uncertainty.likelihood.apart)
+        descent = uncertainty.likelihood.descent(drawing.better[None])
         simulations += descent.simulations
         uncertainty = uncertainty.at(descent.unit[0])
         restarts += 1
-
-
-@dataclass(frozen=True, eq=False)
-class _Places:
-    """Where lanes begin: the parameter's column (k,), coordinates (k, D) and how far the deviance is up there (k,)."""
-
-    column: np.ndarray
-    unit: np.ndarray
-    rise: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -242,16 +233,14 @@ class _Drawing:
         self.simulations = 0
 
     def begin(self, points: int, ended: Callable[[], None]) -> None:
-        """Lanes from the optimum."""
         k = len(self.column)
-        lanes = self._run(_Places(self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k)), points, ended)
+        lanes = _Lanes(self.uncertainty, self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k))
+        self._run(lanes, points, ended)
         self.curves = [lanes.profile(i) for i in range(k)]
 
     def look_elsewhere(self, points: int) -> None:
         """Lanes from where the rest of a range fits as well."""
-        places, spent = _elsewhere(self.uncertainty, self.column, self.curves)
-        self.simulations += spent
-        self._join(places, points)
+        self._join(_elsewhere(self.uncertainty, self.column, self.curves), points)
 
     def go_on(self, points: int) -> bool:
         """Lanes from points of all lanes that fit and lie beyond a profile's interval; False where there are none."""
@@ -259,20 +248,20 @@ class _Drawing:
                  for k in self.region.outermost(int(c), *_in_range(self.uncertainty, int(c), p.interval))]  # fmt: skip
         if where:
             c, k = np.array(where).T
-            self._join(_Places(c, self.region.unit[k], self.region.rise[k, c] * threshold()), points)
+            rise = self.region.rise[k, c] * threshold()
+            self._join(_Lanes(self.uncertainty, c, self.region.unit[k], rise), points)
         return bool(where)
 
-    def _join(self, places: "_Places", points: int) -> None:
-        lanes = self._run(places, points)
-        self.curves = [_joined(p, [lanes.profile(int(k)) for k in np.flatnonzero(places.column == c)])
+    def _join(self, lanes: "_Lanes", points: int) -> None:
+        self._run(lanes, points)
+        self.curves = [_joined(p, [lanes.profile(int(k)) for k in np.flatnonzero(lanes.column[::2] == c)])
                        for p, c in zip(self.curves, self.column, strict=True)]  # fmt: skip
 
-    def _run(self, places: "_Places", points: int, ended: Callable[[], None] = lambda: None) -> "_Lanes":
-        lanes = _Lanes(self.uncertainty, places.column, places.unit, places.rise)
-        self.simulations += lanes.run(points, ended)
+    def _run(self, lanes: "_Lanes", points: int, ended: Callable[[], None] = lambda: None) -> None:
+        lanes.run(points, ended)
+        self.simulations += lanes.simulations
         self.better = lanes.better
         self.region = self.region.joined(lanes.region)
-        return lanes
 
 
 def _in_range(uncertainty: Uncertainty, c: int, interval: tuple[float, float]) -> tuple[float, float]:
@@ -281,10 +270,8 @@ def _in_range(uncertainty: Uncertainty, c: int, interval: tuple[float, float]) -
     return (interval[0] - low) / width, (interval[1] - low) / width
 
 
-def _elsewhere(
-    uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
-) -> tuple[_Places, int]:
-    """The best place of each range beyond the profile's interval that fits as well, and the simulations spent."""
+def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]) -> "_Lanes":
+    """Lanes from the best place of each range beyond the profile's interval that fits as well."""
     begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
     wanted = []  # (column, value in the range)
     for c, profile in zip(column, curves, strict=True):
@@ -292,18 +279,22 @@ def _elsewhere(
         values = np.concatenate([GRID, begin[1:, c]])
         wanted += [(c, v) for v in values[(values < low - SEEN) | (values > high + SEEN)]]
     if not wanted:
-        return _Places(np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0)), 0
+        return _Lanes(uncertainty, np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0))
     columns = np.repeat([c for c, _ in wanted], len(begin))
     start = np.tile(begin, (len(wanted), 1))
     rows = np.arange(len(start))
     start[rows, columns] = np.repeat([v for _, v in wanted], len(begin))
-    frozen = np.zeros(start.shape, dtype=bool)
-    frozen[rows, columns] = True
-    descent = descend(uncertainty.likelihood.rows, start, frozen, tolerance=0.05, apart=uncertainty.likelihood.apart)
+    descent = _others_free(uncertainty, start, columns, tolerance=0.05)
     rise = (descent.deviance - uncertainty.deviance) * threshold() / uncertainty.limits[columns]
     best = [rows[columns == c][rise[columns == c].argmin()] for c in np.unique(columns)]
     best = np.array([k for k in best if rise[k] < threshold()], dtype=int)
-    return _Places(columns[best], descent.unit[best], rise[best]), descent.simulations
+    return _Lanes(uncertainty, columns[best], descent.unit[best], rise[best], descent.simulations)
+
+
+def _others_free(uncertainty: Uncertainty, start: np.ndarray, columns: np.ndarray, tolerance: float) -> Descent:
+    """Descents from coordinates (n, D), each with one of the `columns` (n,) as it is."""
+    frozen = np.arange(start.shape[1]) == columns[:, None]
+    return uncertainty.likelihood.descent(start, frozen, tolerance=tolerance)
 
 
 def _joined(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
@@ -330,9 +321,11 @@ def _joined(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> 
 class _Lanes:
     """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the k-th place, in its parameter."""
 
-    def __init__(self, uncertainty: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray):
-        """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,)."""
-        self.uncertainty, self.limit = uncertainty, threshold()
+    def __init__(
+        self, uncertainty: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray, simulations: int = 0
+    ):
+        """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,) and so many `simulations` led to."""
+        self.uncertainty, self.limit, self.simulations = uncertainty, threshold(), simulations
         self.origin, self.risen = unit, rise
         self.column, self.unit = np.repeat(column, 2), np.repeat(unit, 2, axis=0)
         self.sign = np.tile([-1.0, 1.0], len(column))
@@ -345,7 +338,6 @@ class _Lanes:
         self.path: list[list[tuple[float, float]]] = [[] for _ in self.column]
         self.trail: list[tuple[np.ndarray, np.ndarray]] = []  # coordinates (n, D), deviances above the optimum's (n,)
         self.better: np.ndarray | None = None
-        self.simulations = 0
 
     @property
     def region(self) -> _Region:
@@ -355,34 +347,29 @@ class _Lanes:
         rise = np.concatenate([np.empty(0), *(rise for _, rise in self.trail)])
         return _Region(unit, rise[:, None] / limits)
 
-    def run(self, points: int, ended: Callable[[], None] = lambda: None) -> int:
-        """At most so many points on every lane, until one is better than the optimum; the simulations spent."""
+    def run(self, points: int, ended: Callable[[], None]) -> None:
+        """At most so many points on every lane, until one is better than the optimum."""
         for _ in range(points):
             if not self.advance() or self.better is not None:
                 break
             ended()
-        return self.simulations
 
     def advance(self) -> bool:
         """One more point on every open lane; False when there is none left."""
         lanes = np.flatnonzero(self.open)
         if not len(lanes):
             return False
-        pick = np.arange(len(lanes))
         column, sign = self.column[lanes], self.sign[lanes]
         here = self.unit[lanes, column]
         target = np.clip(here + sign * self.step[lanes], 0.0, 1.0)
         start = np.clip(self.unit[lanes] + self.slope[lanes] * (target - here)[:, None], 0.0, 1.0)
-        start[pick, column] = target
-        frozen = np.zeros(start.shape, dtype=bool)
-        frozen[pick, column] = True
-        descent = descend(
-            self.uncertainty.likelihood.rows, start, frozen, tolerance=0.01, apart=self.uncertainty.likelihood.apart
-        )
+        start[np.arange(len(lanes)), column] = target
+        descent = _others_free(self.uncertainty, start, column, tolerance=0.01)
         self.simulations += descent.simulations
         rise = (descent.deviance - self.uncertainty.deviance) * self.scale[lanes]
         moved = target - here
-        if (over := self._overshoots(rise, lanes) & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
+        over = ~(rise <= OVERSHOOT * self.limit) & (self.rise[lanes] < self.limit)  # or cannot be simulated
+        if (over := over & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
             self.step[lanes[over]] = np.abs(moved[over]) / 3
             fine = ~over
             lanes, rise, moved, target = lanes[fine], rise[fine], moved[fine], target[fine]
@@ -403,10 +390,6 @@ class _Lanes:
             self.better = descent.unit[rise.argmin()]
         return True
 
-    def _overshoots(self, rise: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-        """Lanes whose step went from below the threshold to far above it, or where nothing can be simulated."""
-        return ~(rise <= OVERSHOOT * self.limit) & (self.rise[lanes] < self.limit)
-
     def _adapt(self, lanes: np.ndarray, rise: np.ndarray, moved: np.ndarray) -> None:
         """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of the last."""
         roots = np.sqrt(np.maximum(np.stack((rise, self.rise[lanes])), 0.0))
@@ -416,28 +399,23 @@ class _Lanes:
 
     def profile(self, k: int) -> LikelihoodProfile:
         """The profile of the k-th parameter, from its two lanes."""
-        sides, ends, limits = [], [], []
         j = int(self.column[2 * k])
         optimum = (float(self.origin[k, j]), float(self.risen[k]))
-        for lane in (2 * k, 2 * k + 1):
-            path = np.array([optimum, *self.path[lane]])
-            limit, end = self._crossing(path, lane)
-            sides.append(path)
-            ends.append(end)
-            limits.append(limit)
-        joined = np.concatenate((sides[0][:0:-1], sides[1]))
+        down, up = (np.array([optimum, *self.path[lane]]) for lane in (2 * k, 2 * k + 1))
+        (lowest, below), (highest, above) = self._crossing(down), self._crossing(up)
+        joined = np.concatenate((down[:0:-1], up))
         low = self.uncertainty.lower[j]
         scale = self.uncertainty.upper[j] - low
         return LikelihoodProfile(
             name=self.uncertainty.names[j],
             values=low + scale * joined[:, 0],
             deviance=joined[:, 1],
-            interval=(float(low + scale * limits[0]), float(low + scale * limits[1])),
-            ends=(ends[0], ends[1]),
-            minima=tuple(float(low + scale * m) for side in sides for m in self._minima(side)),
+            interval=(float(low + scale * lowest), float(low + scale * highest)),
+            ends=(below, above),
+            minima=tuple(float(low + scale * m) for side in (down, up) for m in self._minima(side)),
         )
 
-    def _crossing(self, path: np.ndarray, lane: int) -> tuple[float, End]:
+    def _crossing(self, path: np.ndarray) -> tuple[float, End]:
         """Where the path (n, 2) last rises through the threshold, on the root of the deviance."""
         over = path[:, 1] > self.limit
         if not over[-1]:
@@ -451,9 +429,8 @@ class _Lanes:
     def _minima(self, path: np.ndarray) -> list[float]:
         """Places of local minima below the threshold, beyond a rise that is no ripple."""
         heights = path[:, 1]
-        minima = []
-        for k in range(1, len(heights) - 1):
-            crest = heights[:k].max()
-            if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit) and crest - heights[k] > RISE:
-                minima.append(float(path[k, 0]))
-        return minima
+        return [
+            float(path[k, 0])
+            for k in range(1, len(heights) - 1)
+            if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit) and heights[:k].max() - heights[k] > RISE
+        ]

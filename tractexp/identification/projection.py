@@ -51,7 +51,6 @@ class Projection:
 
     @property
     def grid(self) -> list[complex]:
-        """Poles that are tried."""
         decays = np.geomspace(self.slowest, FASTEST * self.rate, DECAYS + 2)[1:-1].tolist()
         turns = [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]
         return [complex(-a, 2 * np.pi * f) for a in decays for f in sorted({*turns, *(-f for f in turns)})]

@@ -26,7 +26,7 @@ def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
     return np.array([centered[k:] @ centered[:-k] for k in range(1, lags + 1)]) / (power or 1.0)
 
 
-def ljung_box(rows: np.ndarray, fitted: int = 0, lags: int = LAGS) -> ResidualTest:
+def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
     """Whether `rows` (n,) are uncorrelated; `fitted` autoregressive coefficients cost as many degrees of freedom.
 
     Source: Ljung and Box 1978.
@@ -34,7 +34,7 @@ def ljung_box(rows: np.ndarray, fitted: int = 0, lags: int = LAGS) -> ResidualTe
     from scipy.special import chdtrc
 
     n = len(rows)
-    lags = max(min(max(lags, fitted + 5), n // 4), fitted + 1)
+    lags = max(min(max(LAGS, fitted + 5), n // 4), fitted + 1)
     r = autocorrelation(rows, lags)
     statistic = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     p = float(chdtrc(lags - fitted, statistic))

@@ -19,6 +19,7 @@ from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.model_error import ModelError, in_percent, model_error
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED, History, SearchResult
+from tractexp.identification.verdict import EDGE
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
@@ -45,10 +46,11 @@ class Fit(Playback):
     role: str  # TRAIN or VALIDATE
 
     def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it."""
+        """As `result.json` has it; where Q is a small share of S, Eq. (20) divides its error by little."""
         record = self.event.record
+        share = float(np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30)))
         row: dict[str, Any] = {"name": record.name, "role": self.role}
-        row |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": reactive_share(record)}
+        row |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": share}
         return row if self.epsilon_i is None else row | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
 
 
@@ -56,11 +58,6 @@ def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float
     """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
     own = {f"{name}[{k}]": value for name, each in per_event.items() for k, value in enumerate(each, start=1)}
     return {**values, **own}
-
-
-def reactive_share(record: Record) -> float:
-    """The rms of Q over that of the apparent power: where it is small, Eq. (20) divides the error of Q by little."""
-    return float(np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30)))
 
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
@@ -276,14 +273,10 @@ def conclude(
     exponents = {p.name: p.power_exponent for p in problem.parameters}
     result = Result(
         **estimates,
+        **_spent(end),
         objective=float(problem.objective(free[None])[0]),
         epsilon_p=epsilon_p,
         epsilon_q=epsilon_q,
-        simulations=end.simulations,
-        refused=end.refused,
-        iterations=end.iterations,
-        seconds=end.seconds,
-        status=end.status,
         seed=seed,
         events=[f.to_dict() for f in fits],
         model_error=model_errors(fits),
@@ -340,18 +333,13 @@ def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]
 def searched(problem: Problem, end: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself end, and what that took: what optimizers are compared by."""
     _, epsilon_p, epsilon_q = fitted(problem, end.values)
-    return {
-        **_values(problem, end.values),
-        "objective": end.objective,
-        "epsilon_p": epsilon_p,
-        "epsilon_q": epsilon_q,
-        "simulations": end.simulations,
-        "seconds": end.seconds,
-        "refused": end.refused,
-        "iterations": end.iterations,
-        "status": end.status,
-        "at_bound": at_bound(problem, end.values),
-    }
+    errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
+    return _values(problem, end.values) | errors | _spent(end) | {"at_bound": at_bound(problem, end.values)}
+
+
+def _spent(end: SearchResult) -> dict[str, Any]:
+    """What a search took, and the sentence it ended with."""
+    return {name: getattr(end, name) for name in ("simulations", "seconds", "refused", "iterations", "status")}
 
 
 def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
@@ -363,10 +351,10 @@ def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
     }
 
 
-def at_bound(problem: Problem, values: np.ndarray, share: float = 1e-3) -> list[str]:
+def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
     """Names of the free parameters within a thousandth of their range of a bound."""
     unit = problem.space.to_unit(values)
-    return [n for n, z in zip(problem.space.names, unit, strict=True) if z < share or z > 1 - share]
+    return [n for n, z in zip(problem.space.names, unit, strict=True) if z < EDGE or z > 1 - EDGE]
 
 
 def active_bounds(problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()) -> list[str]:

@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.descent import descend
-from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import IDENTIFIED, WEAK, WITHIN, ParameterVerdict, size
+from tractexp.identification.verdict import WITHIN, ParameterVerdict, size
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
 from tractexp.plugin import discover, get
@@ -60,13 +58,8 @@ def _moved(uncertainty: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterat
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
         if own[j, 0] <= far <= own[j, 1]:
             continue
-        verdict, narrow = (
-            uncertainty.verdicts[name],
-            abs(far - value) <= WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j]),
-        )
-        word = WEAK if verdict.word == IDENTIFIED and not narrow else verdict.word
-        there = f"with {by} it is {far:.4g}"
-        yield name, replace(verdict, word=word, detail="; ".join(filter(None, (verdict.detail, there))))
+        wide = abs(far - value) > WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j])
+        yield name, uncertainty.verdicts[name].weakened(f"with {by} it is {far:.4g}", enough=bool(wide))
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:
@@ -103,14 +96,11 @@ def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure
         other = Problem(model, problem.events, own, fixed, substeps, per_event, problem.loss)
     except UserError:
         return None
-    likelihood = Likelihood(
-        other, uncertainty.likelihood.noise, uncertainty.likelihood.valid, uncertainty.likelihood.initial_power,
-        uncertainty.likelihood.prior,
-    )  # fmt: skip
+    likelihood = replace(uncertainty.likelihood, problem=other)
     start = likelihood.placed(_starts(uncertainty, other))
     if uncertainty.exact:
         start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
-    ended = descend(likelihood.rows, start, iterations=ITERATIONS, tolerance=0.01, apart=likelihood.apart)
+    ended = likelihood.descent(start, iterations=ITERATIONS, tolerance=0.01)
     best = int(ended.deviance.argmin())
     if not ended.deviance[best] < uncertainty.deviance + threshold():
         return None

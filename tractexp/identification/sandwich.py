@@ -25,7 +25,7 @@ from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.separable import Sensitivities
 
 ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
-WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out
+WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out, and takes nothing from a residual
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     influences = lambda columns: _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)  # noqa: E731
     shared = np.concatenate([J.shared, held_by])
     every = np.arange(free)
-    inside = every[(unit[:free] > WALL) & (unit[:free] < 1 - WALL)]
+    inside = every[off_walls(unit[:free])]
     root, ratio = np.zeros((free, free)), np.ones(free)
     own, ratio[inside], spread = robust_root(shared[:, inside], influences(inside))
     root[np.ix_(every[: len(own)], inside)] = own
@@ -73,6 +73,11 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
     )
     return Scatter(information, quantile(len(blocks)), ratio, spread)
+
+
+def off_walls(unit: np.ndarray) -> np.ndarray:
+    """Which coordinates (D,) rest on no bound."""
+    return (unit > WALL) & (unit < 1 - WALL)
 
 
 def _prior_jacobian(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:

@@ -96,25 +96,23 @@ class _Counter:
     def budget(self) -> int | None:
         return self.limits.simulations
 
-    def _raw(self, x: np.ndarray) -> np.ndarray:
-        return self.raw.from_unit(x) if self.unit else x
-
-    def _admit(self, x: np.ndarray) -> np.ndarray:
-        """The points a limit still allows, clipped; raises when there is none."""
+    def _admit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+        """The points a limit still allows, clipped, the same in raw units, and how many it cut off; raises for none."""
         limits = self.limits
         if limits.seconds is not None and self.seconds >= limits.seconds:
             raise _Stop(f"stopped at the time limit of {limits.seconds:g} s")
         x = self.box.clip(np.atleast_2d(x))
         if np.isnan(x).any():
             raise UserError("the optimizer proposed a point that is not a number; this is a fault of its plugin")
+        asked = len(x)
         if limits.simulations is not None:
             remaining = limits.simulations - self.simulations
             if remaining <= 0:
                 raise _Stop(f"stopped at the budget of {limits.simulations} simulations")
             x = x[:remaining]
-        return x
+        return x, self.raw.from_unit(x) if self.unit else x, asked - len(x)
 
-    def _note(self, x: np.ndarray, raw: np.ndarray, f: np.ndarray, asked: int) -> None:
+    def _note(self, x: np.ndarray, raw: np.ndarray, f: np.ndarray, cut: int) -> None:
         self.simulations += len(f)
         self.refused += int(np.count_nonzero(f >= REFUSED))
         first = int(np.argmin(f))
@@ -124,25 +122,21 @@ class _Counter:
             self.elite.add(x, f)
         if self.limits.target is not None and self.best <= self.limits.target:
             raise _Reached(f"reached the target objective {self.limits.target:g}")
-        if len(x) < asked:
+        if cut:
             raise _Stop(f"stopped at the budget of {self.limits.simulations} simulations")
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        asked = len(np.atleast_2d(x))
-        x = self._admit(x)
-        raw = self._raw(x)
+        x, raw, cut = self._admit(x)
         f = self.problem.objective(raw)
         f = np.where(np.isfinite(f), f, UNKNOWN)
-        self._note(x, raw, f, asked)
+        self._note(x, raw, f, cut)
         return x, f
 
     def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        asked = len(np.atleast_2d(x))
-        x = self._admit(x)
-        raw = self._raw(x)
+        x, raw, cut = self._admit(x)
         r = self.problem.residuals(raw)
         f = np.einsum("nm,nm->n", r, r)
-        self._note(x, raw, np.where(np.isfinite(f), f, REFUSED), asked)
+        self._note(x, raw, np.where(np.isfinite(f), f, REFUSED), cut)
         return x, r
 
 
@@ -206,7 +200,6 @@ def search(
 
 
 def _result(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
-    """Where a search is."""
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))

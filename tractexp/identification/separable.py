@@ -77,16 +77,6 @@ class Sensitivities:
         """(R_e, m) of one event."""
         return self.columns[self.k :, self.rows[event]].T
 
-    @property
-    def dense(self) -> np.ndarray:
-        """Every entry, (R, k + m E)."""
-        m = len(self.columns) - self.k
-        whole = np.zeros((self.columns.shape[1], self.k + m * len(self.rows)))
-        whole[:, : self.k] = self.shared
-        for e, rows in enumerate(self.rows):
-            whole[rows, self.k + e * m : self.k + (e + 1) * m] = self.own(e)
-        return whole
-
     def only(self, coordinates: np.ndarray) -> "Sensitivities":
         """Those to the coordinates that a mask (k + m E,) has; of an event the others are zero."""
         own = self.columns[self.k :].copy()
@@ -183,18 +173,6 @@ class NormalMatrix:
         whole = np.zeros((len(self.shared), len(self.positions) + self.columns.coordinates.size))
         whole[:, self.positions] = np.einsum("nkk->nk", self.shared)
         whole[:, self.columns.coordinates] = np.einsum("nemm->nem", self.own)
-        return whole
-
-    @property
-    def dense(self) -> np.ndarray:
-        """Every entry, (n, D, D)."""
-        n, size = self.diagonal.shape
-        whole = np.zeros((n, size, size))
-        whole[:, self.positions[:, None], self.positions] = self.shared
-        for e, mine in enumerate(self.columns.coordinates):
-            whole[:, mine[:, None], mine] = self.own[:, e]
-            whole[:, mine[:, None], self.positions] = self.cross[:, e]
-            whole[:, self.positions[:, None], mine] = np.swapaxes(self.cross[:, e], 1, 2)
         return whole
 
     def solve(self, side: np.ndarray, kept: np.ndarray, added: Sequence[np.ndarray]) -> np.ndarray:

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from tractexp.identification.problem import Problem
-from tractexp.noise.span import spanned
 
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
@@ -66,14 +65,6 @@ def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
         "a step or a pulse": np.concatenate([steps(channels, problem), pulses(after, problem)], axis=1),
         "an oscillation": np.concatenate([tones(channels, problem), bursts(after, problem)], axis=1),
     }
-
-
-def of_each_event(rows: np.ndarray, split: np.ndarray, least: float) -> np.ndarray:
-    """How much parameters of their own for each event would lower the deviance of rows (b, R), (b,).
-
-    `split` (k, R) are what each parameter changes in one event alone; those of at most `least` change nothing.
-    """
-    return ((rows @ spanned(split, DISTINCT, least).T) ** 2).sum(axis=1)
 
 
 def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:

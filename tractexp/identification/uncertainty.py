@@ -16,8 +16,9 @@ from tractexp.identification.blocks import LEVEL
 from tractexp.identification.descent import CENTRAL
 from tractexp.identification.information import Information
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.residual_tests import ResidualTest, jarque_bera, ljung_box
+from tractexp.identification.residual_tests import jarque_bera, ljung_box
 from tractexp.identification.sandwich import scatter
+from tractexp.identification.separable import Sensitivities
 from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.noise.color import FEWEST
 
@@ -79,19 +80,52 @@ class Uncertainty:
         return self.likelihood.initial_power
 
     @functools.cached_property
+    def sensitivities(self) -> tuple[np.ndarray, Sensitivities]:
+        """What the estimate leaves of the records (R,), whitened, and its differences."""
+        return self.likelihood.of_records.jacobian(self.unit)
+
+    @functools.cached_property
     def whitened(self) -> np.ndarray:
         """The residual of the estimate over the noise, (2 N,)."""
         return self.of_noise.rows(self.unit[None] if self.exact else self.of_noise.placed(self.unit[None]))[0]
 
     @functools.cached_property
     def tests(self) -> list[dict[str, Any]]:
-        """Whether the whitened residual is white and normal."""
-        return test(self.of_noise, self.whitened)
+        """Whiteness and normality of the whitened residual of each event and channel."""
+        problem, valid = self.of_noise.problem, self.of_noise.valid
+        white, results = self.whitened.reshape(problem.drive.channels, -1), []
+        for e, event in enumerate(problem.events):
+            part = problem.drive.part(e)
+            for c, channel in enumerate(problem.drive.names):
+                seen = white[c, part][valid[c, part]]
+                if len(seen) < FEWEST:
+                    continue
+                tests = ljung_box(seen, self.of_noise.noise.pair(e)[c].order), jarque_bera(seen)
+                results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
+        return results
 
     @functools.cached_property
     def noise(self) -> list[dict[str, Any]]:
-        """Level and color of the noise of each event and channel."""
-        return describe_noise(self.of_noise)
+        """Level [pu] and color of the noise of each event and channel, with the level before the dip beside it."""
+        rows, noise, problem = [], self.of_noise.noise, self.of_noise.problem
+        for e, event in enumerate(problem.events):
+            pair, covariance = noise.pair(e), noise.covariance(e)
+            cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+            for c, (channel, before) in enumerate(zip(problem.drive.names, event.levels, strict=True)):
+                rows.append(
+                    {
+                        "event": event.record.name,
+                        "channel": channel,
+                        "deviation": float(np.sqrt(covariance[c, c])),
+                        "before": float(before),
+                        "order": pair[c].order,
+                        "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0].real),
+                        "between_P_and_Q": float(cross),
+                        "wanders": noise.random_walk is not None,
+                        "of_the_voltage": float(np.sqrt(noise.loudest_input_mode)),
+                    }
+                )
+        return rows
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -148,11 +182,11 @@ class Uncertainty:
         }
 
 
-def threshold(level: float = LEVEL) -> float:
+def threshold() -> float:
     """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
     from scipy.special import chdtri
 
-    return float(chdtri(1, 1 - level))
+    return float(chdtri(1, 1 - LEVEL))
 
 
 def conclude(
@@ -211,44 +245,3 @@ def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
     factors = np.full(len(unit), scattered.quantile)
     limits = (factors * scattered.ratio / scattered.spread) ** 2
     return likelihood, float(rows @ rows), scattered.information, factors, limits
-
-
-def test(likelihood: Likelihood, rows: np.ndarray) -> list[dict[str, Any]]:
-    """Whiteness and normality of the whitened residuals (2 N,) of each event and channel."""
-    drive = likelihood.problem.drive
-    white = rows.reshape(drive.channels, -1)
-    results = []
-    for e, event in enumerate(likelihood.problem.events):
-        part = drive.part(e)
-        for c, channel in enumerate(drive.names):
-            seen = white[c, part][likelihood.valid[c, part]]
-            if len(seen) < FEWEST:
-                continue
-            order = likelihood.noise.pair(e)[c].order
-            tests: list[ResidualTest] = [ljung_box(seen, order), jarque_bera(seen)]
-            results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
-    return results
-
-
-def describe_noise(likelihood: Likelihood) -> list[dict[str, Any]]:
-    """Level [pu] and color of the noise of each event and channel, with the level before the dip beside it."""
-    rows, noise = [], likelihood.noise
-    for e, event in enumerate(likelihood.problem.events):
-        pair = noise.pair(e)
-        covariance = noise.covariance(e)
-        cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
-        for c, (channel, before) in enumerate(zip(likelihood.problem.drive.names, event.levels, strict=True)):
-            rows.append(
-                {
-                    "event": event.record.name,
-                    "channel": channel,
-                    "deviation": float(np.sqrt(covariance[c, c])),
-                    "before": float(before),
-                    "order": pair[c].order,
-                    "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0].real),
-                    "between_P_and_Q": float(cross),
-                    "wanders": noise.random_walk is not None,
-                    "of_the_voltage": float(np.sqrt(noise.loudest_input_mode)),
-                }
-            )
-    return rows

@@ -31,6 +31,11 @@ class ParameterVerdict:
     detail: str
     interval: str = ""  # by how much the parameter is known; a profile's where there is one
 
+    def weakened(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
+        """With what speaks against it as well: weak where it was identified, if that is `enough`."""
+        word = WEAK if enough and self.word == IDENTIFIED else self.word
+        return replace(self, word=word, detail="; ".join(filter(None, (self.detail, also))))
+
     def __str__(self) -> str:
         said = "; ".join(filter(None, (self.interval, self.detail)))
         return f"{self.word} ({said})" if self.word in (IDENTIFIED, BOUND) else f"{self.word}: {said}"
@@ -77,13 +82,6 @@ def judge(
             tight = "" if lower[j] <= low and high <= upper[j] else "the interval reaches past its bounds"
             verdicts[name] = ParameterVerdict(IDENTIFIED, tight, shown(value, half[j], lower[j], upper[j]))
     return verdicts
-
-
-def elsewhere(verdict: ParameterVerdict, value: float) -> ParameterVerdict:
-    """A verdict where the records fit as well in another valley, in which the parameter has this value."""
-    word = WEAK if verdict.word == IDENTIFIED else verdict.word
-    also = f"another valley, at {value:.4g}, fits as well"
-    return replace(verdict, word=word, detail="; ".join(filter(None, (verdict.detail, also))))
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:

@@ -37,7 +37,6 @@ def estimate(
     quiet: Sequence[slice],
     random_walk: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
     input_modes: np.ndarray | None = None,
-    highest: int = HIGHEST,
 ) -> Noise:
     """Noise from residuals (C, N) in quiet stretches; `random_walk` is that of the load in channels mixed by `mix`.
 
@@ -59,7 +58,7 @@ def estimate(
     if slow is not None:
         fast = [[without_slow(p) for p in channel] for channel in fast]
     # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
-    fitted = [fit_autoregression(channel, highest, sparing=True) for channel in fast]
+    fitted = [fit_autoregression(channel, HIGHEST, sparing=True) for channel in fast]
     shocks = None
     if count >= MANY and measured.all():
         shocks = tuple(map(_shocks, fitted, fast))
@@ -68,7 +67,7 @@ def estimate(
     return Noise((pair,), mix, shocks, slow, input_modes)
 
 
-def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray], level: float = LOUDER) -> bool:
+def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
     """Whether stretches `late` (n_i,) of a channel are louder than `calm` ones by more than chance.
 
     An F test with as many samples as tell of the slowest of each one's color.
@@ -78,7 +77,7 @@ def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray], level: float 
     if not (late and calm):
         return False
     (a, n), (b, m) = (_variance(pieces) for pieces in (late, calm))
-    return bool(fdtrc(n, m, a / max(b, SMALLEST**2)) < level)
+    return bool(fdtrc(n, m, a / max(b, SMALLEST**2)) < LOUDER)
 
 
 def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:

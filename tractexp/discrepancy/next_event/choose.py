@@ -148,7 +148,8 @@ def next_event(
     separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
     reads = {channel for fit in rivals for name in fit.names for channel in context.catalogue[name].effect.reads}
     events, denied = [], []
-    for group in _alike(imagined(context, sorted(reads))):
+    by_rate = sorted(imagined(context, sorted(reads)), key=lambda e: e.rate)
+    for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):  # sampled alike
         for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
@@ -162,33 +163,19 @@ def next_event(
     tried = [
         EventTrial(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
     ]
-    best = _held(context, noise, sides, tried, ignored, seed, _by_rule)
+    best = _held(context, noise, sides, tried, ignored, seed, lambda event: event.chances)
     sure = best.chances.least >= context.criteria.decided
-    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, _by_noise)
+    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, lambda event: event.exact)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
     return NextEvent(tuple(labels), best, by_noise, tuple(tried), context.criteria, proved, hopeless)
 
 
-def _by_rule(tried: EventTrial) -> Chances:
-    return tried.chances
-
-
-def _by_noise(tried: EventTrial) -> Chances:
-    return tried.exact
-
-
 def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
     enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
-
-
-def _alike(events: Sequence[ImaginedDip]) -> list[list[ImaginedDip]]:
-    """Events that are sampled alike together."""
-    by_rate = sorted(events, key=lambda e: e.rate)
-    return [list(group) for _, group in itertools.groupby(by_rate, key=lambda e: e.rate)]
 
 
 def _held(

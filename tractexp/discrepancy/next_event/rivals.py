@@ -9,7 +9,7 @@ from tractexp.discrepancy.catalogue import Catalogue, catalogue
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.fitting import Start, refit
+from tractexp.discrepancy.fitting import Names, Start, refit
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.domain import domain_of
@@ -17,8 +17,6 @@ from tractexp.errors import TASK, UserError
 from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import joined
-
-Names = tuple[str, ...]
 
 
 def event_for(
@@ -40,9 +38,7 @@ def event_for(
     events = domain_of(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
-    missing = catalogue(
-        model.motor, model.static, model.effects, events, named, criteria.frequency_swing, model.domain
-    )  # fmt: skip
+    missing = catalogue(model, events, named, criteria.frequency_swing)
     _check(missing, named)
     with Effort(tell).audible() as effort:
         context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
@@ -77,7 +73,7 @@ def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
         for setting in candidate.settings:
             for sign in (1, -1):
                 point = at.placed(unit, setting)
-                for p in (p for other in names for p in context.catalogue[other].sizes):
+                for p in context.catalogue.sizes(names):
                     step = candidate.relevant(p) * (candidate.sign(p) or sign)
                     point[at.column[p.name]] = np.clip(at.to_unit(p.name, p.absent + step), 0.0, 1.0)
                 result.append((names, point))

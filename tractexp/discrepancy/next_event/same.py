@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linear import two_sided
+from tractexp.discrepancy.linear import slopes, two_sided
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
 from tractexp.model.drive import Drive
 
@@ -85,18 +85,16 @@ def _followed(
         unit[columns] = x
         return unit
 
-    def slopes(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
-        up, down = two_sided(unit, inside)
-        width = np.array([u[c] - d[c] for u, d, c in zip(up, down, inside, strict=True)])
-        rows = drawn(np.concatenate([up, down]), whose)
-        return (rows[: len(inside)] - rows[len(inside) :]) / width[:, None]
+    def moved(unit: np.ndarray, whose: Sequence[str], inside: Sequence[int]) -> np.ndarray:
+        points, width = two_sided(unit, inside)
+        return slopes(drawn(points, whose), width)
 
     def nearest(x: np.ndarray, rows: np.ndarray):
         from scipy.optimize import least_squares
 
         return least_squares(
             lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows], np.clip(x, 1e-3, 1 - 1e-3),
-            lambda x: slopes(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
+            lambda x: moved(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
             bounds=(0.0, 1.0), xtol=1e-14, ftol=DONE, gtol=1e-14, max_nfev=60,
         )  # fmt: skip
 
@@ -110,7 +108,7 @@ def _followed(
         nearest_point, off = ended.x, float(np.abs(ended.fun).max())
         if off > FOLLOWS:
             return None
-    own = slopes(point, names, _of_load(context, names)), slopes(whole(nearest_point), rival.names, columns)
+    own = moved(point, names, _of_load(context, names)), moved(whole(nearest_point), rival.names, columns)
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None
 

@@ -14,7 +14,7 @@ import numpy as np
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linear import linearised, two_sided
+from tractexp.discrepancy.linear import linearised, slopes, two_sided
 from tractexp.discrepancy.linearization import resting
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
 from tractexp.model.drive import Drive
@@ -77,7 +77,6 @@ class Chances:
 
     @property
     def least(self) -> float:
-        """Over all rivals in turn."""
         return float(self.alone.min())
 
 
@@ -104,9 +103,8 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     drives = [driven(context, event) for event in events]
     inside = list(side.columns[: -len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
-    up, down = two_sided(middle, inside)
-    width = np.array([u[k] - d[k] for u, d, k in zip(up, down, inside, strict=True)])
-    moved = _simulated(context, names, np.concatenate([middle[None], up, down]), drives)  # (E, n, C, N)
+    points, width = two_sided(middle, inside)
+    moved = _simulated(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
     before = [
         _simulated(context, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
         for channel in ("P0", "Q0")
@@ -119,7 +117,7 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
         rows = np.concatenate([moved[e], *(b[e] for b in before)])
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
-        K[:k] = (rows[1 : 1 + k] - rows[1 + k : 1 + 2 * k]) / width[:, None] * side.free[:k, None]
+        K[:k] = slopes(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
         K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
         chances.append(EventView(rows[0], K))
     return chances
@@ -149,15 +147,13 @@ class Separation:
     def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
         """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
 
-        First by the product's rule, then where formulas are exact. None is denied where a side does not survive.
+        First by the product's rule, then where formulas are exact. None is denied where a side does not survive, the
+        truth itself always where all do.
         """
         if not all(x.survives for x in seen):
             return np.zeros((2, len(self.sides) - 1, self.draws), bool)
         rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
-        return self._denied(truth, [x[0] for x in rows], [x[1:] for x in rows])
-
-    def _denied(self, truth: int, f: Sequence[np.ndarray], K: Sequence[np.ndarray]) -> np.ndarray:
-        """Which rivals (2, a, b) each of b draws denies where one of them is the truth; itself it always does."""
+        f, K = [x[0] for x in rows], [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
         k, here = len(side.columns), side.fit.unit[list(side.columns)]

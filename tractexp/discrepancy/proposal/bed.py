@@ -13,7 +13,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
-from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, shape_of
+from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, pick_of, shape_of, size_of
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
@@ -42,21 +42,12 @@ def kind_of(name: str) -> str:
 
 def sizes_of(chosen: Term) -> list[tuple[Size, str]]:
     """The sizes of a term, and what the library calls each."""
-    balance, kind = chosen.balance, chosen.signal.kind
-    if len(balance.sizes) == 1:
-        return [(balance.sizes[0], f"{kind}_{balance.name}_size")]
-    return [(size, f"{kind}_{balance.name}_{size.name.removeprefix('size_')}_size") for size in balance.sizes]
+    return [(size, size_of(chosen.signal.kind, chosen.balance, size)) for size in chosen.balance.sizes]
 
 
 def shapes_of(chosen: Term) -> dict[str, str]:
     """The parameters of a term's signal by their own names, and what the library calls each."""
-    return {s.name: f"{chosen.signal.kind}_{shape_of(chosen.signal, s)}" for s in chosen.signal.shapes}
-
-
-def choice_of(chosen: Term) -> list[str]:
-    """The library's parameters that choose a term."""
-    picked = [chosen.signal.name, *([chosen.clock.name] if chosen.clock else [])]
-    return [f"{chosen.signal.kind}_pick_{name}" for name in picked]
+    return {s.name: shape_of(chosen.signal, s) for s in chosen.signal.shapes}
 
 
 def context_of_terms(original: Context) -> Context:
@@ -100,7 +91,8 @@ class _Part(Effect):
 def place(at: Coordinates, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]) -> np.ndarray:
     """Coordinates (D,) with a term of these sizes and this setting."""
     moved = unit.copy()
-    for label in choice_of(chosen):
+    for picked in (chosen.signal, chosen.clock) if chosen.clock else (chosen.signal,):
+        label = pick_of(chosen.signal.kind, picked.name)
         moved[at.column[label]] = at.to_unit(label, 1.0)
     for name, label in shapes_of(chosen).items():
         moved[at.column[label]] = np.clip(at.to_unit(label, setting[name]), 0.0, 1.0)
@@ -119,8 +111,8 @@ def carried_over(other: Context, original: Context, unit: np.ndarray) -> np.ndar
     """Coordinates (D',) of the context of terms with base model, faults and power before as at coordinates (D,)."""
     to, old = other.coordinates, original.coordinates
     moved = to.null.copy()
-    faults = [p.name for n in to.catalogue.of_measurement for p in to.catalogue[n].effect.parameters]
-    for name in (*(to.names[k] for k in to.base), *faults):
+    faults = to.catalogue.parameters(to.catalogue.of_measurement)
+    for name in (*(to.names[k] for k in to.base), *(p.name for p in faults)):
         moved[to.column[name]] = unit[old.column[name]]
     moved[to.before] = unit[old.before]
     return moved

@@ -11,19 +11,14 @@ from tractexp.discrepancy.proposal.library import (
     SIGNALS,
     SOURCE,
     TIMED,
-    Balance,
     Signal,
+    pick_of,
     shape_of,
     size_of,
 )
 from tractexp.errors import Unfit
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
-
-
-def picks(name: str) -> str:
-    """The parameter that chooses a signal or a clock: 1 where it is chosen."""
-    return f"pick_{name}"
 
 
 class Library(Effect):
@@ -44,34 +39,29 @@ class Library(Effect):
     def _parameters(self) -> Any:
         for balance in self.balances:
             for size in balance.sizes:
-                yield size.parameter(self.size(balance, size.name), f"size in {balance.words}")
+                yield size.parameter(size_of(self.name, balance, size), f"size in {balance.words}")
         for chosen in (*self.signals, *self.clocks):
-            yield Parameter(0.0, (0.0, 1.0), "1", f"whether it is {chosen.words}", SOURCE, name=self.pick(chosen.name))
+            name = pick_of(self.name, chosen.name)
+            yield Parameter(0.0, (0.0, 1.0), "1", f"whether it is {chosen.words}", SOURCE, name=name)
         for signal in self.signals:
             for shape in signal.shapes:
-                yield shape.parameter(f"{self.name}_{shape_of(signal, shape)}")
-
-    def pick(self, chosen: str) -> str:
-        return f"{self.name}_{picks(chosen)}"
-
-    def size(self, balance: Balance, size: str) -> str:
-        return f"{self.name}_{size_of(balance, next(s for s in balance.sizes if s.name == size))}"
+                yield shape.parameter(shape_of(signal, shape))
 
     def edit(self, eq: Any, **parameters: Any) -> None:
         clock = {"clock": self._clock(eq, parameters)} if self.clocks else {}
         total = 0
         for signal in self.signals:
-            own = {s.name: parameters[f"{self.name}_{shape_of(signal, s)}"] for s in signal.shapes}
+            own = {s.name: parameters[shape_of(signal, s)] for s in signal.shapes}
             if present(eq, signal):
-                total += parameters[self.pick(signal.name)] * signal.build(eq, **clock, **own)
+                total += parameters[pick_of(self.name, signal.name)] * signal.build(eq, **clock, **own)
         g = eq.define(f"{self.name}_signal", total, "g")
         for balance in self.balances:
             if all(site in eq for site in balance.places_in(eq)):
-                own = {s.name: parameters[self.size(balance, s.name)] for s in balance.sizes}
+                own = {s.name: parameters[size_of(self.name, balance, s)] for s in balance.sizes}
                 balance.build(eq, g, **own)
 
     def _clock(self, eq: Any, parameters: dict[str, Any]) -> Any:
-        times = (parameters[self.pick(c.name)] * c.build(eq) for c in self.clocks)
+        times = (parameters[pick_of(self.name, c.name)] * c.build(eq) for c in self.clocks)
         return eq.define(f"{self.name}_clock", sum(times), "t")
 
 

@@ -62,6 +62,7 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
     constants = [
         f"{c} = {getattr(shapes, c):g}" for c in CONSTANTS if any(re.search(rf"\b{c}\b", f) for f in functions)
     ]
+    relevant = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
     sites = ", sites" * any("sites." in f for f in functions)
     headline = quoting.python(f"{term.words[:1].upper()}{term.words[1:]}")
     text = HEAD.format(
@@ -72,7 +73,7 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
     return text.replace("\n\n\n\n", "\n\n\n") + "\n" + CLASS.format(
         headline=headline, latex=quoting.python(term.latex), time=TIME * term.exogenous,
         records=quoting.python(records),
-        parameters="\n".join(_declared(term, values)), relevant=_relevant(term),
+        parameters="\n".join(_declared(term, values)), relevant=f"{{{relevant}}}",
         arguments=", ".join(parameters_of(term)), body="\n".join(_body(term)),
     )  # fmt: skip
 
@@ -91,11 +92,6 @@ def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
         text = f'"{unit}", "{about}", SOURCE, "{symbol}"{null}'
         lines.append(f"    {p.name} = Parameter({p.default!r}, {p.bounds!r}, {text})")
     return lines
-
-
-def _relevant(term: Term) -> str:
-    text = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
-    return f"{{{text}}}"
 
 
 def _body(term: Term) -> list[str]:

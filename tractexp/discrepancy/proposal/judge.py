@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.fitting import Refit, distances
 from tractexp.discrepancy.gap import Curves, beyond_chance, curves, pushed
 from tractexp.discrepancy.held_out import carried
 from tractexp.discrepancy.proposal.bed import carried_over
@@ -113,18 +113,12 @@ def _compared(
 
 def tied(result: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:
     """Those that neither held-out events nor, were they true, the fit of the chosen one denies."""
-    context, criteria = result.context, result.context.criteria
-    rows = _rows(context, result, [chosen.fit, *(o.fit for o in others)])
-    distances = ((rows[1:] - rows[0]) ** 2).sum(axis=1)
+    criteria = result.context.criteria
+    apart = distances(result.context, result.noise, [chosen.fit, *(o.fit for o in others)])[1:]
     explained = result.bare.deviance - chosen.fit.deviance
     distinct = []
-    for other, distance in zip(others, distances.tolist(), strict=True):
+    for other, distance in zip(others, apart.tolist(), strict=True):
         behind, parameters = other.fit.cost - chosen.fit.cost, other.fit.parameters + chosen.fit.parameters
         if other.stands(criteria) and not criteria.rejects(behind, distance, parameters, explained):
             distinct.append(other)
     return distinct
-
-
-def _rows(context: Context, result: Fitted, fits: Sequence[Refit]) -> np.ndarray:
-    faults = context.coordinates.sizes(context.catalogue.of_measurement)
-    return context.rows(np.array([f.unit for f in fits]), result.noise, faults, [f.names for f in fits])

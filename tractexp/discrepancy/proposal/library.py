@@ -54,8 +54,8 @@ class Signal:
 
     @property
     def settings(self) -> list[dict[str, float]]:
-        """Every combination of grid values."""
-        values = itertools.product(*(s.grid for s in self.shapes))
+        """Every combination of grid values; of phases the first, for two of them make one block of a screen."""
+        values = itertools.product(*(s.grid[:1] if s.name == "phase" else s.grid for s in self.shapes))
         return [dict(zip((s.name for s in self.shapes), chosen, strict=True)) for chosen in values]
 
 
@@ -155,22 +155,28 @@ class Term:
         return self.balance.latex.replace("{g}", self.signal.latex)
 
 
-def size_of(balance: Balance, size: Size) -> str:
-    """What the library calls a size."""
-    return f"{balance.name}_{size.name}"
+def size_of(kind: str, balance: Balance, size: Size) -> str:
+    """What the library's effect of a kind calls a size: of several, each is that of a balance of its own."""
+    part = size.name.removeprefix("size")
+    return f"{kind}_{balance.name}{part}_size"
 
 
 def shape_of(signal: Signal, shape: Shape) -> str:
-    """What the library calls a parameter of a signal."""
-    return f"{signal.name}_{shape.name}"
+    """What it calls a parameter of a signal."""
+    return f"{signal.kind}_{signal.name}_{shape.name}"
+
+
+def pick_of(kind: str, name: str) -> str:
+    """What it calls the choice of a signal or a clock: 1 where it is chosen."""
+    return f"{kind}_pick_{name}"
 
 
 def _level(low: float, high: float, grid: Grid, latex: str) -> Shape:
     return Shape("level", grid, (low, high), "1", "level, over the value before the event", latex)
 
 
-def _time(grid: Grid, most: float = 3.0) -> Shape:
-    return Shape("time", grid, (0.002, most), "s", "time constant", "T")
+def _time(grid: Grid) -> Shape:
+    return Shape("time", grid, (0.002, 3.0), "s", "time constant", "T")
 
 
 def _spread(first: float, last: float, step: float) -> Grid:
@@ -281,7 +287,6 @@ BALANCES = (
 
 @functools.cache
 def terms() -> tuple[Term, ...]:
-    """Every term of the library."""
     return tuple(_terms())
 
 
@@ -294,5 +299,4 @@ def _terms() -> Iterator[Term]:
 
 
 def term(name: str) -> Term:
-    """The term of this name."""
     return next(t for t in terms() if t.name == name)

@@ -159,10 +159,8 @@ def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
     """
-    chosen, at = term(fit.names[0]), context.coordinates
-    values = values_of(at, fit.unit, chosen)
+    chosen, values, there = _without(context, noise, fit)
     setting = {s.name: values[s.name] for s in chosen.signal.shapes}
-    there = Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise)
     return _starts(context, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
@@ -171,14 +169,21 @@ def regridded(context: Context, noise: Noise, fit: Refit) -> Start:
 
     At the first fit of the base model, which something missing bends, another setting may have seemed the best.
     """
-    chosen, at = term(fit.names[0]), context.coordinates
-    sizes = [0.0] * len(chosen.balance.sizes)
-    values = values_of(at, fit.unit, chosen)
-    there = Ground.at(context, place(at, fit.unit, chosen, values, sizes), noise)
-    tried = [(chosen, s) for s in chosen.signal.settings if s.get("phase", 0.0) == 0.0]
-    best = max(scores(there, tried), key=lambda f: f.drop)
+    chosen, _, there = _without(context, noise, fit)
+    best = max(scores(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop)
     (best,) = zoomed(there, [best])
-    return fit.names, place(at, fit.unit, chosen, best.setting, best.sizes)
+    return fit.names, place(context.coordinates, fit.unit, chosen, best.setting, best.sizes)
+
+
+def _without(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str, float], Ground]:
+    """The term of a fit, its sizes and setting, and the ground of that fit without it."""
+    chosen, at = term(fit.names[0]), context.coordinates
+    values = values_of(at, fit.unit, chosen)
+    return (
+        chosen,
+        values,
+        Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise),
+    )
 
 
 def _starts(context: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
@@ -191,10 +196,8 @@ def standard_errors(result: Fitted, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
     context, chosen = result.context, result.term(fit)
     at = context.coordinates
-    faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
     own = at.parameters(fit.names)
-    columns = [*at.base, *at.before, *faults, *own]
-    _, rows = linearised(context, fit.unit, result.noise, columns, fit.names)
+    _, rows = linearised(context, fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
     covariance = np.linalg.pinv(rows[1:] @ rows[1:].T, rcond=1e-14, hermitian=True)
     spread = np.sqrt(np.diag(covariance))[-len(own) :] * [at.width(at.names[k]) for k in own]
     determined = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0

@@ -41,9 +41,7 @@ class Ground:
     @classmethod
     def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
-        at = context.coordinates
-        faults = [k for n in context.catalogue.of_measurement for k in at.sizes([n])]
-        raw, rows = linearised(context, unit, noise, [*at.base, *at.before, *faults], ())
+        raw, rows = linearised(context, unit, noise, context.coordinates.nuisances(()), ())
         Q = np.linalg.qr(rows[1:].T)[0]
         ground = cls(context, unit, noise, raw, Q, rows[0])
         return replace(ground, r=ground.off(rows[:1])[0])
@@ -97,7 +95,7 @@ def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Scre
     noise = ground.drawn(seed, draws)
     best = np.zeros(draws)
     scored = []
-    for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings if _first(s)], noise):
+    for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings], noise):
         scored.append(score)
         best = np.maximum(best, drops)
     return Screened(ground, sorted(scored, key=lambda s: -s.drop), best)
@@ -107,11 +105,6 @@ def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[Score
     """Score terms at settings of their own, in this order; a phase is found, not given."""
     by_key = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
     return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
-
-
-def _first(setting: Setting) -> bool:
-    """Whether it is the first of a grid's settings that differ by their phase: both phases make one block."""
-    return setting.get("phase", 0.0) == 0.0
 
 
 def _key(setting: Setting) -> tuple:
