@@ -48,27 +48,18 @@ def tables(rows: Rows) -> str:
         f"{len(rows)} data sets" + (f", of which {failed} could not be simulated or investigated." if failed else "."),
         *(marked.table(head, lines) for head, lines in (_answers(good), _strangers(good), _pairs(good)) if lines),
         _partly(good), _proposals(good), marked.table(*_seconds(good)),
-        *(f"![{what}]({_path(name)})" for name, what in FIGURES.items()),
+        f"![Verdict for each hidden effect]({FIGURE})",
     ]  # fmt: skip
     return "\n\n".join(filter(None, parts))
 
 
-FIGURES = {
-    "detection": "Share of data sets in which a disagreement was found",
-    "confusion": "Verdict for each hidden effect",
-}
-
-
-def _path(name: str) -> str:
-    return f"images/missing-effects-{name}.svg"
+FIGURE = "images/missing-effects-confusion.svg"
 
 
 def write(rows: Rows, docs: Path) -> None:
-    """Put the tables between their marks and the figures into images/."""
+    """Put the tables between their marks and the figure into images/."""
     marked.replace(docs / PAGE, MARK, tables(rows))
-    good = [r for r in rows if "failed" not in r]
-    for name, draw in (("detection", _draw_detection), ("confusion", _draw_confusion)):
-        draw(good, docs / _path(name))
+    _draw_confusion([r for r in rows if "failed" not in r], docs / FIGURE)
 
 
 def share(right: int, of: int) -> str:
@@ -244,41 +235,6 @@ def _seconds(rows: Rows) -> tuple[list[str], list[list]]:
     return ["verdict", "data sets", "median [s], one core", "90 % [s]"], lines
 
 
-def _draw_detection(rows: Rows, path: Path) -> None:
-    """Share of data sets in which something was found, over how many detection limits were hidden."""
-    from matplotlib import rc_context
-    from matplotlib.figure import Figure
-
-    from tractexp.blocks import style
-
-    x = [m for m in MULTIPLES if any(r["group"] == f"{m:g} x" and reached(r, m) for r in rows)]
-    with rc_context(style.SETTINGS):
-        figure = Figure(figsize=(6.4, 3.4), layout="constrained")
-        axes = figure.subplots()
-        members = [[r for r in rows if r["group"] == f"{m:g} x" and reached(r, m)] for m in x]
-        for label, color, count in (
-            ("a disagreement is found", style.REACTIVE, lambda r: r["verdict"] != "none"),
-            ("the truth is among the names", style.ACTIVE, in_set),
-            ("the truth is the one name", style.VOLTAGE, right),
-        ):
-            axes.plot(x, [100 * np.mean([*map(count, rs)]) for rs in members], "o-", color=color, label=label)
-        fine = np.geomspace(0.5, 8, 60)
-        axes.plot(fine, 100 * _power(fine), "--", color=style.FAINT, label="best possible: likelihood-ratio test")
-        axes.set(xscale="log", xticks=x, xticklabels=[f"{m:g}" for m in x], ylim=(0, 103))
-        axes.set(xlabel="times the detection limit", ylabel="share of data sets [%]")
-        axes.minorticks_off()
-        axes.legend(loc="lower right")
-        style.save(figure, path)
-
-
-def _power(multiple: np.ndarray) -> np.ndarray:
-    """Power of the two-sided test at the level of one of 20, where 1 has a power of 0.9."""
-    from scipy.stats import norm
-
-    z = norm.isf(0.05 / 40)
-    return norm.cdf(multiple * (z + norm.isf(0.1)) - z)
-
-
 def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
     """What was said (columns) of what was hidden (rows), in percent, at four times the limit or as large as may be."""
     from matplotlib import rc_context
@@ -301,7 +257,8 @@ def _draw_confusion(rows: Rows, path: Path, multiple: float = 4.0) -> None:
         axes.imshow(table, cmap="Blues", vmin=0, vmax=130, aspect="auto")
         for (i, j), value in np.ndenumerate(table):
             if value:
-                axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=7)
+                color = "white" if value > 60 else "black"
+                axes.text(j, i, f"{value:.0f}", ha="center", va="center", fontsize=7, color=color)
         axes.set_xticks(range(len(said)), [s.replace("_", " ") for s in said], rotation=90)
         axes.set_yticks(range(len(labels)), [s.replace("_", " ") for s in labels])
         for end in itertools.accumulate(map(len, blocks[:-1])):
