@@ -166,15 +166,15 @@ def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, st
     """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
     refused: dict[str, str] = {}
 
-    def tried(name: str, function: Callable[[Any], Any], given: Any) -> list[Any]:
+    def tried(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
         try:
-            return [function(given)]
+            return [function(argument)]
         except UserError as error:
             refused[name] = str(error)
             return []
 
-    found = [package for point in entry_points() for package in tried(point.module, _package, point)]
-    names = [name for package in found for name in modules(package.__name__, package.__path__)]
+    packages = [package for point in entry_points() for package in tried(point.module, _package, point)]
+    names = [name for package in packages for name in modules(package.__name__, package.__path__)]
     for module in [module for name in names for module in tried(name, _module, name)]:
         tried(module.__name__, _check_decorated, module)
     return _registry, refused

@@ -355,8 +355,7 @@ class Discrepancy(Task, call=investigate):
         for line in recorded(train, held, "hold out"):
             say(line)
         job.prepare_log()
-        told: dict[str, Any] = {"records": train, "validate": held, "progress": lambda line: say(f"  {line}")}
-        return super().perform(job, **told, **instead)
+        return super().perform(job, records=train, validate=held, progress=lambda line: say(f"  {line}"), **instead)
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
