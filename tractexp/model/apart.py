@@ -12,8 +12,6 @@ from tractexp.model.sites import Site
 if TYPE_CHECKING:
     from tractexp.model.equations import Equations
 
-NAMING = ("flux", "lag", "lag_vector", "memory", "branch")  # words that take a name and its LaTeX first
-
 
 class Apart:
     """A view of `Equations` that ends every name in a suffix: what a second motor declares is a second motor.
@@ -26,10 +24,7 @@ class Apart:
         self._eq, self._suffix = eq, suffix
 
     def __getattr__(self, name: str) -> Any:
-        word = getattr(self._eq, name)
-        if name not in NAMING:
-            return word
-        return lambda own, latex, *more, **further: word(own + self._suffix, self._latex(latex), *more, **further)
+        return getattr(self._eq, name)
 
     def __contains__(self, what: Site | str) -> bool:
         return self._named(what) in self._eq
@@ -60,8 +55,23 @@ class Apart:
     def edit(self, site: Site | str, change: Callable[[sympy.Expr], sympy.Expr], shown: object = None) -> None:
         raise UserError(f"a motor edits the site {site}; of several motor groups only effects edit sites")
 
+    def flux(self, name: str, latex: str) -> Symbol:
+        return self._eq.flux(name + self._suffix, self._latex(latex))
+
+    def lag(self, name: str, latex: str) -> Symbol:
+        return self._eq.lag(name + self._suffix, self._latex(latex))
+
+    def lag_vector(self, name: str, latex: str) -> Symbol:
+        return self._eq.lag_vector(name + self._suffix, self._latex(latex))
+
+    def memory(self, name: str, latex: str) -> Symbol:
+        return self._eq.memory(name + self._suffix, self._latex(latex))
+
     def speed(self, latex: str = r"\omega") -> Symbol:
         return self._eq.speed(self._latex(latex), "omega" + self._suffix)
+
+    def branch(self, name: str, latex: str, *circuit: sympy.Expr, **behind: sympy.Expr) -> sympy.Expr:
+        return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **behind)
 
     def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr | None = None) -> None:
         self._eq.require(slack, f"of motor group {self._suffix.strip('_')}: {sentence}", shown)
