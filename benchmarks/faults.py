@@ -14,6 +14,7 @@ import contextlib
 import errno
 import io
 import json
+import operator
 import os
 import random
 import shutil
@@ -74,12 +75,13 @@ def forked(
             signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
             code = 1
             try:
-                code = act() or 0
+                code = operator.index(act() or 0)
             except BaseException:
                 import traceback
 
                 traceback.print_exc()
-            os._exit(code)
+            finally:  # whatever happens: two would go on here
+                os._exit(code)
         if kill_after is not None:
             while runs(child) and once and once.encode() not in os.pread(said.fileno(), 100_000, 0):
                 time.sleep(0.05)
@@ -271,8 +273,11 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
     from tractexp.tracking.run import TrackedRun
     from tractexp.tracking.runfile import save
 
+    def opens() -> None:
+        tracking.open_store(tracking.default_uri(empty))
+
     empty = made(work / "empty")
-    forked(lambda: tracking.open_store(tracking.default_uri(empty)))
+    forked(opens)
 
     def logs(folder: Path, n: int | None) -> Callable[[], None]:
         def act() -> None:

@@ -23,7 +23,7 @@ from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, place, sizes_of, with_terms
 from tractexp.discrepancy.proposal.effect import Library
-from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, term, terms
+from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, pick_of, term, terms
 from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import fitted
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
@@ -243,7 +243,7 @@ def test_the_library_adds_each_signal_that_is_picked():
     library = Library(ANSWER)
     eq = base(library).equations
     (defined,) = [e for s, e in eq.definitions.items() if s.name == f"{ANSWER}_signal"]
-    picked = {s: 1 for s in defined.free_symbols if s.name == library.pick("constant")}
+    picked = {s: 1 for s in defined.free_symbols if s.name == pick_of(ANSWER, "constant")}
     others = {s: 0 for s in defined.free_symbols if "pick_" in s.name and s not in picked}
     assert picked
     assert others
