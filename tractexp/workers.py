@@ -1,7 +1,7 @@
 """Worker processes for many calls, by `joblib.Parallel` with any of its backends.
 
 Three things joblib cannot do by its public calls. With one worker it runs calls in this process, which a call that
-kills its worker takes along; so one that is to be apart is two, of which `pre_dispatch` keeps one at work.
+kills its worker takes along; so one that is to be apart is two, which get one call at a time.
 Where a worker is killed, `Parallel` ends and does not say whose worker it was; so what was in work is called again,
 each in a `Parallel` of its own, and only a call that kills a worker by itself is to blame. A loky worker outlives a
 parent that is killed; so a thread of it watches the parent.
@@ -61,9 +61,12 @@ class Workers:
             n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
             dispatch: Any = {"batch_size": 1, "pre_dispatch": n}  # numbers, other than joblib's annotations say
             parallel: Any = Parallel(max(n, 1 + self.apart), return_as="generator_unordered", **dispatch)
-            results = parallel(delayed(_numbered)(function, k, item) for k, item in enumerate(items))
-            with contextlib.closing(results):
-                yield from (result for result in results if result is not None)
+            calls = (delayed(_numbered)(function, k, item) for k, item in enumerate(items))
+            # One at a time where one is at work: joblib drops a result that waits when the next call kills its worker.
+            for batch in ([call] for call in calls) if n == 1 else [calls]:
+                results = parallel(batch)
+                with contextlib.closing(results):
+                    yield from (result for result in results if result is not None)
 
     def results(
         self,
