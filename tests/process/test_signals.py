@@ -84,6 +84,8 @@ def desk(tmp_path_factory):
 )
 def test_a_task_hears_a_signal(task, way, desk, tmp_path):
     folder = desk if "table" in task else tmp_path
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as shells leave it to what they run in the background
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     sender = Sender(way, 0.7 if way == signal.SIGTERM else 1.4)
     try:
         done = run_command(*ALWAYS, *TASKS[task], cwd=folder)
