@@ -194,12 +194,12 @@ def _is_right(row: dict) -> bool:
 
 def _pairs(rows: Rows) -> tuple[list[str], list[list]]:
     lines = []
-    for (group, count), multiple in itertools.product((("pairs", "two"), ("triples", "three")), MULTIPLES):
-        full = [r for r in rows if r["group"] == f"{group} {multiple:g} x" and reached(r, multiple)]
+    for multiple in MULTIPLES:
+        full = [r for r in rows if r["group"] == f"pairs {multiple:g} x" and reached(r, multiple)]
         if full:
             partly = [r for r in full if r["verdict"] == "named" and {*r["names"]} < {*r["truth"]}]
             lines.append([
-                f"{count} effects, {multiple:g} x", len(full), sum(map(right, full)), sum(map(in_set, full)),
+                f"two effects, {multiple:g} x", len(full), sum(map(right, full)), sum(map(in_set, full)),
                 len(partly), _count(full, "unexplained"), sum(map(wrong, full)) - len(partly),
             ])  # fmt: skip
     head = ["hidden", "data sets", "exactly these", "these among the sets", "only a part of them", "unexplained",

@@ -51,9 +51,8 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "left_out": (LEFT_OUT, LARGE, PHYSICAL),
 }
 Trials = Iterator[cases.Planned]
-TOGETHER = {"pairs": 2, "triples": 3}
 ERROR = 0.01  # of the response: how inexact the loads are in which nothing is hidden
-SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", *TOGETHER)
+SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", "pairs")
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
@@ -76,9 +75,9 @@ def rows_of(name: str, salt: int | None, multiples: Container[float], **settings
     elif name == "field":
         for multiple, effect in itertools.product((m for m in PAIRED if m in multiples), PHYSICAL):
             yield f"field {multiple:g} x", cases.in_the_field(effect, multiple, salt, **settings)
-    elif name in TOGETHER:
+    elif name == "pairs":
         for m in (m for m in PAIRED if m in multiples):
-            yield f"{name} {m:g} x", cases.several(TOGETHER[name], m, salt, **settings)
+            yield f"{name} {m:g} x", cases.several(2, m, salt, **settings)
     else:
         group, sizes, effects = HIDDEN[name]
         for multiple, effect in itertools.product((m for m in sizes if m in multiples), effects):

@@ -140,9 +140,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
-    "second_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
-    "third_name_p": (3e-9, lambda c: at_fit(c, 2e-9, names=("one", "two")).asks_for_more, False),
-    "family_p": (3e-5, lambda c: worth(refitted(181.8, 2), refitted(200.0, 1), c.family_p), False),
+    "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
     "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
@@ -180,6 +178,12 @@ def test_every_criterion_has_a_case_and_an_origin():
         assert told["why"], name
 
 
+def test_a_member_of_a_family_pays_as_a_second_name_does():
+    p = Criteria().further_name_p
+    assert not worth(refitted(181.8, 2), refitted(200.0, 1), p)
+    assert worth(refitted(181.8, 2), refitted(200.0, 1), 3 * p)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_a_looser_criterion_decides_otherwise(name):
     looser, decide, by_default = CASES[name]
@@ -198,5 +202,5 @@ def test_loose_criteria_name_what_is_not_there():
     """A step of the load is in no catalogue: by default that is said, by loose criteria something is named for it."""
     made = events("load_step", size=2.0, count=3)[:2]
     assert investigate(base(), made, only=FEW).verdict.word == "unexplained"
-    loose = Criteria(adequate_p=0.0, second_name_p=0.5, third_name_p=0.5)
+    loose = Criteria(adequate_p=0.0, further_name_p=0.5)
     assert investigate(base(), made, only=FEW, criteria=loose).names != ()

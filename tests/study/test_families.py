@@ -267,28 +267,17 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
 
 
 @pytest.mark.parametrize(
-    ("names", "explained", "another"),
+    ("sets", "another"),
     [
-        ((), 0.0, True),
-        (("a",), 0.1, True),
-        (("a", "b"), 0.79, False),
-        (("a", "b"), 0.81, True),
-        (("a", "b", "c"), 1.0, False),
+        (((),), True),
+        (((), ("a",)), True),
+        (((), ("a",), ("a", "b")), False),
+        (((), ("a",), ("a",)), False),  # the pair led back to the same one: what follows would be the same search
+        (((), ("a",), ("b",)), True),
     ],
 )
-def test_a_third_effect_is_tried_where_two_explain_most(names, explained, another):
-    """Of 1,000 that exceed the noise of 600 samples."""
-    first = SimpleNamespace(fit=fit(1600.0, 0), context=SimpleNamespace(samples=600))
-    last = SimpleNamespace(fit=fit(1600.0 - 1000 * explained, len(names), *names))
-    assert worth_another([first, last] if names else [first]) == another
-
-
-def test_a_larger_set_that_led_back_to_the_one_before_is_not_tried_again():
-    """Of the third, the names of the second are left: what follows would be the same search."""
-    first = SimpleNamespace(fit=fit(1600.0, 0), context=SimpleNamespace(samples=600))
-    steps = [first, *(SimpleNamespace(fit=fit(deviance, 2, "a", "b")) for deviance in (700.0, 690.0))]
-    assert worth_another(steps[:2])
-    assert not worth_another(steps)
+def test_a_second_effect_is_tried_and_no_third(sets, another):
+    assert worth_another([SimpleNamespace(fit=fit(0.0, len(names), *names)) for names in sets]) == another
 
 
 def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):

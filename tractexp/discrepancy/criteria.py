@@ -41,17 +41,10 @@ class Criteria:
         0.003, (0.0, 1.0), "p of what a fit leaves, below which it leaves something", CHOSEN,
         "what naming leaves of 5 % is 0.005: six tests share it, and 199 draws give their tails by extrapolation",
     )  # fmt: skip
-    second_name_p: float = _criterion(
-        1e-5, (0.0, 1.0), "p that a second name must undercut", CHOSEN,
+    further_name_p: float = _criterion(
+        1e-5, (0.0, 1.0), "p that a second name must undercut, and by which another law or place must explain more than"
+        " the catalogue's, its further parameters paid for; at 0 neither is tried", CHOSEN,
         "a second name spoils a right first one, or patches up a wrong one",
-    )  # fmt: skip
-    third_name_p: float = _criterion(
-        1e-9, (0.0, 1.0), "p that a third name must undercut", CHOSEN, "as for the second, with hundreds of sets to try"
-    )
-    family_p: float = _criterion(
-        1e-5, (0.0, 1.0), "p by which another law or place must explain more than the catalogue's, its further"
-        " parameters paid for; at 0 none is tried", CHOSEN,
-        "as for a second name; what decides is that it leaves nothing",
     )  # fmt: skip
     other_valley: float = _criterion(
         0.8, (0.0, 1.0), "part of what a name that suffices explains that another effect must promise where the base"
@@ -175,10 +168,6 @@ class Criteria:
     def naming(self) -> float:
         """The false-alarm rate that naming may spend."""
         return self.naming_share * self.false_alarms
-
-    def further_name(self, names: int) -> float:
-        """The p that one more name must undercut where there are some already."""
-        return self.second_name_p if names == 1 else self.third_name_p
 
     def knows_noise(self, worth: float) -> bool:
         """Whether quiet stretches worth so many independent samples tell the noise exactly enough."""

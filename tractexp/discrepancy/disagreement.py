@@ -94,7 +94,7 @@ class Disagreement:
     def level(self) -> float:
         """The p that one more name must undercut."""
         level = self.chance.critical_p(self.criteria.naming)
-        return min(level, self.criteria.further_name(len(self.fit.names))) if self.fit.names else level
+        return min(level, self.criteria.further_name_p) if self.fit.names else level
 
     @property
     def suffices(self) -> bool:

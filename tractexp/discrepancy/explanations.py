@@ -32,10 +32,9 @@ from tractexp.discrepancy.window_search import behind_window
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
 
-MOST_EFFECTS = 3
+MOST_EFFECTS = 2  # of some 3,000 data sets that were judged, three named four times, and never the right ones
 MOST_STEPS = 6  # of adding and leaving out
-WORTH_A_THIRD = 0.8  # of what exceeds the noise: what two effects explain before a third is tried beside them
-SHORTLIST = {1: 10, 2: 8, 3: 6}  # sets of each size that are refitted
+SHORTLIST = {1: 10, 2: 8}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
@@ -106,17 +105,9 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
 
 
 def worth_another(steps: Sequence[Disagreement]) -> bool:
-    """Whether one more effect is tried beside those of the last tests; not again where that led back to the same set.
-
-    A third patches up what two do not explain: it is tried where they explain most of what exceeds the noise. None of
-    the first 1,121 data sets that were judged was named by three.
-    """
-    first, last = steps[0], steps[-1]
-    size, samples = len(last.fit.names), first.context.samples
-    explained = first.fit.deviance - last.fit.deviance
-    if len(steps) > 1 and steps[-2].fit.names == last.fit.names:
-        return False
-    return size < 2 or (size < MOST_EFFECTS and explained >= WORTH_A_THIRD * (first.fit.deviance - samples))
+    """Whether one more effect is tried beside those of the last tests; not where one led back to the same set."""
+    same = len(steps) > 1 and steps[-2].fit.names == steps[-1].fit.names
+    return len(steps[-1].fit.names) < MOST_EFFECTS and not same
 
 
 def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
@@ -131,7 +122,7 @@ def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Ref
     wanted = [(tuple(n for n in fit.names if n != left), at.without(fit.unit, [left])) for left in fit.names]
     fewer = refit(context, tests.noise, wanted)[0]
     gained, parameters = max(fewer.deviance - fit.deviance, 0.0), max(fit.parameters - fewer.parameters, 1)
-    if chdtrc(parameters, gained) < context.criteria.further_name(len(fewer.names)):
+    if chdtrc(parameters, gained) < context.criteria.further_name_p:
         return tests
     refits[fewer.names] = fewer
     return without_needless(base, examined(base.quiet, fewer, tests.noise, seed), refits, seed)
@@ -140,9 +131,9 @@ def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Ref
 def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
     """The tests at a member of a family that leaves nothing and explains more than these; else these. Adds to `refits`.
 
-    None is tried unless `family_p` asks for them, and none of waveforms: no criterion was calibrated with members.
+    None is tried at a `further_name_p` of 0, and none of waveforms: no criterion was calibrated with members.
     """
-    if not base.context.domain.calibrated or not base.context.criteria.family_p:
+    if not base.context.domain.calibrated or not base.context.criteria.further_name_p:
         return tests
     tests, fits = against_members(base, tests, refits, seed + FAMILIES)
     refits |= {f.names: f for f in fits}

@@ -37,7 +37,7 @@ def against_members(
     context, noise = base.context, tests.noise
     fits = member_fits(context, noise, refits, {m.effect.family for m in context.catalogue.members})
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, context.criteria.family_p):
+        if not worth(fit, tests.fit, context.criteria.further_name_p):
             continue
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
