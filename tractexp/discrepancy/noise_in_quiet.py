@@ -12,13 +12,9 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.jumps import jumps
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
+from tractexp.identification.observed import Observed
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import walk_of_load
-from tractexp.record import Event
-
-TOGETHER = 64  # sets of voltages in one call
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,16 +29,9 @@ class QuietNoise:
 
     @classmethod
     def at(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
-        """Where errors of the voltage act as they do on the base model at coordinates (D,)."""
-        if (errors := context.domain.input_errors(context.problem, _values(context, unit))) is not None:
-            return cls(context, errors)
-        most = context.records.voltage_errors
-        if not most:
-            return cls(context, None)
-        calm = _at_voltages(context, [context.events], unit)
-        parts = [range(k, min(k + TOGETHER, most)) for k in range(0, most, TOGETHER)]
-        off = [_at_voltages(context, [context.records.off_by(k) for k in part], unit) - calm for part in parts]
-        return cls(context, np.nan_to_num(np.concatenate(off)))
+        """Where errors of the record act as they do on the base model at coordinates (D,)."""
+        observed = Observed(context.kernels.bare, context.records.smoothed)
+        return cls(context, observed.input_errors(observed.problem.space.from_unit(unit[context.coordinates.base])))
 
     def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
         """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
@@ -81,13 +70,3 @@ def _values(context: Context, unit: np.ndarray) -> np.ndarray:
     """Free values (d,) of the problem of everything at coordinates (D,)."""
     space = context.problem.space
     return space.from_unit(unit[: space.dimension])
-
-
-def _at_voltages(context: Context, sets: Sequence[Sequence[Event]], unit: np.ndarray) -> np.ndarray:
-    """Residuals (n, C, N) of the base model at coordinates (D,), driven by the voltages of each set of the events."""
-    kernels, at = context.kernels, context.coordinates
-    everyone = [event for events in sets for event in events]
-    problem = Problem(context.model, everyone, kernels.bounds, kernels.fixed, kernels.substeps)
-    lane = np.r_[unit[at.base], np.tile(unit[at.before], len(sets))]
-    residuals = Likelihood.of(problem, white(context)).residuals(lane[None])[0]
-    return residuals.reshape(len(residuals), len(sets), -1).swapaxes(0, 1)

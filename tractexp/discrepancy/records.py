@@ -34,15 +34,6 @@ class Records:
     def events(self) -> tuple[Event, ...]:
         return tuple(s.event for s in self.smoothed)
 
-    @property
-    def voltage_errors(self) -> int:
-        """How many shapes of error the voltage of some event may still have."""
-        return max(len(s.errors) for s in self.smoothed)
-
-    def off_by(self, shape: int) -> list[Event]:
-        """The events with one of the errors of their voltage each."""
-        return [s.off_by(shape) for s in self.smoothed]
-
 
 def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
     """Raise `UserError` for events that do not belong together."""
