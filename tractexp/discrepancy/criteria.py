@@ -98,8 +98,8 @@ class Criteria:
         "there may be both, and a window that is not there costs much",
     )  # fmt: skip
     window_share: float = _criterion(
-        0.05, (0.0, 1.0), "part of what the best effect explains that such a window must explain, too", CHOSEN,
-        "of large effects nearly everything looks a little like a window",
+        0.5, (0.0, 1.0), "part of what the best effect explains that a window must explain", CHOSEN,
+        "what lacks something large takes a wrong window for a part of it",
     )  # fmt: skip
     blurred: float = _criterion(
         0.5, (0.0, 1e6), "variance from noise of the voltage, over that of the power, from which the measurement is not"
@@ -175,8 +175,8 @@ class Criteria:
 
     def least_window(self, best: float) -> float:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
-        clear = max(self.window_clear, self.window_share * best)
-        return max(self.window_least, min(best - self.window_behind, clear))
+        near = min(best - self.window_behind, self.window_clear)
+        return max(self.window_least, near, self.window_share * best)
 
     def promises(self, drop: float, explained: float) -> bool:
         """Whether an effect that would lower the deviance so far is looked for beside a name that explains so much."""

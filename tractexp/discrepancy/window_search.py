@@ -20,8 +20,6 @@ from tractexp.discrepancy.recorder_window import windows_of
 from tractexp.discrepancy.records import Records
 from tractexp.noise import Noise
 
-FAR = 2.0  # times the deviance that a window explains: no effect that only imitates a window explains as much
-
 
 @dataclass(frozen=True, eq=False)
 class WindowFit:
@@ -70,7 +68,7 @@ def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | No
     window = best.behind.records.window
     if window is not None and window.said:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None
-    return best if most < FAR * best.gained and best.gained > criteria.least_window(most) else None
+    return best if best.gained > criteria.least_window(most) else None
 
 
 def behind_window(base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int) -> BaseFit | None:
