@@ -1,4 +1,4 @@
-"""Are intervals as wide as they should be? python benchmarks/calibration.py [--phasors 200] [--waves 60]
+"""Are intervals as wide as they should be? python benchmarks/calibration.py [--phasors 440] [--waves 60]
 
 Simulation-based calibration (Talts et al. 2018): a truth is drawn from the prior of a generator that is not ours, with
 its own equations, frame and solver; the product identifies what that load draws, and the truth gets its rank in what
@@ -11,6 +11,7 @@ row may say which `commit` made it. The seeds are no other study's.
 """
 
 import argparse
+import itertools
 import json
 import os
 import sys
@@ -32,6 +33,7 @@ from hidden_effects import cases  # noqa: E402
 STORED = Path(__file__).with_suffix(".jsonl")
 SERIES = 48  # of the seeds of waves: `waves.SERIES` are others
 BINS = 10  # of the ranks
+LEVEL = 0.01  # of the test that ranks are uniform
 HALF = 1.959964  # standard deviations from the middle of a normal distribution to the end of its 95 %
 
 
@@ -50,7 +52,8 @@ def ranked(fit: Any, truth: Mapping[str, float]) -> dict[str, Any]:
     result = fit.result
     inside = {name: bool(low <= truth[name] <= high) for name, (low, high) in result.intervals.items() if name in truth}
     ranks = {name: rank(truth[name], result.parameters[name], result.intervals[name]) for name in inside}
-    return {"grade": str(fit.grade), "ranks": ranks, "inside": inside}
+    identified = [name for name in inside if result.verdicts[name].startswith("identified")]
+    return {"grade": str(fit.grade), "ranks": ranks, "inside": inside, "identified": identified}
 
 
 def phasors(number: int) -> dict[str, Any]:
@@ -66,7 +69,8 @@ def of_waves(number: int) -> dict[str, Any]:
     """The record of this number: a drawn load through a drawn fault."""
     case, events = wave_records.drawn_events([SERIES, number])
     row = {"kind": case.kinds[0], "rate": case.sampler.rate}
-    return row | ranked(waves.identified(events[0]), case.site.truth())
+    fit = waves.identified(events[0])
+    return row | ranked(fit, waves.truth_of(case.site, fit))
 
 
 def nth(some: Iterator[int], n: int) -> int:
@@ -101,34 +105,57 @@ def study(domain: str, count: int, path: Path) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    """Of each parameter: ranks by tenths, p that they are uniform, and the share of intervals that hold the truth."""
+def summary(rows: Sequence[Mapping[str, Any]], identified: bool = False) -> dict[str, dict[str, Any]]:
+    """Of each parameter, in all sets or in those that identify it: ranks by tenths, p that they are uniform, and the
+    share of intervals that hold the truth."""
     good = [row for row in rows if "failed" not in row]
     content = {}
     for name in good[0]["ranks"]:
-        ranks = [row["ranks"][name] for row in good]
+        own = [row for row in good if name in row["identified"]] if identified else good
+        ranks = [row["ranks"][name] for row in own]
         content[name] = {
             "tenths": np.histogram(ranks, BINS, (0, 1))[0].tolist(),
             "p": uniform(ranks),
-            "inside": float(np.mean([row["inside"][name] for row in good])),
+            "inside": float(np.mean([row["inside"][name] for row in own])),
         }
     return content
 
 
 def tables(rows: Sequence[Mapping[str, Any]]) -> str:
-    """The table of docs/uncertainty.md."""
-    lines = ["| sets | parameter | ranks by tenths | p, uniform | hold the truth |", "|---|---|---|---|---|"]
+    """What is stored, for people: every parameter, in all sets and in those that identify it."""
+    lines = ["| domain | parameter | sets | ranks by tenths | p, uniform | hold the truth |", f"|{6 * '---|'}"]
+    for domain, which in itertools.product(DOMAINS, (False, True)):
+        of = [row for row in rows if row["domain"] == domain]
+        for name, found in summary(of, which).items() if of else ():
+            tenths, sets = " ".join(map(str, found["tenths"])), f"{sum(found['tenths'])}{', identified' * which}"
+            lines.append(f"| {domain} | {name} | {sets} | {tenths} | {found['p']:.2g} | {found['inside']:.0%} |")
+    return "\n".join(lines)
+
+
+def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
+    """The sentences of docs/uncertainty.md."""
+    sentences = []
     for domain in DOMAINS:
         of = [row for row in rows if row["domain"] == domain]
-        for name, found in summary(of).items() if of else ():
-            tenths = " ".join(map(str, found["tenths"]))
-            lines.append(f"| {len(of)} {domain} | {name} | {tenths} | {found['p']:.2g} | {found['inside']:.0%} |")
-    return "\n".join(lines)
+        every, identified = summary(of), summary(of, identified=True)
+        held = sorted(found["inside"] for found in every.values())
+        sentences.append(
+            f"in {len(of)} sets of {domain} {held[0]:.0%} to {held[-1]:.0%} of the intervals hold the truth. Ranks are"
+            f" uniform (chi-square p > {LEVEL}) of all parameters{_but(every)}, and where they are identified of all"
+            f"{_but(identified)}"
+        )
+    return "; ".join(sentences)
+
+
+def _but(found: Mapping[str, Mapping[str, Any]]) -> str:
+    """The parameters whose ranks are not uniform, as an exception."""
+    uneven = [f"`{name}`" for name, of in found.items() if of["p"] < LEVEL]
+    return f" but {' and '.join(uneven)}" * bool(uneven)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--phasors", type=int, default=200, help="sets")
+    parser.add_argument("--phasors", type=int, default=440, help="sets")
     parser.add_argument("--waves", type=int, default=60, help="records")
     parser.add_argument("--out", type=Path, default=STORED)
     parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")

@@ -31,9 +31,12 @@ class Site:
     def devices(self) -> tuple[Device, ...]:
         return self.group, self.branch, self.shunt, *self.more
 
-    def truth(self) -> dict[str, float]:
-        """What the model `fifth_order_branch` calls it."""
-        return self.group.truth() | {"branch_resistance": self.branch.R / self.branch.X}
+    def truth(self, power: float = BASE_POWER) -> dict[str, float]:
+        """What the model `fifth_order_branch` calls it, per unit of so many MVA."""
+        there = power / BASE_POWER
+        on_base = {"X_prime": there, "R_s": there, "M": 1 / there, "T_m": 1 / there}
+        truth = {name: value * on_base.get(name, 1.0) for name, value in self.group.truth().items()}
+        return truth | {"branch_resistance": self.branch.R / self.branch.X}
 
 
 @dataclass(frozen=True)

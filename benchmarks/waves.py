@@ -39,8 +39,14 @@ def identified(event):
     )  # fmt: skip
 
 
-def judged(fit, truth: dict[str, float]) -> dict:
+def truth_of(site: waves.Site, fit) -> dict[str, float]:
+    """The parameters of a load, per unit of the base that the product fitted it on."""
+    return site.truth(fit.result.records[0]["base"]["power_MVA"])
+
+
+def judged(fit, site: waves.Site) -> dict:
     """How a fit stands to the truth."""
+    truth = truth_of(site, fit)
     result, row = fit.result, {"inside": {}, "z": {}, "off": {}, "wide": {}}
     for name, true in truth.items():
         (low, high), error = result.intervals[name], result.standard_errors[name]
@@ -57,7 +63,7 @@ def covered(series: str, seed: int) -> dict:
     started = time.perf_counter()
     case, events = waves.drawn_events([SERIES[series], seed])
     made = time.perf_counter()
-    row = judged(identified(events[0]), case.site.truth())
+    row = judged(identified(events[0]), case.site)
     row |= {"kind": case.kinds[0], "rate": case.sampler.rate, "samples": events[0].record.waves.samples.shape[1]}
     return row | {"made": made - started, "seconds": time.perf_counter() - made}
 
@@ -66,7 +72,7 @@ def clean(series: str, seed: int) -> dict:
     """The same record without noise, offsets and quantization: errors of equations and interpolation alone."""
     case, _ = waves.drawn_events([SERIES[series], seed])
     case = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
-    row = judged(identified(waves.events(case, [SERIES[series], seed])[0]), case.site.truth())
+    row = judged(identified(waves.events(case, [SERIES[series], seed])[0]), case.site)
     return {"off": row["off"], "epsilon_i": row["epsilon_i"], "rate": case.sampler.rate, "kind": case.kinds[0]}
 
 
@@ -80,7 +86,7 @@ def swapped(series: str, seed: int) -> dict:
     one, two = (f.result for f in fits)
     row = {"z": {}, "overlap": {}, "held_out": [r.events[1]["epsilon_i"] for r in (one, two)]}
     row["fitted"] = [r.events[0]["epsilon_i"] for r in (one, two)]
-    row["inside"] = {n: [judged(f, case.site.truth())["inside"][n] for f in fits] for n in NAMES}
+    row["inside"] = {n: [judged(f, case.site)["inside"][n] for f in fits] for n in NAMES}
     for name in NAMES:
         errors = [r.standard_errors[name] or np.inf for r in (one, two)]
         row["z"][name] = float((one.parameters[name] - two.parameters[name]) / np.hypot(*errors))

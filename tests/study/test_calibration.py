@@ -1,10 +1,12 @@
 """Ranks of truths in what is reported: `benchmarks/calibration.py`, its arithmetic and its stored rows."""
 
 import json
+from pathlib import Path
 
 import calibration
 import numpy as np
 import pytest
+import wave_records
 
 ROWS = [json.loads(line) for line in calibration.STORED.read_text(encoding="utf-8").splitlines()]
 
@@ -37,7 +39,21 @@ def test_a_set_of_the_generator_has_the_ranks_that_are_stored():
     assert row["ranks"] == pytest.approx(stored["ranks"], abs=0.01)
 
 
-@pytest.mark.parametrize(("domain", "least"), [("phasors", 60), ("waves", 3)])
+def test_the_docs_say_what_is_stored():
+    docs = (Path(__file__).parents[2] / "docs" / "uncertainty.md").read_text(encoding="utf-8")
+    assert calibration.in_words(ROWS) in " ".join(docs.split())
+
+
+def test_the_truth_of_a_load_is_told_on_the_base_that_it_was_fitted_on():
+    """Twice the base has twice the impedances per unit, and half of the torque and inertia."""
+    site = wave_records.site(np.random.default_rng(1))
+    one, two = site.truth(), site.truth(2 * wave_records.BASE_POWER)
+    assert {name: two[name] / one[name] for name in one} == pytest.approx(
+        dict.fromkeys(one, 1.0) | {"X_prime": 2.0, "R_s": 2.0, "M": 0.5, "T_m": 0.5}
+    )
+
+
+@pytest.mark.parametrize(("domain", "least"), [("phasors", 440), ("waves", 60)])
 def test_stored_sets_are_each_counted_once(domain, least):
     numbers = [row["number"] for row in ROWS if row["domain"] == domain]
     assert len(numbers) == len({*numbers}) >= least

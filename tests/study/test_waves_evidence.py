@@ -179,7 +179,7 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
 @pytest.fixture(scope="module")
 def row():
     case, events = waves.drawn_events([1, 3])
-    return study.judged(study.identified(events[0]), case.site.truth())
+    return study.judged(study.identified(events[0]), case.site)
 
 
 def test_parameters_lie_within_their_intervals_and_the_model_is_adequate(row):
@@ -195,7 +195,7 @@ def test_parameters_lie_within_their_intervals_and_the_model_is_adequate(row):
 def test_without_noise_little_but_interpolation_is_left():
     case, _ = waves.drawn_events([1, 3])
     still = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
-    row = study.judged(study.identified(waves.events(still, [1, 3])[0]), case.site.truth())
+    row = study.judged(study.identified(waves.events(still, [1, 3])[0]), case.site)
     assert row["epsilon_i"] < 2e-4
     # What the voltage did between samples at its edges is left open, which costs the branch's ratio most.
     limits = {"branch_resistance": 1e-2}
