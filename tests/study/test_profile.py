@@ -12,7 +12,8 @@ from tractexp.errors import UserError
 from tractexp.identification.descent import descend
 from tractexp.identification.posterior import PosteriorSample
 from tractexp.identification.problem import Problem
-from tractexp.identification.profile import End, LikelihoodProfile, checked, profiles, revised
+from tractexp.identification.profile import checked, profiles, revised
+from tractexp.identification.profile_lanes import End, LikelihoodProfile
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
 from tractexp.report import posterior

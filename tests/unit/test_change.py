@@ -47,7 +47,7 @@ def test_a_fifth_of_the_greatest_power_is_what_small_loads_are_measured_by(size)
 
 
 def test_a_step_stands_out_from_a_drift_beside_it():
-    """A drift of 1.5 % a cycle about a step of 10 %: the change is four times those beside it; without the step none."""
+    """A drift of 1.5 % a cycle about a step of 10 %: the change is four times those beside it."""
     drift = np.clip((np.arange(100 * N) - AT) / N, -6, 6) * 0.015
     step = 0.1 * (np.arange(100 * N) >= AT)
     (one,) = changes(1 + drift + step)
