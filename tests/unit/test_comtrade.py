@@ -442,6 +442,10 @@ def test_foreign_files_are_named():
     assert foreign.sentence("a/b.pqd") == ""
     assert "give the .cfg beside it" in foreign.sentence("x.hdr")
     assert foreign.sentence("x.cfg") == ""
+    records = [
+        name for name in ("a.PL4", "b.psout", "c.rec", "d.hdr", "e.zip", "f.pdf", "g.cfg") if foreign.is_record(name)
+    ]
+    assert records == ["a.PL4", "b.psout", "c.rec"]
 
 
 @pytest.mark.parametrize(("unit", "kilo"), [("V", 1e-3), ("kV", 1.0), ("KV", 1.0), ("mV", 1e-6), ("MV", 1e3)])

@@ -1,6 +1,7 @@
 """Where a dip is found, how deep, and what is refused."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tractexp.errors import UserError
-from tractexp.record import Record, describe, detect, find_dips
+from tractexp.record import Record, describe, detect, dips, find_dips
 from tractexp.record.event import noise
-from tractexp.record.fall import sample_noise
+from tractexp.record.fall import falls, sample_noise
+from tractexp.record.own_base import OwnBase
 
 
 def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002, slow=0.0, seed=0):
@@ -324,3 +326,41 @@ def test_a_voltage_beyond_all_measure_ends_in_no_warning():
     U = np.where((t >= 2) & (t < 2.15), 0.7, 1.0)
     U[500], U[600] = 1e30, 1e30
     assert detect(Record("made", t, U, 0.8 * np.ones(800), 0.4 * np.ones(800))).depth == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("size", [0.1, 110.0])
+def test_dips_and_swells_are_the_same_in_any_unit_of_voltage(size):
+    """A swell that rises slowly, two dips, and a long rise that ends in a dip, which is no swell."""
+    t = np.arange(9000) / 1000
+    U = 1 + 0.0005 * np.random.default_rng(3).standard_normal(9000)
+    U[600:700] += np.minimum(0.005 * np.arange(100), 0.1)
+    for first, stop, change in ((1500, 1600, -0.05), (2500, 2700, -0.6), (4000, 7000, 0.1), (7000, 7200, -0.3)):
+        U[first:stop] += change
+    lower, higher = falls(t, U)
+    assert [start for start, _ in lower] == [1500, 2500, 7000]
+    assert [end for _, end in higher] == [700]
+    assert 601 <= higher[0][0] <= 603  # where it leaves a tenth of the margin
+    assert falls(t, size * U) == (lower, higher)
+
+
+def test_the_end_of_a_dip_that_never_ends_is_that_of_the_record():
+    t = np.arange(1000) / 1000
+    U = np.where(t < 0.5, 1.0, 0.6)
+    (dip,) = dips.numbered([Record("long", t, U, 0.8 * U, 0.3 * U, source="long.csv")], "long.csv", 1.0, 10.0)
+    assert (dip.start, dip.end) == (0.5, t[-1])
+
+
+def test_a_load_without_active_power_before_its_dip_has_no_level():
+    t = np.arange(1000) / 1000
+    U = np.where((t > 0.5) & (t < 0.6), 0.6, 1.0)
+    record = Record("gaps", t, U, np.where(t <= 0.5, np.nan, 0.8), 0.3 * U, source="gaps.csv")
+    assert dips.level(record) == (1.0, 0.0)
+
+
+def test_one_base_beside_a_record_of_which_nobody_said_the_mva():
+    """Both are in the unit of one file then: 5 per unit of it are 2.5 of a record that has 2 of them as its own."""
+    own = OwnBase(power=50.0, file_power=10.0, in_mva=True)
+    there = SimpleNamespace(
+        base=SimpleNamespace(power=2.0), file_base=SimpleNamespace(power=1.0, in_mva=False, origin="")
+    )
+    assert own.over(there) == 2.5
