@@ -5,7 +5,6 @@ derivatives and steady state, and the power they draw. Kernel, steady state, par
 it. What stands at a site can be edited after it was placed: that is what a missing effect does.
 """
 
-import itertools
 from collections.abc import Callable, Iterable
 from typing import Any, Literal, NoReturn
 
@@ -13,14 +12,14 @@ import sympy
 from sympy import I, conjugate, im, re
 
 from tractexp.errors import Unfit, Unknown, UserError, nearest
-from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
+from tractexp.kernel.graph import Symbol, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
-from tractexp.model.graph import as_real_imag, replaced
-from tractexp.model.graph import halves as real_and_imaginary
+from tractexp.model.graph import replaced
 from tractexp.model.names import check_name
+from tractexp.model.real_form import RealForm, expanded
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
 from tractexp.model.symbols import is_real as _is_real
@@ -29,7 +28,6 @@ from tractexp.model.symbols import real_symbol as _real
 from tractexp.model.symbols import vector_symbol as _complex
 from tractexp.parameter import Parameter
 
-LONG = 300  # nodes of an expression
 LONG_AGO = -(10**6)  # s: the time at which a load rests before the event
 NOTHING = sympy.Integer(0)
 LOWEST = sympy.Rational(1, 20)  # of the voltage before the event: below it what draws a power is an admittance
@@ -94,7 +92,7 @@ class Equations:
         drawn = (sites.current, sites.zero_current) if self.waves else (sites.P, sites.Q)
         self._drawn: dict[Site, sympy.Expr] = dict.fromkeys(drawn, sympy.Integer(0))
         self._fluxes: dict[sympy.Expr, Symbol] = {}  # of branches at the bus, by resistance over reactance
-        self._halves: dict[sympy.Expr, tuple[sympy.Expr, sympy.Expr]] = {}  # of expressions, as names stand now
+        self._real_form = RealForm(self.definitions, self.states, by_name=self.waves)
         self._lost = NOTHING, NOTHING  # power [pu] between the recorded bus and that which all parts see
         self._owners: dict[str, str] = {}  # who declared the parameter, state or quantity of a name
         self._writer = "bus"
@@ -268,7 +266,7 @@ class Equations:
             before = self._named("current", before)
         expression = sympy.sympify(change(before))
         self._check_kind(site, expression)
-        self._halves.clear()
+        self._real_form.forget()
         self.edits.setdefault(self._writer, []).append(site.name)
         if site in self._drawn:
             self._drawn[site] = expression
@@ -461,7 +459,7 @@ class Equations:
         share = sympy.Integer(1) if not self.waves or size == self.U0**2 else size / self.U0**2
         self.definitions[self.P_s0] = (self.P0 - others[0] - lost[0]) / share
         self.definitions[self.Q_s0] = (self.Q0 - others[1] - lost[1]) / share
-        self._halves.clear()
+        self._real_form.forget()
         for symbol, declared in (self.states | self.memories).items():
             self._check_still(f"the value before the event of '{symbol}'", declared.initial)
         for requirement in self.requirements:
@@ -509,10 +507,7 @@ class Equations:
 
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
-        expression = sympy.sympify(expression)
-        while names := {s for s in symbols_of(expression) & self.definitions.keys() if named(s)}:
-            expression = replaced(expression, {s: self.definitions[s] for s in names})
-        return expression
+        return expanded(sympy.sympify(expression), self.definitions, named)
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
         """(symbol, derivative, initial) of each real state, phasors split in two, names expanded."""
@@ -536,80 +531,15 @@ class Equations:
         return rows
 
     def parts(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part in real symbols, names expanded.
-
-        A name that stands for something real is lowered by itself and put in last: products are not expanded
-        across it, so that it stays one common subexpression. What was split once is not split again: a derivative is
-        asked for as what moves, and as what vanishes before the event.
-        """
-        if expression not in self._halves:
-            self._halves[expression] = self._split(sympy.sympify(expression))
-        return self._halves[expression]
-
-    def _split(self, expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part, reckoned anew."""
-        split: dict[Symbol, sympy.Expr] = {}
-        for state in self.states:
-            if not state.is_real:
-                a, b = phasor_parts(state)
-                a0, b0 = phasor_parts(start_symbol(state))
-                split |= {state: a + I * b, start_symbol(state): a0 + I * b0}
-        if self.waves:  # of space vectors products are not expanded across a name either
-            return self._parts_by_name(expression, split)
-        lowered = replaced(self.expand(expression, lambda s: not s.is_real), split)
-        if _is_real(lowered):
-            both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
-        else:
-            both = map(_shorter, as_real_imag(lowered))
-        real, imaginary = (replaced(e, {s: self.real(s) for s in self._names(e)}) for e in both)
-        return real, imaginary
-
-    def _parts_by_name(self, expression: sympy.Expr, split: dict[Symbol, sympy.Expr]) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part where every name, real or complex, is lowered by itself."""
-        names = {s for s in symbols_of(expression) & self.definitions.keys() if not s.is_real}
-        halves = {s: phasor_parts(s) for s in names}
-        lowered = replaced(expression, split | {s: a + I * b for s, (a, b) in halves.items()})
-        both = real_and_imaginary(lowered)
-        values = {}
-        for s, pair in halves.items():
-            values |= zip(pair, self._parts_of(s), strict=True)
-        real, imaginary = (replaced(_shorter(e), values | {s: self.real(s) for s in self._names(e)}) for e in both)
-        return real, imaginary
-
-    def _names(self, expression: sympy.Expr) -> set[Symbol]:
-        return symbols_of(expression) & self.definitions.keys()
+        """Real and imaginary part in real symbols, names expanded."""
+        return self._real_form.parts(expression)
 
     def real(self, expression: sympy.Expr) -> sympy.Expr:
         """The real part of an expression that is meant to be real."""
-        if isinstance(expression, Symbol) and expression in self.definitions:
-            return self._parts_of(expression)[0]
-        return self.parts(expression)[0]
-
-    def _parts_of(self, name: Symbol) -> tuple[sympy.Expr, sympy.Expr]:
-        """Real and imaginary part of a named quantity."""
-        return self.parts(self.definitions[name])
+        return self._real_form.real(expression)
 
     def latex(self) -> list[str]:
         """The equations one a line: states, memories, named quantities, power, steady state."""
         from tractexp.model.printed import lines
 
         return lines(self)
-
-
-def _shorter(expression: sympy.Expr) -> sympy.Expr:
-    """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded.
-
-    Long ones stay as they are: they gain nothing, and expanding them takes seconds.
-    """
-    if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
-        return expression
-    if not any(
-        isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args) for part in nodes(expression)
-    ):
-        return expression
-    extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
-    hidden: dict[Any, Any] = {part: _real(f"_extreme{k}") for k, part in enumerate(extremes)}
-    plain: Any = expression.xreplace(hidden)  # SymPy compares the arguments of a maximum for seconds
-    expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
-    chosen: Any = min(plain, expanded, key=operations)
-    return chosen.xreplace({symbol: part for part, symbol in hidden.items()})
