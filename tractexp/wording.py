@@ -1,10 +1,13 @@
 """Numbers as a person reads them: the one format of probabilities and errors on pages and the console."""
 
+import itertools
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
 
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
+MANY = 3  # alternatives that share a name, or figures: so many are told by what they have in common
 MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
 
 
@@ -52,6 +55,27 @@ def epsilon(error: float | None) -> str:
 def joined(names: Sequence[str], last: str = "and") -> str:
     """Names as a sentence lists them: 'a', 'a and b', 'a, b and c'."""
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
+
+
+def alternatives(sets: Sequence[Sequence[str]]) -> str:
+    """Sets of names as alternatives; many that share a name by that name and what may stand beside it: 'a and b or c',
+    'a beside one more effect (b, c or d)'."""
+    if not sets:
+        return ""
+    common = Counter(itertools.chain(*sets)).most_common(1)[0][0]
+    sharing = [names for names in sets if common in names and len(names) > 1]
+    if len(sharing) < MANY:
+        return joined([joined(names) for names in sets], "or")
+    beside = joined([joined([name for name in names if name != common]) for names in sharing], "or")
+    others = [joined(names) for names in sets if names not in sharing]
+    return joined([f"{common} beside one more effect ({beside})", *others], "or")
+
+
+def listed(values: Sequence[float], shown: Callable[[float], str]) -> str:
+    """Figures as a sentence lists them; of many the smallest and the largest."""
+    if len(values) > MANY:
+        return f"{shown(min(values))} to {shown(max(values))}"
+    return joined([shown(value) for value in values])
 
 
 def as_sentence(text: str) -> str:

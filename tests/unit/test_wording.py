@@ -2,7 +2,7 @@
 
 import pytest
 
-from tractexp.wording import in_words, joined, percent, with_error
+from tractexp.wording import alternatives, in_words, joined, listed, percent, with_error
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,18 @@ def test_names_are_listed_as_in_a_sentence():
 
 def test_a_share_is_never_more_than_all_or_less_than_nothing():
     assert [percent(share) for share in (-0.3, 0.234, 2.08)] == ["0%", "23%", "100%"]
+
+
+def test_alternatives_that_share_a_name_are_told_by_it():
+    pairs = [("b", "a"), ("a", "c"), ("a", "d")]
+    assert alternatives(pairs) == "a beside one more effect (b, c or d)"
+    assert alternatives([*pairs, ("b", "c")]) == "a beside one more effect (b, c or d) or b and c"
+    assert alternatives(pairs[:2]) == "b and a or a and c"
+    assert alternatives([("a",), ("b",), ("c",)]) == "a, b or c"
+    assert alternatives([("a",)]) == "a"
+    assert alternatives([]) == ""
+
+
+def test_many_figures_are_told_by_their_ends():
+    assert listed([0.2, 0.1, 0.4, 0.3], percent) == "10% to 40%"
+    assert listed([0.2, 0.1], percent) == "20% and 10%"

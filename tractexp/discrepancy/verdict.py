@@ -16,7 +16,7 @@ from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import joined, percent
+from tractexp.wording import alternatives, joined, listed, percent
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 NONE, NAMED, TIED, UNEXPLAINED = "none", "named", "tied", "unexplained"
@@ -153,8 +153,8 @@ def _named(names: Sequence[str], tested: int, fitted: int) -> str:
 
 def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
-    shares = joined([percent(weighed.assessments[tuple(names)].gap.explained) for names in sets], "and")
-    spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
+    shares = listed([weighed.assessments[tuple(names)].gap.explained for names in sets], percent)
+    spoken = alternatives([_spoken(names, weighed) for names in sets])
     others = sum(bool(r.rejected) for r in weighed.survivors.rivals)
     other = "the other set of its size is" if others == 1 else f"the {others} other sets of its size are"
     rest = f", and {other} rejected" * (len(sets) == 1 and others > 0)
@@ -171,11 +171,11 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     chosen = [predicted.sets[tuple(names)] for names in sets]
     size = len(chosen[0].names)
     rest = [p for p in predicted.ranked(size, predicted.context.criteria.ahead) if p.names not in sets]
-    off = joined([in_percent(p.error) for p in chosen], "and")
+    off = listed([p.error for p in chosen], in_percent)
     following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
     worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
     worse += f" {in_percent(rest[0].error)}" if rest else ""
-    spoken = joined([joined(_spoken(names, weighed)) for names in sets], "or")
+    spoken = alternatives([_spoken(names, weighed) for names in sets])
     if len(sets) > 1:
         sentence = (
             f"{spoken}: they predict the held-out events within {off} of the response, which cannot tell them apart"
@@ -188,8 +188,7 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
 def _tied(sets: Sequence[Sequence[str]]) -> str:
     """Several explanations, told as the alternatives they are."""
     each = "either" if len(sets) == 2 else "each"
-    sentence = joined([joined(names) for names in sets], "or")
-    return f"{sentence}: {each} explains the disagreement, and these events cannot tell them apart"
+    return f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them apart"
 
 
 def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:

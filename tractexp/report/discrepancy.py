@@ -21,7 +21,7 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import headlines, proposed
-from tractexp.wording import as_sentence, counted, epsilon, joined, percent
+from tractexp.wording import alternatives, as_sentence, counted, epsilon, joined, percent
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
@@ -36,7 +36,7 @@ CURRENTS = (
 def summary(findings: "Outcome") -> Report:
     """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
     content, left = findings.content, findings.remainder.caption
-    names = " or ".join(map(joined, content["name_sets"]))
+    names = alternatives(content["name_sets"])
     report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if findings.names else "base"
     report.items([findings.reason, *findings.sizes, *[left] * bool(left), *findings.proposed])
@@ -83,8 +83,8 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
     fitted = f"{counted(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held out"
     lead = "; ".join([*described(identities), f"{findings.context.model.title}, {fitted}"])
     page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
-    spoken = [joined([findings.catalogue.spoken(name) for name in names]) for names in findings.verdict.sets]
-    head = f"{findings.verdict.word.upper()} {' or '.join(spoken)}".strip()
+    spoken = [[findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets]
+    head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
     sentences = [as_sentence(findings.verdict.reason), *left, *headlines(findings), _graded(findings)]
     kind = "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]

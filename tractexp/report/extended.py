@@ -11,7 +11,7 @@ from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.recommended import held
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
-from tractexp.wording import joined, with_error
+from tractexp.wording import alternatives, joined, with_error
 
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 
@@ -79,8 +79,8 @@ def equations(page: Report, findings: Findings) -> None:
     from tractexp.model.printed import changed
 
     page.heading("The extended model")
-    if others := [joined(names) for names in findings.verdict.sets[1:]]:
-        page.text(f"It has {joined(findings.names)}; {joined(others, 'or')} instead would fit these events as well.")
+    if others := alternatives(findings.verdict.sets[1:]):
+        page.text(f"It has {joined(findings.names)}; {others} instead would fit these events as well.")
     page.text(
         f"conf/model/extended.yaml beside this page: {use_of(findings.context.load.domain, 'conf')}. Its equations"
         " that changed or came in:"
