@@ -85,7 +85,11 @@ def _averaged(y, window, out):
     beyond = whole.max(initial=0) + 1
     wide = _padded(y, beyond, edge=True)
     ahead, behind = beyond + whole, beyond - whole
-    sums = np.cumsum(wide, -1, out=_room("sums", wide.shape))
+    sums = _room("sums", wide.shape)  # from the first sample on, so that no row's depend on the others' windows
+    np.cumsum(y, -1, out=sums[..., beyond:-beyond])
+    steps = np.arange(1.0, beyond + 1)
+    sums[..., :beyond] = -y[..., :1] * (beyond - steps)
+    sums[..., -beyond:] = sums[..., -beyond - 1, None] + y[..., -1:] * steps
     arrays = dict.fromkeys(("ahead", "behind"), wide) | dict.fromkeys(("to_ahead", "to_behind"), sums)
     shifts = {"ahead": ahead, "behind": behind, "to_ahead": ahead, "to_behind": behind}
     _written(MEAN, out, shifts, arrays, {"r": window / 2 - whole, "each": 1 / window})

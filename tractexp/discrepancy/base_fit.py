@@ -34,11 +34,16 @@ class BaseFit:
 
 def base_fit(context: Context) -> BaseFit:
     """Fit the base model from all over its box, where its own fast kernel fits it best."""
-    at, alone = context.coordinates, Likelihood.of(context.kernels.bare)
-    ends = distinct(explored(alone), alone.free)  # the best may not stay so once what the recorder did is free
-    local_minima = np.tile(at.null, (len(ends), 1))
-    local_minima[:, [*at.base, *at.before]] = ends
-    return fitted_from(context, list(local_minima), list(local_minima))
+    minima = minima_of(context, Likelihood.of(context.kernels.bare))  # the first may not stay the best: faults are free
+    return fitted_from(context, minima, minima)
+
+
+def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
+    """Coordinates (D,) of the best fits of the base model alone by this likelihood, from all over its box."""
+    at, ends = context.coordinates, distinct(explored(bare), bare.free)
+    minima = np.tile(at.null, (len(ends), 1))
+    minima[:, [*at.base, *at.before]] = ends
+    return list(minima)
 
 
 def fitted_from(context: Context, starts: Sequence[np.ndarray], local_minima: Sequence[np.ndarray]) -> BaseFit:

@@ -22,6 +22,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from tractexp.discrepancy.base_fit import minima_of
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
@@ -32,6 +33,7 @@ from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_re
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.noise_in_quiet import white
 from tractexp.discrepancy.records import Records
+from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import block_sums, noise_variance
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -189,7 +191,8 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
     """The base model and sets of effects, each as it fits best by least squares."""
     base, context = explained.base, explained.base.context
     say = lambda line: context.effort.say(f"{line}, by least squares")  # noqa: E731
-    begun = [explained.steps[0].fit.unit, *base.local_minima]
+    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0]).with_initial_power
+    begun = [explained.steps[0].fit.unit, *base.local_minima, *minima_of(context, squares)]
     bare = refit(context, noise, [((), unit) for unit in begun])[0]
     ground = explained.steps[0].at(bare, noise)
     refits: dict[Names, Refit] = {(): bare}
