@@ -142,6 +142,19 @@ def test_each_motor_takes_the_effects_that_make_sense_for_it(motor):
     assert all(why.startswith("its equations have no ") or why == shared for why in told.values())
 
 
+@pytest.mark.parametrize("name", [n for n in NAMES if n not in REFUSED["electromechanical"]])
+def test_a_candidate_has_the_same_bits_alone_and_among_others(name):
+    """On any number of cores candidates are parted otherwise."""
+    rng = np.random.default_rng(len(name))
+    own = [rng.uniform(*p.bounds, size=7) for p in effect(name).parameters]
+    candidates = np.column_stack([np.tile(TRUTH, (7, 1)), *own])
+    drive = Drive.of([dip(0.5)])
+    together = model(name).simulate(drive, candidates)
+    for k, one in enumerate(candidates):
+        alone = model(name).simulate(drive, one)
+        np.testing.assert_array_equal(alone.outputs[:, 0], together.outputs[:, k])
+
+
 def test_a_static_load_with_a_frequency_exponent_needs_no_other():
     static = get("model/static", "exponential_frequency")()
     alone = compose(get("model/motor", "none")(), static)
