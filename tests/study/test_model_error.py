@@ -66,6 +66,13 @@ def test_a_drift_before_the_dip_is_no_noise():
     assert np.sqrt(quiet) == pytest.approx(np.sqrt(2) * 4e-3, rel=0.2)
 
 
+def test_one_block_tells_nothing_of_chance(monkeypatch):
+    monkeypatch.setattr("tractexp.identification.model_error.LENGTH", 100.0)
+    error = model_error([played(-0.1, -0.1)])
+    assert error.value == pytest.approx(0.1, rel=1e-3)
+    assert error.interval == (0.0, np.inf)
+
+
 def test_events_count_by_the_size_of_their_responses():
     one, two = played(-0.1, -0.1), played(-0.3, -0.3, depth=0.2, name="mild")
     error, alone = model_error([one, two]), model_error([two])

@@ -5,6 +5,7 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.record.phasor import fundamental, measure, one_cycle, sequences, track
+from tractexp.recording.estimator import estimator_of
 
 PHASES = np.array([100, 80 * np.exp(-2.2j), 95 * np.exp(2.0j)])  # unbalanced on purpose
 FREQUENCIES = [48.5, 50.0, 51.7]
@@ -125,6 +126,17 @@ def test_skew_turns_a_channel_back_by_the_time_it_was_late():
 def test_too_short_a_waveform_is_refused():
     with pytest.raises(UserError, match="100 samples at 3200 Hz are too short"):
         measure(np.ones((6, 100)), 3200.0, 50.0)
+
+
+def test_a_waveform_must_span_its_estimators_window_and_one_phasor_more():
+    window = estimator_of({"name": "m_class"}).averager
+    every, rate = 3, 3200.0  # samples from phasor to phasor
+    least = 2 * (window(rate, 50.0).reach + every) + 1
+    t = np.arange(least) / rate
+    whole = measure(three_phase(50.0, t), rate, 50.0, window=window)
+    assert len(whole.t) >= 3
+    with pytest.raises(UserError, match=f"{least - 1} samples at 3200 Hz are too short"):
+        measure(three_phase(50.0, t[:-1]), rate, 50.0, window=window)
 
 
 def three_phase(f, t, lag=0.5, distortion=0.0, noise=0.0, seed=0):
