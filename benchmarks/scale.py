@@ -245,12 +245,12 @@ def slopes(rows: Sequence[dict[str, Any]], idle: float) -> list[float | None]:
 
 def text(stored: dict[str, Any]) -> str:
     """The table of the page."""
-    lines = ["| what grows | size | CPU, s | wall, s | peak, MB | slope |", "|---|---|---|---|---|---|"]
+    lines = ["| what grows | size | CPU, s | peak, MB | slope |", "|---|---|---|---|---|"]
     for name, case in CASES.items():
         rows = stored.get(name, [])
         for k, (found, slope) in enumerate(zip(rows, [None, *slopes(rows, stored["idle"])], strict=False)):
             last = "" if slope is None else f"{slope:.2f}"
-            cells = f"{found['size']:,} | {found['cpu']:.1f} | {found['wall']:.1f} | {found['peak']} | {last}"
+            cells = f"{found['size']:,} | {found['cpu']:.1f} | {found['peak']} | {last}"
             lines.append(f"| {'' if k else case.of} | {cells} |")
     return "\n".join(lines)
 

@@ -24,3 +24,8 @@ def test_every_optimizer_effect_and_part_is_described():
         for name, cls in discover().get(group, {}).items():
             if cls.__module__.startswith(("tractexp.", "tractexp_plugins.")):  # not what another test registered
                 assert f"`{name}`" in text or f"{group}={name}" in text, f"{group} {name}"
+
+
+def test_the_pages_are_read_in_an_afternoon():
+    """At most 30,000 words, the bars of tables counted: a fact that comes in pushes one out."""
+    assert sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").glob("*.md")) <= 30_000
