@@ -105,7 +105,7 @@ def study(domain: str, count: int, path: Path) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def summary(rows: Sequence[Mapping[str, Any]], identified: bool = False) -> dict[str, dict[str, Any]]:
+def summary(rows: Sequence[Mapping[str, Any]], *, identified: bool = False) -> dict[str, dict[str, Any]]:
     """Of each parameter, in all sets or in those that identify it: ranks by tenths, p that they are uniform, and the
     share of intervals that hold the truth."""
     good = [row for row in rows if "failed" not in row]
@@ -124,10 +124,10 @@ def summary(rows: Sequence[Mapping[str, Any]], identified: bool = False) -> dict
 def tables(rows: Sequence[Mapping[str, Any]]) -> str:
     """What is stored, for people: every parameter, in all sets and in those that identify it."""
     lines = ["| domain | parameter | sets | ranks by tenths | p, uniform | hold the truth |", f"|{6 * '---|'}"]
-    for domain, which in itertools.product(DOMAINS, (False, True)):
+    for domain, identified in itertools.product(DOMAINS, (False, True)):
         of = [row for row in rows if row["domain"] == domain]
-        for name, found in summary(of, which).items() if of else ():
-            tenths, sets = " ".join(map(str, found["tenths"])), f"{sum(found['tenths'])}{', identified' * which}"
+        for name, found in summary(of, identified=identified).items() if of else ():
+            tenths, sets = " ".join(map(str, found["tenths"])), f"{sum(found['tenths'])}{', identified' * identified}"
             lines.append(f"| {domain} | {name} | {sets} | {tenths} | {found['p']:.2g} | {found['inside']:.0%} |")
     return "\n".join(lines)
 

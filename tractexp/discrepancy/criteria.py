@@ -94,7 +94,7 @@ class Criteria:
         "an effect has parameters to fit, a window has none",
     )  # fmt: skip
     window_clear: float = _criterion(
-        30.0, (0.0, 1e6), "deviance explained by a window that is believed beside any effect", CHOSEN,
+        30.0, (0.0, 1e6), "deviance explained by a window that is believed though an effect explains more", CHOSEN,
         "there may be both, and a window that is not there costs much",
     )  # fmt: skip
     window_share: float = _criterion(
