@@ -377,7 +377,6 @@ def main() -> int:
     parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
     parser.add_argument("--against", type=Path, help="a file of rows before: how far estimates moved")
     options = parser.parse_args()
-    os.environ.setdefault("NUMBA_NUM_THREADS", "1")  # times are of one thread
     rows = rows_of(options.out)
     if options.tables:
         print(tables(rows))

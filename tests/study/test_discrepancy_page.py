@@ -17,7 +17,7 @@ from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.record.identity import Identity
-from tractexp.report import candidates, discrepancy, extended, overlay
+from tractexp.report import candidates, discrepancy, overlay
 from tractexp.report.events import WITHIN
 from tractexp.wording import joined
 
@@ -153,13 +153,6 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
         assert f"{low:.4g} to {high:.4g}" in words
     told = content(named)["parameters"]
     assert told == {n: {"value": e.value, "standard_error": e.error} for n, e in after.items()}
-
-
-def test_a_long_verdict_is_cut_in_the_table_and_whole_below():
-    weak = "weakly identified: ± 32 %; trades against q_v (correlation 0.99); C q_v^0.2 is known to ± 1.8 %"
-    assert extended.brief(weak) == "weakly identified: ± 32 %"
-    assert extended.brief("at its bound (0.3; widen model.bounds.C)") == "at its bound (0.3; widen model.bounds.C)"
-    assert extended.brief("identified (± 5 %)") == "identified (± 5 %)"
 
 
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):

@@ -13,11 +13,10 @@ from tractexp.identification.descent import descend
 from tractexp.identification.posterior import PosteriorSample
 from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked, profiles, revised
-from tractexp.identification.profile_lanes import End, LikelihoodProfile
+from tractexp.identification.profile_lanes import End, LikelihoodProfile, Region
 from tractexp.identification.uncertainty import conclude, threshold
-from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict
+from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
 from tractexp.report import posterior
-from tractexp.report.identify import brief
 from tractexp.report.profile import meaning, report
 
 
@@ -227,14 +226,21 @@ def test_the_page_says_where_curvature_misleads(quiet):
         assert re.fullmatch(sentence + r"\.", meaning(found, replace(profile, **changes))), sentence
 
 
-def test_a_verdict_tells_the_interval_of_the_profile_and_no_symmetric_one():
-    """The profile's interval is lopsided: half of the curvature's would mislead."""
-    by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)", "± 26 %")
+def test_a_verdict_repeats_no_interval():
+    """The table has the one interval that holds: a half-width of the curvature beside it would be another."""
+    by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)")
     profile = LikelihoodProfile(
         "C", np.array([0.3, 0.5, 0.9]), np.array([5.0, 0.0, 5.0]), (0.31, 0.88), (End.CLOSED, End.CLOSED), ()
     )
     verdict = str(revised(by_curvature, profile, 0.0, 1.0))
-    assert verdict == "weakly identified: 0.31 .. 0.88 by its profile; trades against T_m (correlation 0.98)"
+    assert verdict == "weakly identified: trades against T_m (correlation 0.98)"
     assert brief(verdict) == "weakly identified"
-    assert brief("identified (0.31 .. 0.33 by its profile)") == "identified"
-    assert brief("identified (± 3 %)") == "identified (± 3 %)"
+    assert brief("identified") == "identified"
+
+
+def test_places_that_fit_are_looked_for_beside_an_interval_without_ends():
+    region = Region(np.array([[0.2], [0.9]]), np.array([[0.5], [2.0]]))
+    with np.errstate(all="raise"):
+        assert region.outermost(0, -np.inf, np.inf) == []
+    assert region.outermost(0, 0.3, 0.4) == [0]
+    assert region.outermost(0, 0.0, 0.1) == [0]

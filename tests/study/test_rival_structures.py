@@ -76,10 +76,28 @@ def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
     from tractexp.identification import rivals as module
 
     known, _ = missing
+    known = replace(known, rivals=())
     j = known.names.index("T_m")
     far = RivalStructure("other", 1.0, {"T_m": float(1.5 * known.values[j])})
-    told = dict(module._moved(replace(known, rivals=()), [far]))
+    told = dict(module._moved(known, replace(known, rivals=(far,))))
     assert list(told) == ["T_m"]
     assert known.verdicts["T_m"].word == IDENTIFIED
     assert told["T_m"].word == WEAK
     assert f"with other it is {1.5 * known.values[j]:.4g}" in told["T_m"].detail
+
+
+def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(missing):
+    """Each moves it by a tenth only, but one up and one down: with its scatter that is more than a fifth each way."""
+    from tractexp.identification import rivals as module
+
+    known, _ = missing
+    known = replace(known, rivals=())
+    j = known.names.index("T_m")
+    value = float(known.values[j])
+    known = replace(known, profiled=dict(known.profiled) | {"T_m": (0.88 * value, 1.12 * value)})
+    rivals = tuple(RivalStructure(f"by {share}", 1.0, {"T_m": share * value}) for share in (0.9, 1.1))
+    assert dict(module._moved(known, replace(known, rivals=rivals[:1]))) == {}
+    assert module.WITHIN == 0.2
+    both = dict(module._moved(known, replace(known, rivals=rivals)))
+    assert both["T_m"].word == WEAK
+    assert known.verdicts["T_m"].word == IDENTIFIED

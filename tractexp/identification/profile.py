@@ -20,7 +20,6 @@ from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import (
     BOUND,
     IDENTIFIED,
-    PROFILED,
     UNIDENTIFIED,
     WEAK,
     WITHIN,
@@ -94,7 +93,7 @@ def revised(
     else:
         word = IDENTIFIED
     detail = "; ".join(filter(None, (verdict.detail, profile.verdict)))
-    return ParameterVerdict(word, detail, f"{a:.4g} .. {b:.4g} {PROFILED}")
+    return ParameterVerdict(word, detail)
 
 
 def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:

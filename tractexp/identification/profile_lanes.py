@@ -68,7 +68,7 @@ class Region:
 
     def outermost(self, c: int, low: float, high: float) -> list[int]:
         """Which points lie farthest below and above an interval of the c-th parameter and fit; [] where none does."""
-        values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], (low + high) / 2)
+        values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], low)
         if not len(values):
             return []
         down, up = int(values.argmin()), int(values.argmax())

@@ -7,7 +7,7 @@ Which structures are tried the plugins say (`Part.rival`); an effect that the eq
 static load that refuses an effect of the model.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import WITHIN, ParameterVerdict, size
+from tractexp.identification.verdict import IDENTIFIED, WITHIN, ParameterVerdict, size
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
 from tractexp.plugin import discover, get
@@ -46,20 +46,20 @@ def with_rivals(uncertainty: Uncertainty, parts: Callable[[int], Counting] = unc
         for name, model in structures:
             candidates.append(_fitted(uncertainty, name, model))
             ended()
-    fits = tuple(rival for rival in candidates if rival is not None)
-    return replace(uncertainty, rivals=fits, verdicts=uncertainty.verdicts | dict(_moved(uncertainty, fits)))
+    beside = replace(uncertainty, rivals=tuple(rival for rival in candidates if rival is not None))
+    return replace(beside, verdicts=uncertainty.verdicts | dict(_moved(uncertainty, beside)))
 
 
-def _moved(uncertainty: Uncertainty, rivals: Sequence[RivalStructure]) -> Iterator[tuple[str, ParameterVerdict]]:
-    """Verdicts of the parameters that a rival structure moves beyond their interval: the farthest is told."""
-    own = uncertainty.intervals
-    for j, (name, value) in enumerate(zip(uncertainty.names, uncertainty.values, strict=True)):
-        there = [(rival.values[name], rival.name) for rival in rivals if name in rival.values]
+def _moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
+    """Verdicts of the parameters that a rival moves beyond their interval, or until that is wide."""
+    for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
+        value, verdict = float(own.values[j]), own.verdicts[name]
+        there = [(rival.values[name], rival.name) for rival in beside.rivals if name in rival.values]
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
-        if own[j, 0] <= far <= own[j, 1]:
-            continue
-        wide = abs(far - value) > WITHIN * size(value, uncertainty.lower[j], uncertainty.upper[j])
-        yield name, uncertainty.verdicts[name].weakened(f"with {by} it is {far:.4g}", enough=bool(wide))
+        half = max(abs(far - value), float(np.ptp(beside.intervals[j])) / 2)
+        wide = half > WITHIN * size(value, own.lower[j], own.upper[j])
+        if by and ((wide and verdict.word == IDENTIFIED) or not low <= far <= high):
+            yield name, verdict.weakened(f"with {by} it is {far:.4g}", enough=wide)
 
 
 def _structures(model: Model) -> Iterator[tuple[str, Model]]:

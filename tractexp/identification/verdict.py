@@ -14,7 +14,6 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "at its bound",
 )
 HELD = "a requirement of the model holds it there: beside it there is no steady state"
-PROFILED = "by its profile"  # of an interval in words
 WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
@@ -29,7 +28,6 @@ class ParameterVerdict:
 
     word: str
     detail: str
-    interval: str = ""  # by how much the parameter is known; a profile's where there is one
 
     def weakened(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
         """With what speaks against it as well: weak where it was identified, if that is `enough`."""
@@ -37,8 +35,12 @@ class ParameterVerdict:
         return replace(self, word=word, detail="; ".join(filter(None, (self.detail, also))))
 
     def __str__(self) -> str:
-        said = "; ".join(filter(None, (self.interval, self.detail)))
-        return f"{self.word} ({said})" if self.word in (IDENTIFIED, BOUND) else f"{self.word}: {said}"
+        return ": ".join(filter(None, (self.word, self.detail)))
+
+
+def brief(verdict: str) -> str:
+    """The word of a verdict that was written, without what stands behind it."""
+    return verdict.partition(":")[0]
 
 
 def size(value: float, low: float, high: float) -> float:
@@ -68,19 +70,18 @@ def judge(
             verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join(_trade(information, j, factors[j])), span)
+            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
         elif half[j] > WITHIN * size(value, lower[j], upper[j]):
             why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
-            span = shown(value, half[j], lower[j], upper[j])
-            verdicts[name] = ParameterVerdict(WEAK, "; ".join([*why, *edge]), span)
+            verdicts[name] = ParameterVerdict(WEAK, "; ".join([*why, *edge]))
         elif at:
             verdicts[name] = ParameterVerdict(
                 BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
             )
         else:
             tight = "" if lower[j] <= low and high <= upper[j] else "the interval reaches past its bounds"
-            verdicts[name] = ParameterVerdict(IDENTIFIED, tight, shown(value, half[j], lower[j], upper[j]))
+            verdicts[name] = ParameterVerdict(IDENTIFIED, tight)
     return verdicts
 
 

@@ -9,6 +9,7 @@ from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.recommended import held
+from tractexp.identification.verdict import brief
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
 from tractexp.wording import alternatives, joined, with_error
@@ -95,11 +96,6 @@ def equations(page: Report, findings: Findings) -> None:
     with page.folded("All equations of the extended model"):
         for line in extended.latex():
             page.equation(line)
-
-
-def brief(verdict: str) -> str:
-    """The first clause of a verdict that has several: 'weakly identified: ± 32 %'."""
-    return verdict.split("; ")[0] if ": " in verdict.split(" (")[0] else verdict
 
 
 def value(estimate: ParameterEstimate) -> str:

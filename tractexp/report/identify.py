@@ -16,7 +16,7 @@ from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelati
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, PROFILED, TRADES
+from tractexp.identification.verdict import IDENTIFIED, TRADES, brief
 from tractexp.identification.yardstick import poles_in_words
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, described, title
@@ -243,7 +243,7 @@ def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Seque
          in_percent(m["of_S"]), *(epsilon(e[key]) for key in epsilons)]
         for e, m in zip(events, of_events, strict=True)
     ]  # fmt: skip
-    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(3, 4))
+    return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(4,))
 
 
 def samples(fit: "Identification") -> list[str]:
@@ -262,13 +262,6 @@ def correlations(fit: "Identification") -> list[str]:
     pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
     strong = [f"{a} and {b} {r:+.3f}" for r, a, b in sorted(pairs, key=lambda p: -abs(p[0])) if abs(r) >= TRADES]
     return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
-
-
-def brief(verdict: str) -> str:
-    """A verdict without what stands behind it; a profile's interval stands in a column of its own."""
-    first = verdict.partition(":")[0].partition(";")[0]
-    first = first.partition(" (")[0] if PROFILED in first else first
-    return first + ")" * (first.count("(") - first.count(")"))
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
