@@ -149,9 +149,21 @@ def _counted(found) -> dict:
         "left_by": found.last.left,
         "samples": found.context.samples,
         "refits": _refits(found),
+        "predicted": _predicted(found),
         "untestable": sorted(at.untestable),
         "simulations": found.context.effort.simulations,
     }
+
+
+def _predicted(found) -> list[tuple[list[str], float]]:
+    """Sets that were fitted by least squares, the best first, and the model's error with each on held-out events; the
+    base model last. None where names went by the deviance."""
+    from tractexp.discrepancy.prediction import ErrorPredictions
+
+    if not isinstance(predicted := found.held_out.predictions, ErrorPredictions):
+        return []
+    every = sorted(predicted.sets.values(), key=lambda one: one.left)
+    return [([*one.names], one.error) for one in (*every[:5], predicted.bare)]
 
 
 def _refits(found) -> list[tuple[list[str], float, int]]:

@@ -140,9 +140,9 @@ def run(hidden: Hidden, seed: Sequence[int], size: float = 1.0, only: Sequence[s
         found = tractexp.investigate(
             dips[:1], validate=dips[1:], model=MODEL, domain="waves", progress=False, **chosen
         )  # fmt: skip
-        near = found.content["nearest"] or {}
+        near = found.content["nearest"] or {"effects": None, "gap": {"train": {"closed": None}}}
         row |= {"verdict": str(found.verdict), "names": list(found.names), "sets": found.content["name_sets"]}
-        row |= {"nearest": [near.get("effects"), near.get("explained")], "p_left": found.content["left"]}
+        row |= {"nearest": [near["effects"], near["gap"]["train"]["closed"]], "p_left": found.content["left"]}
         row |= {"gap": asdict(found.gap)}
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"

@@ -469,7 +469,7 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     assert found.verdict.nearest is not None
     near = content(found)["nearest"]
     assert near["effects"]
-    assert 0 < near["explained"] < 1
+    assert 0 < near["gap"]["train"]["closed"] < 1
     assert near["gap"]["train"]["after"]["chi2_per_sample"] < near["gap"]["train"]["before"]["chi2_per_sample"]
     assert near["gap"]["validate"] is None
     rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
@@ -704,8 +704,9 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     assert made["verdict"] == "unexplained"
     assert made["effects"] == []
     assert made["gap"]["train"]["before"]["chi2_per_sample"] > 10
-    assert 0.2 < made["nearest"]["explained"] < 1
-    assert 0.2 < made["nearest"]["explained_held_out"] < 1
+    near = made["nearest"]["gap"]
+    assert 0.2 < near["train"]["closed"] < 1
+    assert near["validate"]["after"]["model_error"]["value"] > near["validate"]["before"]["model_error"]["value"] / 2.25
     assert all(len(at["interval"]) == 2 for at in made["nearest"]["parameters"].values())
     assert made["extended"] is None
     assert not (tmp_path / "run" / "conf").exists()

@@ -16,6 +16,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
+from tractexp.identification.model_error import in_percent
 from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, overlay
 from tractexp.report.events import WITHIN
@@ -127,17 +128,21 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     assert beside(named) in words
 
 
+def promising(named, score):
+    """The investigation with another score first."""
+    first = replace(named.first, scores=[score, *named.first.scores])
+    return replace(named, held_out=replace(named.held_out, first=first))
+
+
 def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
     assert why_not_the_most_helpful(named) == ""
     other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
     favoured = replace(other, drop=1e6, p=0.0)
-    first = replace(named.first, scores=[favoured, *named.first.scores])
-    told = why_not_the_most_helpful(replace(named, first=first))
+    told = why_not_the_most_helpful(promising(named, favoured))
     assert told.startswith("speed_dependent_torque promises most in one linear step from the base model")
     assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
     assert "speed_dependent_torque" in told
-    chance = replace(named.first, scores=[replace(favoured, drop=1.0), *named.first.scores])
-    assert why_not_the_most_helpful(replace(named, first=chance)) == ""
+    assert why_not_the_most_helpful(promising(named, replace(favoured, drop=1.0))) == ""
 
 
 def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdict(named, tmp_path):
@@ -197,11 +202,11 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
         (
             ("dc_link_lag", "inrush"),
             ("load_drift",),
-            "dc_link_lag and inrush beside load_drift, the nearest, explain 66%",
+            "dc_link_lag and inrush beside load_drift, the nearest, close 66% of the gap",
         ),
-        (("dc_link_lag",), ("load_drift",), "dc_link_lag beside load_drift, the nearest, explains 66%"),
-        ((), ("load_drift", "time_skew"), "load_drift and time_skew, the nearest, explain 66%"),
-        (("dc_link_lag",), (), "dc_link_lag, the nearest, explains 66%"),
+        (("dc_link_lag",), ("load_drift",), "dc_link_lag beside load_drift, the nearest, closes 66%"),
+        ((), ("load_drift", "time_skew"), "load_drift and time_skew, the nearest, close 66%"),
+        (("dc_link_lag",), (), "dc_link_lag, the nearest, closes 66%"),
     ],
 )
 def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
@@ -210,22 +215,25 @@ def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(na
     tests = SimpleNamespace(context=bench, p_left=0.001, loudest="pushes into the balances")
     best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
     explained = SimpleNamespace(faults=faults, base=SimpleNamespace(context=bench))
-    weighed = SimpleNamespace(survivors=SimpleNamespace(retained=[best], explanations=explained), faults=faults)
-    assert told in verdict._unexplained(weighed, SimpleNamespace(fitted=0.66))
+    left = SimpleNamespace(retained=[best], explanations=explained)
+    weighed = SimpleNamespace(survivors=left, faults=faults, first=tests)
+    assert told in verdict._unexplained(weighed, SimpleNamespace(closed=(0.66, 0.5)))
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
-    """It says what was tested, not what the catalogue holds, and a probability that can be pictured."""
+    """It says what was tested, not what the catalogue holds, and numbers that can be pictured."""
     reason = unexplained.verdict.reason
     tested = len(unexplained.catalogue.candidates)
     assert tested == len(FEW) + 3
     assert f"none of the {tested} effects tested" in reason
     assert "catalogue" not in reason
-    assert "less than 0.005" in reason  # no finer than 199 draws tell
     assert not re.search(r"e-\d\d", reason)
     near = unexplained.verdict.nearest
     assert near is not None
-    assert re.search(rf"the nearest, explains? {near.fitted:.0%} of what exceeds the noise", reason)
+    before, after = (in_percent(unexplained.held_out.predictions.sets[names].error) for names in ((), near.names))
+    assert re.search(
+        rf"the nearest, miss(es)? {after} of the response there, where the base model misses {before}", reason
+    )
     assert joined(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
     told = content(unexplained)["nearest"]["parameters"]
     assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()

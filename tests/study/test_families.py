@@ -259,7 +259,7 @@ def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept
     }
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
     surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(context=at)))
-    made = HeldOut(surviving, None, (), None, {}, judged)
+    made = HeldOut(surviving, None, None, None, (), None, {}, judged)
     assert [r.fit.names[0] for r in made.retained] == kept
 
 

@@ -7,7 +7,7 @@ from typing import Any
 from tractexp import files, quoting
 from tractexp.discrepancy import recommended
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import Curves, GapTest
+from tractexp.discrepancy.gap import Curves, closed
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
@@ -25,7 +25,7 @@ PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 def content(investigation: Findings) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
-    window = investigation.context.records.window
+    window, held = investigation.context.records.window, investigation.validate
     return {
         "verdict": investigation.verdict.word,
         "complete": investigation.verdict.complete,
@@ -35,8 +35,8 @@ def content(investigation: Findings) -> dict[str, Any]:
         "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": {
-            "train": _gap(investigation.train),
-            "validate": None if investigation.validate is None else _gap(investigation.validate),
+            "train": _gap(investigation.train.before, investigation.train.after),
+            "validate": held and _gap(held.before, held.after),
             "fitted_to_both": investigation.fitted_to_both,
         },
         "contributions": [
@@ -88,25 +88,22 @@ def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     return {e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after}
 
 
-def _gap(gap: GapTest) -> dict[str, Any]:
-    return {"before": _curves(gap.before), "after": _curves(gap.after), "closed": files.plain(gap.closed)}
+def _gap(before: Curves, after: Curves) -> dict[str, Any]:
+    return {"before": _curves(before), "after": _curves(after), "closed": files.plain(closed(before, after))}
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
-    """The set that comes nearest where nothing explains the disagreement, with the shares it explains."""
+    """The set that comes nearest where nothing explains the disagreement, and what it makes of the gap."""
     near = investigation.verdict.nearest
     if near is None:
         return None
     assert near.rival.tests is not None
     by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
     on = {"train": near.curves, "validate": near.carried}
-    gaps = {role: both and {"before": _curves(both[0]), "after": _curves(both[1])} for role, both in on.items()}
     return {
         "effects": list(near.names),
-        "explained": files.plain(near.fitted),
-        "explained_held_out": files.plain(near.held_out),
-        "gap": gaps,
-        "others": [{"effects": list(names), "explained": files.plain(share)} for names, share in near.others],
+        "gap": {role: both and _gap(*both) for role, both in on.items()},
+        "others": [{"effects": list(names), "closed": files.plain(share)} for names, share in near.others],
         "parameters": {p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)},
     }
 
@@ -139,7 +136,7 @@ def _error(error: ModelError) -> dict[str, Any]:
 def write_left(investigation: Findings, path: Path) -> Path:
     """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each channel."""
     drive, nearest = investigation.context.drive, investigation.verdict.nearest
-    near = investigation.train.after.calculated if nearest is None else nearest.calculated
+    near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
@@ -161,8 +158,9 @@ def _curves(curves: Curves) -> dict[str, Any]:
 
 
 def sets(investigation: Findings) -> list[dict[str, Any]]:
-    """The refitted sets of the chosen size."""
+    """The refitted sets that were compared, with the model's error on held-out events where that decided."""
     rows, at = [], investigation.context.coordinates
+    predicted = investigation.held_out.predictions
     for rival in investigation.survivors.rivals:
         names = rival.fit.names
         if not names:
@@ -171,7 +169,9 @@ def sets(investigation: Findings) -> list[dict[str, Any]]:
         own = investigation.catalogue.parameters(names)
         values = {p.name: {"value": at.value(p.name, rival.fit.unit), "standard_error": None} for p in own}
         ratio = files.plain(rival.lowered)
-        rows.append({"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values})
+        row = {"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values}
+        error = {"model_error": predicted.sets[names].error} if predicted and names in predicted.sets else {}
+        rows.append(row | files.plain(error))
     return rows
 
 

@@ -109,7 +109,7 @@ def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     assessment = findings.held_out.assessments.get(rival.fit.names)
     if names in findings.verdict.sets:
         helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
-        left = f"leaves no more than chance does{helps}"
+        left = f"leaves {'more' if findings.held_out.leaves_more else 'no more'} than chance does{helps}"
         return (CHOSEN, left) if names == findings.names else (TIED, left)
     if rival.rejected:
         names = findings.held_out.names_of(findings.survivors.rivals[0])

@@ -53,11 +53,8 @@ class GapTest:
 
     @property
     def closed(self) -> float:
-        """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
-        below 0 where more is left than before. nan where that falls short of the noise by more than there was before,
-        which was within the error of the noise's level then."""
-        before, after = self.before.error.square, self.after.error.square
-        return 1 - after / before if 0 < before < np.inf and after >= -before else np.nan
+        """The share of the squared model error that is gone."""
+        return closed(self.before, self.after)
 
     @property
     def explained(self) -> float:
@@ -74,6 +71,14 @@ class GapTest:
     def helps(self) -> bool:
         """Whether the extension helps on these events, or they are too mild to tell."""
         return self.gain > 0 or not self.telling
+
+
+def closed(before: Curves, after: Curves) -> float:
+    """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
+    below 0 where more is left than before. nan where that falls short of the noise by more than there was before, which
+    was within the error of the noise's level then."""
+    square, rest = before.error.square, after.error.square
+    return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
 
 
 def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str] = ()) -> Curves:

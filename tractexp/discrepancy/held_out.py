@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Names, Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, gap
@@ -57,13 +57,16 @@ class Assessment:
 class HeldOut:
     """The explanations that remain, as fitted without the faults of the measurement that do not help.
 
-    `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events. Where none
-    helped as it was fitted, `together` are those that were fitted to all events instead. Where none leaves noise only,
-    the survivors are those that predict the held-out events well (`leaves_more`), by their `predictions`.
+    `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events; `first` and
+    `last` have the tests of the base model and of the best set. Where none helped as it was fitted, `together` are
+    those that were fitted to all events instead. Where none leaves noise only, the survivors are those that predict the
+    held-out events well (`leaves_more`), by their `predictions`.
     """
 
     survivors: Survivors
-    noise: Noise
+    first: Disagreement
+    last: Disagreement
+    noise: Noise  # under which all were fitted
     faults: Names  # of the measurement, in every explanation
     bare: Refit
     extended: Mapping[Names, Refit]
@@ -110,7 +113,8 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
         (s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.retained[:1])
     ]
     exact = {f.names: f for f in refit(context, noise, wanted, faults=faults)}
-    as_fitted = HeldOut(surviving, noise, faults, bare, {names: exact[names] for names, _ in wanted})
+    extended = {names: exact[names] for names, _ in wanted}
+    as_fitted = HeldOut(surviving, explained.steps[0], explained.last, noise, faults, bare, extended)
     if not events or not any(s.fit.names or faults for s in surviving.adequate):
         return as_fitted
     count, doubted = len(surviving.adequate), not explained.steps[0].adequate

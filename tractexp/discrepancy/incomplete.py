@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
@@ -11,6 +13,7 @@ from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.gap import Curves, curves, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, carried, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
+from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.prediction import (
     Prediction,
     PredictionError,
@@ -53,15 +56,19 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets that predict the held-out events, if any does; what else there is stays as it was.
 
     None without held-out events: a larger set always fits better what it was fitted to. Nor where those deny what
-    leaves noise only on the fitted ones.
+    leaves noise only on the fitted ones. Where what is left is loud all is told as least squares fit it, named or not.
     """
     if not events or weighed.survivors.adequate:
         return weighed
     context = weighed.survivors.explanations.base.context
     context.effort.say("judging what leaves something on the held-out events")
     there, (unit,), noise = carried(context, events, [weighed.bare])
-    named = None if curves(there, unit, noise).chi2_per_sample > LOUD else _by_deviance(weighed, events, seed)
-    return named or _by_size(weighed, events, seed)
+    loud = curves(there, unit, noise).chi2_per_sample > LOUD
+    named = None if loud else _by_deviance(weighed, events, seed)
+    if named is not None:
+        return named
+    by_size = _by_size(weighed, events, seed)
+    return by_size if loud or by_size.retained else weighed
 
 
 def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut | None:
@@ -101,31 +108,35 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
 
 
 def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
-    """The sets that predict the held-out events best by the size of the model's error."""
+    """All sets as least squares fit them; retained are those that predict the held-out events best by the size of the
+    model's error, none where none does."""
     explained = weighed.survivors.explanations
-    predicted, criteria = predictions(explained, events), explained.base.context.criteria
-    explaining = predicted.explaining(criteria)
-    if not explaining:
-        return weighed
-    best, size = explaining[0], len(explaining[0].names)
-    ranked = predicted.ranked(size, criteria.ahead)
-    others = [p for p in ranked if len(p.names) == size and p not in explaining]
-    bare = predicted.bare.fit
+    criteria, quiet = explained.base.context.criteria, explained.base.quiet
+    predicted = predictions(explained, events)
+    there, bare, explaining = predicted.context, predicted.bare, predicted.explaining(criteria)
+    near = predicted.nearest(criteria)
+    ranked = explaining or [near] * (near is not None)
+    ranked = [*ranked, *(p for p in predicted.ranked(max(map(len, predicted.sets)), criteria.ahead) if p not in ranked)]
 
-    def rival(one: PredictionError, rejected: bool) -> Rival:
-        fit = one.fit
-        tests = None if rejected else least_squares_tests(explained.base.quiet, fit, predicted.noise, seed)
-        return Rival(fit, bare.deviance - fit.deviance, fit.cost - best.fit.cost, rejected, tests)
+    def rival(one: PredictionError) -> Rival:
+        told = one is near or one in explaining
+        tests = least_squares_tests(quiet, one.fit, predicted.noise, seed) if told else None
+        return Rival(one.fit, np.nan, one.fit.cost - ranked[0].fit.cost, one not in explaining, tests)
 
     def assessed(one: PredictionError) -> Assessment:
-        other, units = predicted.context, (predicted.bare.unit, one.unit)
-        judged = gap(other, *units, one.names, predicted.noise, other.coordinates.before)
-        return Assessment(judged, other, units)
+        left = there.residuals(one.unit[None], one.names)[0]
+        noise = QuietNoise.at(there, one.unit).of(one.unit, left)
+        judged = gap(there, bare.unit, one.unit, one.names, noise, there.coordinates.before)
+        return Assessment(judged, there, (bare.unit, one.unit))
 
-    retained, rejected = [rival(p, False) for p in explaining], [rival(p, True) for p in others]
-    assessments = {p.names: assessed(p) for p in explaining}
-    own = {"noise": predicted.noise, "faults": (), "bare": bare}
-    return _named(weighed, retained, rejected, assessments, predicted, **own)
+    first = least_squares_tests(quiet, bare.fit, predicted.noise, seed)
+    rivals = [rival(p) for p in ranked]
+    retained, others = rivals[: len(explaining)], rivals[len(explaining) :]
+    own = {
+        "first": first, "last": (rivals[0].tests if rivals else None) or first, "noise": predicted.noise, "faults": (),
+        "bare": bare.fit,
+    }  # fmt: skip
+    return _named(weighed, retained, others, {p.names: assessed(p) for p in explaining}, predicted, **own)
 
 
 def _named(

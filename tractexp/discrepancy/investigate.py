@@ -16,7 +16,7 @@ from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
 from tractexp.discrepancy.incomplete import incomplete
 from tractexp.discrepancy.next_event.choose import NextEvent
-from tractexp.discrepancy.overlay import Overlay, left, on_fitted, on_held_out
+from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.proposal.propose import Proposed, propose
@@ -36,11 +36,11 @@ class Findings:
     """Everything found, step by step."""
 
     base: BaseFit
-    first: Disagreement  # of the base model
     places: tuple[DisagreementInterval, ...]  # where it is; none where the verdict is none
     explanations: Explanations
     survivors: Survivors
-    held_out: HeldOut
+    by_likelihood: HeldOut
+    held_out: HeldOut  # the same, or by least squares where names go by the model's error
     verdict: Verdict
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
@@ -60,14 +60,20 @@ class Findings:
         return self.verdict.names
 
     @property
+    def first(self) -> Disagreement:
+        """The tests of the base model."""
+        return self.held_out.first
+
+    @property
     def last(self) -> Disagreement:
         """The tests once the chosen effects are in."""
-        return self.explanations.last
+        return self.held_out.last
 
     @property
     def tests(self) -> Disagreement:
         """The tests of the model that the investigation ends with."""
-        return (self.verdict.chosen.tests or self.last) if self.names else self.first
+        chosen = self.verdict.chosen
+        return self.first if chosen is None else chosen.tests or self.last
 
     @functools.cached_property
     def contributions(self) -> list[tuple[tuple[str, ...], float]]:
@@ -87,7 +93,8 @@ class Findings:
     @property
     def extended(self) -> Refit:
         """The model with the names of the verdict added; the base model where there are none."""
-        return self.held_out.extended[self.verdict.chosen.fit.names] if self.names else self.bare
+        chosen = self.verdict.chosen
+        return self.bare if chosen is None else self.held_out.extended[chosen.fit.names]
 
     @property
     def next_event(self) -> NextEvent | None:
@@ -98,7 +105,8 @@ class Findings:
     @property
     def assessment(self) -> Assessment | None:
         """What the held-out events say of the names."""
-        return self.held_out.assessments.get(self.verdict.chosen.fit.names) if self.names else None
+        chosen = self.verdict.chosen
+        return chosen and self.held_out.assessments.get(chosen.fit.names)
 
     @property
     def validate(self) -> GapTest | None:
@@ -112,8 +120,8 @@ class Findings:
 
     @functools.cached_property
     def after(self) -> list[ParameterEstimate]:
-        """The parameters of the extended model."""
-        return estimates(self.verdict.chosen.tests or self.last, self.extended.unit, self.names)
+        """The parameters of the model that the investigation ends with."""
+        return estimates(self.tests, self.extended.unit, self.names)
 
     @functools.cached_property
     def overlays(self) -> list[Overlay]:
@@ -134,10 +142,17 @@ class Findings:
 
     @functools.cached_property
     def remainder_of_base(self) -> list[Remainder]:
-        """The same of what the base model alone leaves: the nearest candidates may have patched something up."""
-        if self.verdict.nearest is None:
-            return [] if self.names else self.remainder
-        return self._left([replace(overlay, nearest=None) for overlay in self.overlays])
+        """The same of what the base model alone leaves: the nearest candidates may have patched something up.
+
+        As least squares fit it or as the likelihood does, by whichever shapes tell more: least squares spread over a
+        record what happens at one moment.
+        """
+        if self.names:
+            return []
+        alone = [self._left([replace(overlay, nearest=None) for overlay in self.overlays])]
+        if self.by_likelihood is not self.held_out:
+            alone.append(self._left(of_fit(self.context, self.by_likelihood.bare, self.last.noise)))
+        return max(alone, key=_told)
 
     @property
     def headline(self) -> str:
@@ -149,7 +164,7 @@ class Findings:
         ]
         if not remainders_left:
             return ""
-        shapes, base = max(remainders_left, key=lambda item: sum(shape.share for shape in item[0]))
+        shapes, base = max(remainders_left, key=lambda item: _told(item[0]))
         held_out = shapes[0].event in {event.record.name for event in self.withheld}
         base |= self.verdict.nearest is None
         whose = "the base model misses this" if base else "the nearest candidates miss this"
@@ -198,21 +213,19 @@ def investigate(
         base, first = behind_recorder(base, disagreement(base, seed), seed)
         explained = explanations(base, first, seed)
         base, first = explained.base, explained.steps[0]
-        standing_out = places(first)
-        surviving = survivors(explained, seed)
-        weighed = held_out(surviving, validate, seed)
+        weighed = by_likelihood = held_out(survivors(explained, seed), validate, seed)
         if word_of(weighed) == UNEXPLAINED:
             weighed = incomplete(weighed, validate, seed)
         said = verdict(weighed, validate)
         proposed = Proposed()
         if said.word == UNEXPLAINED:
-            proposed = propose(base, first, weighed.bare, explained.last.noise, validate, seed)
+            proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
         return Findings(
             base=base,
-            first=first,
-            places=() if said.word == NONE else tuple(standing_out),
+            places=() if said.word == NONE else tuple(places(weighed.first)),
             explanations=explained,
             survivors=weighed.survivors,
+            by_likelihood=by_likelihood,
             held_out=weighed,
             verdict=said,
             train=_gap(base.context, weighed, said),
@@ -221,10 +234,16 @@ def investigate(
         )
 
 
+def _told(shapes: Sequence[Remainder]) -> float:
+    """What share of what is left these shapes tell."""
+    return sum(shape.share for shape in shapes)
+
+
 def _gap(context: Context, weighed: HeldOut, said: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
     at = context.coordinates
-    after = weighed.extended[said.chosen.fit.names] if said.names else weighed.bare
-    noise = (said.chosen.tests or weighed.survivors.explanations.last).noise
+    chosen = said.chosen
+    after = weighed.extended[chosen.fit.names] if chosen else weighed.bare
+    noise = ((chosen and chosen.tests) or weighed.last).noise
     fitted = [*at.base, *at.before, *at.parameters(said.names)]
     return gap(context, weighed.bare.unit, after.unit, after.names, noise, fitted)

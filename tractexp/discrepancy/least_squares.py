@@ -13,7 +13,7 @@ from tractexp.discrepancy.chance import chance_at
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linearization import tangent
+from tractexp.discrepancy.linearization import rich_residuals, tangent
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.score_test import ScoreTest
 from tractexp.identification.blocks import blocks_of
@@ -30,13 +30,14 @@ def residual_noise(context: Context, fit: Refit) -> Noise:
 
 
 def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
-    """All tests at a fit by least squares, and a covariance of its parameters that holds where what it leaves is no
-    noise. `noise` is that of `residual_noise`."""
+    """All tests at a fit by least squares, under the noise that it shows where little happens, and a covariance of its
+    parameters that holds where what it leaves is no noise. It was fitted under `noise`, that of `residual_noise`."""
     t = tangent(quiet.context, fit, noise)
-    projection = t.whitened(noise)
-    chance = chance_at(t, projection, noise, quiet, seed, plain=True)
-    root = _robust(quiet.context, projection)
-    return Disagreement(fit, noise, t, projection, chance, projection.scores(), root)
+    root = _robust(quiet.context, t.whitened(noise))
+    own = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
+    projection = t.whitened(own)
+    chance = chance_at(t, projection, own, quiet, seed, plain=True)
+    return Disagreement(fit, own, t, projection, chance, projection.scores(), root)
 
 
 def _robust(context: Context, projection: ScoreTest) -> np.ndarray:

@@ -45,7 +45,7 @@ def on_fitted(
 ) -> list[Overlay]:  # fmt: skip
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
-    near = None if nearest is None else nearest.calculated
+    near = None if nearest is None else nearest.curves[1].calculated
     return _each(context, gap.noise, (gap.before.calculated, after, near), places, held_out=False)
 
 
@@ -66,6 +66,12 @@ def on_held_out(
         other.residuals(unit[None], fit.names)[0] + other.drive.measured for unit, fit in zip(units, fits, strict=True)
     ]
     return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
+
+
+def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
+    """The fitted events by one fit alone."""
+    calculated = context.residuals(fit.unit[None], fit.names)[0] + context.drive.measured
+    return _each(context, noise, (calculated, None, None), (), held_out=False)
 
 
 def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:

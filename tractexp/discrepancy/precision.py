@@ -15,6 +15,7 @@ from tractexp.identification.verdict import BOUND, judge
 from tractexp.parameter import Parameter
 from tractexp.wording import with_error
 
+BLIND = 1e-6  # ranges: what even by itself is not known to a million of them changes nothing
 WIDE = float(ndtri((1 + LEVEL) / 2))  # standard errors in half of an interval: the samples are many
 
 
@@ -50,13 +51,14 @@ class ParameterEstimate:
 def standard_errors(tests: Disagreement) -> dict[str, float]:
     """Of the base model's parameters and those of the effects in a fit, from the curvature there.
 
-    A parameter that rests on its bound has none.
+    A parameter that rests on its bound has none; that of one without effect at the fit is inf.
     """
     at = tests.context.coordinates
-    inverse = np.linalg.pinv(tests.root, rcond=1e-10)
-    spread = np.sqrt(np.einsum("ij,ij->i", inverse, inverse))
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
     columns = at.nuisances(tests.fit.names)
+    seen = np.where(np.linalg.norm(tests.root, axis=0) > BLIND, tests.root, 0.0)
+    ranges = np.ones(len(columns))
+    spread = Information(tuple(map(str, columns)), 0 * ranges, ranges, seen).standard_errors
     return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
 
 

@@ -126,13 +126,25 @@ class Predictions(Generic[OneSet]):
                 families.setdefault(self.catalogue.textbook(one.names), []).append(one)
         return sorted((_simplest(members, factor) for members in families.values()), key=_rank)
 
-    def explaining(self, criteria: Criteria) -> list[OneSet]:
-        """The set that predicts best and those tied with it; none where none divides what the base model leaves."""
+    def best(self, criteria: Criteria) -> OneSet:
+        """The set that predicts best and needs each of its members; the base model where none is ahead of it."""
         chosen = self.bare
         for size in range(1, 1 + max(map(len, self.sets))):
             best = next((p for p in self.ranked(size, criteria.ahead) if len(p.names) == size), None)
             if best is not None and best.ahead_of(chosen, criteria.ahead):
                 chosen = best
+        return chosen
+
+    def nearest(self, criteria: Criteria) -> OneSet | None:
+        """The same, or else the one that leaves least; None where none leaves less than the base model."""
+        best = self.best(criteria)
+        if not best.names:
+            best = min(self.sets.values(), key=_rank)
+        return best if best.names else None
+
+    def explaining(self, criteria: Criteria) -> list[OneSet]:
+        """The set that predicts best and those tied with it; none where none divides what the base model leaves."""
+        chosen = self.best(criteria)
         if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
             return []
         factor = criteria.ahead

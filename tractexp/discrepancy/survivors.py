@@ -23,7 +23,7 @@ class Rival:
     """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
 
     fit: Refit
-    lowered: float  # by how much its deviance is below that of the base model
+    lowered: float  # by how much its deviance is below that of the base model, nan of a fit by least squares
     behind: float  # of Akaike's criterion
     rejected: bool
     tests: Disagreement | None = None  # at its fit, where they were made
@@ -45,7 +45,7 @@ class Survivors:
     @property
     def adequate(self) -> tuple[Rival, ...]:
         """Those that leave nothing; none where the chosen one does not."""
-        return tuple(s for s in self.retained if s.adequate) if self.retained[0].adequate else ()
+        return tuple(s for s in self.retained if s.adequate) if self.retained and self.retained[0].adequate else ()
 
 
 def survivors(explained: Explanations, seed: int) -> Survivors:

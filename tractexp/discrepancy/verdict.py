@@ -6,15 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.chance import by_draws
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import Curves, curves
+from tractexp.discrepancy.gap import Curves, closed, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
-from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import alternatives, joined, listed, percent
 
@@ -24,16 +21,10 @@ NONE, NAMED, TIED, UNEXPLAINED = "none", "named", "tied", "unexplained"
 
 @dataclass(frozen=True, eq=False)
 class Nearest:
-    """Where nothing explains the disagreement: the set that comes nearest, and what it leaves.
-
-    Shares are of the deviance in excess of the noise, on the fitted and on the held-out events (nan without any).
-    """
+    """Where nothing explains the disagreement: the set that comes nearest, and what it leaves."""
 
     rival: Rival
-    fitted: float
-    held_out: float
-    calculated: np.ndarray  # (C, N) pu, of the fitted events end to end
-    others: list[tuple[tuple[str, ...], float]]  # the next ones, with their shares on the fitted events
+    others: list[tuple[tuple[str, ...], float]]  # the next ones, and what share of the gap they close on fitted events
     curves: tuple[Curves, Curves]  # of the base model and with these, on the fitted events
     carried: tuple[Curves, Curves] | None  # on the held-out ones
 
@@ -41,20 +32,25 @@ class Nearest:
     def names(self) -> tuple[str, ...]:
         return self.rival.fit.names
 
+    @property
+    def closed(self) -> tuple[float, float]:
+        """The share of the gap that is closed on the fitted and on the held-out events, nan without any."""
+        return closed(*self.curves), closed(*self.carried) if self.carried else np.nan
+
 
 @dataclass(frozen=True, eq=False)
 class Verdict:
     """One of four words, the sentence behind it, and what belongs to it.
 
-    `names` are the effects added, `sets` all sets not rejected, `chosen` the set that the extended model has. It is
-    `complete` where nothing but noise is left.
+    `names` are the effects added, `sets` all sets not rejected, `chosen` the set that the extended model has, None
+    without one. It is `complete` where nothing but noise is left.
     """
 
     word: str
     reason: str
     names: tuple[str, ...]
     sets: tuple[tuple[str, ...], ...]
-    chosen: Rival
+    chosen: Rival | None
     next_event: NextEvent | None  # that would tell tied sets apart
     nearest: Nearest | None  # where nothing explains
     complete: bool
@@ -63,24 +59,23 @@ class Verdict:
 def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
     left = weighed.survivors
     explained = left.explanations
-    context, first = explained.base.context, explained.steps[0]
+    context = explained.base.context
     word = word_of(weighed)
-    nearest = _nearest(context, weighed.bare, left.rivals, weighed.noise, validate) if word == UNEXPLAINED else None
+    nearest = _nearest(weighed, validate) if word == UNEXPLAINED else None
     sets = tuple(map(weighed.names_of, weighed.retained)) if word in (NAMED, TIED) else ()
     reason = _reason(word, weighed, sets, nearest)
     if weighed.together and weighed.retained:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if (window := context.records.window) is not None:
         reason += f"; {window.describe()}, which is taken into account"
-    chosen = (weighed.retained or left.adequate or left.retained)[0]
-    names = sets[0] if sets else ()
-    at = (chosen.tests or explained.last) if names else first
+    chosen = weighed.retained[0] if sets else None
+    at = weighed.first if chosen is None else chosen.tests or weighed.last
     if at.resting:
         reason += f"; on a bound: {', '.join(at.resting)}"
     return Verdict(
         word=word,
         reason=reason,
-        names=names,
+        names=sets[0] if sets else (),
         sets=sets,
         chosen=chosen,
         next_event=_next_event(weighed, sets) if word == TIED else None,
@@ -102,10 +97,8 @@ def word_of(weighed: HeldOut) -> str:
     first = explained.steps[0]
     if explained.empty and first.adequate:
         return NONE
-    if not left.adequate and not weighed.leaves_more:
-        return UNEXPLAINED
     if not weighed.retained:
-        return NONE if first.adequate else UNEXPLAINED
+        return NONE if first.adequate and left.adequate else UNEXPLAINED
     return NAMED if len(weighed.retained) == 1 else TIED
 
 
@@ -119,7 +112,7 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     left = weighed.survivors
     first = left.explanations.steps[0]
     if weighed.leaves_more:
-        return _by_size(weighed, sets)
+        return _by_size(weighed, sets) if sets else _too_far_off(weighed)
     if word == NAMED:
         return _named(_spoken(sets[0], weighed), len(first.context.catalogue.candidates), _fitted(weighed, sets[0]))
     if word == TIED:
@@ -193,31 +186,50 @@ def _tied(sets: Sequence[Sequence[str]]) -> str:
 
 def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
-    left = weighed.survivors
-    best, explained = left.retained[0], left.explanations
+    best, explained = weighed.survivors.retained[0], weighed.survivors.explanations
     assert best.tests is not None
-    tested = f"none of the {len(best.tests.context.catalogue.candidates)} effects tested"
     chance = f"would come about by chance with a probability of {by_draws(best.tests.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
-        return (
-            f"the model and the records disagree, and {tested} helps more than chance does: what the base model leaves"
-            f" {chance}; {loudest}"
-        )
-    most = len(best.fit.names)
-    together = f", alone or up to {most} together," if most > 1 else ""
+        none = f"none of the {_tested(weighed)} effects tested helps more than chance does"
+        return f"the model and the records disagree, and {none}: what the base model leaves {chance}; {loudest}"
     names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
     sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
-    share = (
-        f"explain{'s' * (len(names or faults) == 1)} {percent(nearest.fitted)} of what exceeds the noise, and what"
-        if nearest
-        else ""
-    )
-    comes = f"{sentence}, the nearest, {share or 'helps, but what'}"
+    one = len(names or faults) == 1
+    share = f"close{'s' * one} {nearest.closed[0]:.0%} of the gap" if nearest else f"help{'s' * one}"
+    none = f"none of the {_tested(weighed)} effects tested{_together(best.fit.names)} explains it all"
     return (
-        f"the model and the records disagree, and {tested}{together} explains it all: {comes} is left {chance};"
+        f"the model and the records disagree, and {none}: {sentence}, the nearest, {share}, but what is left {chance};"
         f" {loudest}"
     )
+
+
+def _too_far_off(weighed: HeldOut) -> str:
+    """How far the set that predicts the held-out events best is from dividing what the base model leaves of them."""
+    predicted, rivals = weighed.predictions, weighed.survivors.rivals
+    assert isinstance(predicted, ErrorPredictions)
+    bare, criteria = in_percent(predicted.bare.error), predicted.context.criteria
+    if not rivals:
+        none = f"none of the {_tested(weighed)} effects tested predicts the held-out events better than the base model"
+        return f"the model and the records disagree, and {none}, which misses {bare} of the response there"
+    near = predicted.sets[rivals[0].fit.names]
+    spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
+    none = f"none of the {_tested(weighed)} effects tested{_together(near.names)} predicts the held-out events"
+    misses = f"miss{'es' * (len(near.names) == 1)}"
+    return (
+        f"the model and the records disagree, and {none} well enough to be named: {spoken}, the nearest, {misses} {off}"
+        f" of the response there, where the base model misses {bare}, which a name must divide by {criteria.divides:g}"
+        " and by more than chance"
+    )
+
+
+def _tested(weighed: HeldOut) -> int:
+    return len(weighed.first.context.catalogue.candidates)
+
+
+def _together(names: Sequence[str]) -> str:
+    """That sets were tried, too, where the nearest is one."""
+    return f", alone or up to {len(names)} together," if len(names) > 1 else ""
 
 
 def _denied(weighed: HeldOut) -> str:
@@ -231,21 +243,17 @@ def _denied(weighed: HeldOut) -> str:
     )
 
 
-def _nearest(
-    context: Context, bare: Refit, rivals: Sequence[Rival], noise: Noise, validate: Sequence[Event]
-) -> Nearest | None:  # fmt: skip
-    best = rivals[0].fit
-    if not best.names:
+def _nearest(weighed: HeldOut, validate: Sequence[Event]) -> Nearest | None:
+    """The best of the sets that were compared; None where that is the base model."""
+    rivals, context = weighed.survivors.rivals[:4], weighed.survivors.explanations.base.context
+    if not rivals or not rivals[0].fit.names:
         return None
-    before, after = curves(context, bare.unit, noise), curves(context, best.unit, noise, best.names)
-    excess = max(before.deviance - context.samples, 1e-300)
-    held, there = float("nan"), None
+    fits = [weighed.bare, *(r.fit for r in rivals)]
+    before, *after = (curves(context, f.unit, weighed.last.noise, f.names) for f in fits)
+    there = None
     if validate:
-        other, (plain, near), level = carried(context, validate, [bare, best])
-        there = curves(other, plain, level), curves(other, near, level, best.names)
-        held = (there[0].deviance - there[1].deviance) / max(there[0].deviance - other.samples, 1e-300)
-        if not np.isfinite(held):  # no steady state there
-            held, there = float("nan"), None
-    others = [(r.fit.names, (before.deviance - r.fit.deviance) / excess) for r in rivals[1:4]]
-    share = (before.deviance - after.deviance) / excess
-    return Nearest(rivals[0], float(share), float(held), after.calculated, others, (before, after), there)
+        other, units, noise = carried(context, validate, fits[:2])
+        pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
+        there = pair if np.isfinite([one.deviance for one in pair]).all() else None  # else no steady state there
+    others = [(r.fit.names, closed(before, one)) for r, one in zip(rivals[1:], after[1:], strict=True)]
+    return Nearest(rivals[0], others, (before, after[0]), there)

@@ -197,7 +197,7 @@ def describe(event: Event) -> str:
     gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
     if gaps:
         odd.append(f"{gaps} samples lack P or Q and are not used")
-    return sentence + (f". Note: {'; '.join(odd)}." if odd else "")
+    return sentence + (f". Note: {'; '.join(odd)}" if odd else "")
 
 
 def _noise(event: Event) -> str:

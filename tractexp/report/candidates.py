@@ -19,7 +19,9 @@ from tractexp.discrepancy.evidence import (
 )
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
+from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.verdict import TIED
+from tractexp.report.predicted import predicted
 from tractexp.wording import joined
 
 COLORS = {CHOSEN: "#009E73", TIED: "#E69F00"}
@@ -29,6 +31,9 @@ MOST_SETS = 12  # that are compared in a table
 
 
 def candidates(page: Report, findings: Findings) -> None:
+    """By the deviance that each lowers, or where names go by the model's error, by that."""
+    if isinstance(predictions := findings.held_out.predictions, ErrorPredictions):
+        return predicted(page, findings, predictions)
     rows = evidence(findings)
     labels = _labels(rows)
     page.heading("Candidates by their evidence")

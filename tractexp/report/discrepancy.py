@@ -21,12 +21,13 @@ from tractexp.report.extended import equations, interval, laws, parameters, valu
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
 from tractexp.report.proposal import headlines, proposed
-from tractexp.wording import alternatives, as_sentence, counted, epsilon, joined, percent
+from tractexp.wording import alternatives, as_sentence, counted, epsilon, joined
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
 
 KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
+ROLES = {"train": "fitted", "validate": "held out"}
 CURRENTS = (
     ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the currents of all"
     " phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
@@ -50,18 +51,17 @@ def summary(findings: "Outcome") -> Report:
             f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}"
         )
     if near := content["nearest"]:
-        held = near["explained_held_out"]
-        beyond = "" if held is None else f" and {percent(held)} on the held-out events"
-        share = f"{percent(near['explained'])} of what exceeds the noise{beyond}"
+        closed = {role: (near["gap"][role] or {}).get("closed") for role in ROLES}
+        shares = joined([f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None])
         sizes = ", ".join(findings.sizes_of_nearest)
-        report.text(f"nearest, not accepted: {joined(near['effects'])}, {share}; {sizes}")
+        report.text(f"nearest, not accepted: {joined(near['effects'])}; gap closed {shares or 'unknown'}; {sizes}")
     return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
 
 
 def gap(content: Mapping[str, Any]) -> Table:
     """How far off the base model is, and the extended one where an effect was named."""
     gaps, named, rows = content["gap"], bool(content["effects"]), []
-    for label, role in (("fitted", "train"), ("held out", "validate")):
+    for role, label in ROLES.items():
         for model, stage in (("base model", "before"), ("extended model", "after"))[: 1 + named]:
             if (one := gaps[role]) is not None:
                 closed = one["closed"] if stage == "after" else None
@@ -197,15 +197,10 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     assert near.rival.tests is not None
     by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
     own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
-    held = percent(near.held_out) if np.isfinite(near.held_out) else ""
-    rows = [[joined(near.names), percent(near.fitted), held]]
-    rows += [[joined(names), percent(share), ""] for names, share in near.others]
+    rows = [[joined(near.names), *(f"{share:.0%}" if np.isfinite(share) else "" for share in near.closed)]]
+    rows += [[joined(names), f"{share:.0%}", ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
-    page.table(
-        ["nearest candidates", "explain on the fitted events", "on the held-out events"], rows,
-        "Shares of the deviance in excess of the noise. A large share is no explanation as long as what is left could"
-        " not come about by chance.", words=(0,),
-    )  # fmt: skip
+    page.table(["nearest candidates", "gap closed, fitted", "held out"], rows, words=(0,))
     with page.folded(f"How large {joined(near.names)} would be"):
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],

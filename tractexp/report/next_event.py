@@ -49,7 +49,7 @@ def section(page: Report, choice: NextEvent) -> None:
     )
     page.text(
         "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the records leave them;"
-        " all others are fitted to the records and the new event together, under the records' own noise"
+        " all others are fitted to the records and the new event together, under the noise of their fits"
         + (", by a refit of every parameter." if best.refitted else ", linearised about their fits.")
         + " Noise of the voltage, and laws that no rival has, are not in it."
     )

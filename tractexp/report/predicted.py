@@ -1,0 +1,79 @@
+"""The sets of an investigation by what they predict, where none leaves noise only."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from tractexp.blocks import Report
+from tractexp.blocks.chart import Chart
+from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.precision import ParameterEstimate, standard_errors
+from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
+from tractexp.identification.model_error import in_percent
+from tractexp.wording import joined
+
+ADDED, TIED, OTHER, BASE = "#009E73", "#E69F00", "#0072B2", "#9A9A9A"
+MOST = 16  # sets that are shown
+BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the bars
+
+
+def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -> None:
+    """The model's error on the held-out events with each set, and by what it divides that of the base model."""
+    criteria, bare = findings.context.criteria, predictions.bare
+    every = [one for one in sorted(predictions.sets.values(), key=lambda p: p.left) if np.isfinite(one.error)]
+    some = every[:MOST]
+    rows = some if bare in some or bare not in every else [*some[: MOST - 1], bare]
+    page.heading("Candidates by what they predict")
+    page.chart(
+        _bars(findings, rows),
+        "The model's error on the held-out events, in percent of the response, with the sets that predict them best"
+        " (green: added, orange: tied with it, gray: the base model). All were fitted to the other events by least"
+        " squares. Dashed: what a name must undercut.",
+    )
+    page.table(
+        ["candidate", "model error, held out", "error divided by", "status", "size"],
+        [
+            [_label(one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}", _status(findings, one),
+             "; ".join(map(str, _sizes(findings, one)))]
+            for one in rows
+        ],
+        f"A name divides the error of the base model by {criteria.divides:g} and is ahead of every other set of its"
+        f" size or smaller by {criteria.ahead:g}, both by more than chance (blocks of 0.1 s left out in turn). Of"
+        f" {len(predictions.sets) - 1} sets that were fitted {len(rows) - (bare in rows)} are shown.",
+        words=(0, 3, 4),
+    )  # fmt: skip
+
+
+def _label(one: PredictionError) -> str:
+    return joined(one.names) or "the base model"
+
+
+def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
+    errors = [100 * one.error for one in rows]
+    colors = [
+        BASE if not one.names else ADDED if one.names == findings.names
+        else TIED if one.names in findings.verdict.sets else OTHER
+        for one in rows
+    ]  # fmt: skip
+    bare = next((error for one, error in zip(rows, errors, strict=True) if not one.names), max(errors))
+    chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
+    chart.bars("", [_label(one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
+    chart.edge(bare / findings.context.criteria.divides, dash="dash")
+    return chart.limits(None, 0.0, ROOM * max(errors))
+
+
+def _status(findings: Findings, one: PredictionError) -> str:
+    if not one.names:
+        return ""
+    if one.names in findings.verdict.sets:
+        return "added" if one.names == findings.names else "tied"
+    return "not named"
+
+
+def _sizes(findings: Findings, one: PredictionError) -> list[ParameterEstimate]:
+    """How large its effects are, with standard errors where they were reckoned."""
+    rival = next((r for r in findings.survivors.rivals if r.fit.names == one.names), None)
+    errors = {} if rival is None or rival.tests is None else standard_errors(rival.tests)
+    at = findings.context.coordinates
+    own = findings.catalogue.sizes(one.names)
+    return [ParameterEstimate(p, at.value(p.name, one.fit.unit), errors.get(p.name, np.nan)) for p in own]
