@@ -13,8 +13,11 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
+from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import PredictionError, Predictions, predictions
+from tractexp.discrepancy.recommended import adequacy
+from tractexp.identification.model_error import in_percent
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.plugin import get
@@ -49,6 +52,21 @@ def test_the_set_that_divides_the_error_and_leaves_all_others_behind_is_named():
 
 def test_a_stranger_s_best_imitation_is_not():
     assert named(off(error=1.0), off("a", error=0.5), off("b", error=0.9)) == []
+
+
+def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
+    """The best pair owes its lead to the one block in which the base model is far off."""
+    bare, best = off(error=1.0), off("a", "b", error=0.3)
+    bare.squares[3] += 60.0
+    best.squares[4] += 3.0
+    clear = off("a", "c", error=0.42)
+    clear.squares[3] += 1.5
+    assert best.left < clear.left
+    assert not best.clear_of(bare)
+    assert named(bare, best, clear) == [("a", "c")]
+    sets = {one.names: one for one in (bare, best)}
+    assert Predictions(Catalogue(), sets).nearest(Criteria()) is best
+    assert Predictions(Catalogue(), {(): off(error=0.1), ("a",): off("a", error=0.2)}).nearest(Criteria()) is None
 
 
 def test_sets_that_predict_alike_are_tied_the_better_one_first():
@@ -163,10 +181,38 @@ def test_the_covariance_by_least_squares_is_wider_where_residuals_are_correlated
     fit, context = inexact.extended, inexact.context
     noise = residual_noise(context, fit)
     tests = least_squares_tests(inexact.base.quiet, fit, noise, seed=0)
-    plain = least_squares_tests(inexact.base.quiet, fit, noise, seed=0)
-    object.__setattr__(plain, "robust", None)
+    plain = replace(tests, robust=tangent(context, fit, noise).whitened(noise).R)
     wide, narrow = standard_errors(tests), standard_errors(plain)
     assert np.median([wide[name] / narrow[name] for name in wide]) > 1.5
+
+
+def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identified(inexact):
+    """Fits are by least squares, under which the noise is as large as what they leave: nothing would stand out."""
+    assert inexact.train.before.chi2_per_sample > 100
+    assert inexact.train.after.chi2_per_sample > 5
+    assert inexact.tests.noise.levels == pytest.approx([2e-4, 2e-4], rel=0.5)
+    assert "times as loud as the noise" in adequacy(inexact).sentence
+    assert inexact.tests.p_left < 1e-6
+    alone = tractexp.identify(dips()[:2], progress=False)
+    assert inexact.train.before.error.value == pytest.approx(alone.model_error.value, rel=0.03)
+    errors = alone.result.standard_errors
+    for e in inexact.before:
+        assert abs(e.value - alone.result.parameters[e.parameter.name]) < errors[e.parameter.name]
+
+
+def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least_squares():
+    """The trip is not among the effects that are tried."""
+    found = tractexp.investigate(dips()[:2], validate=dips()[2:], effects=("dc_link_lag",), progress=False)
+    assert found.verdict == "unexplained"
+    alone = tractexp.identify(dips()[:2], progress=False)
+    assert found.gap.train.before.model_error["value"] == pytest.approx(alone.model_error.value, rel=0.03)
+    assert "a name must divide that by 2.25" in found.reason
+    gap = found.content["nearest"]["gap"]["validate"]
+    before, after = (gap[stage]["model_error"]["value"] for stage in ("before", "after"))
+    assert (
+        f"{in_percent(after)} of the response there, where the base model misses {in_percent(before)}" in found.reason
+    )
+    assert 1 - (after / before) ** 2 == pytest.approx(gap["closed"], abs=1e-3)
 
 
 def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):

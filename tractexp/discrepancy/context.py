@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -50,7 +50,13 @@ class Context:
         """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
-        return Context.of(self.load, self.catalogue, records, *same, type(kernels.family))
+        there = Context.of(self.load, self.catalogue, records, *same, type(kernels.family))
+        return there if len(self.coordinates.before) else there.with_measured_power
+
+    @property
+    def with_measured_power(self) -> "Context":
+        """The same with P0 and Q0 of each event as they were measured before it: they are no part of a fit."""
+        return replace(self, coordinates=replace(self.coordinates, before=np.array([], dtype=int)))
 
     @property
     def model(self) -> Model:
@@ -64,7 +70,9 @@ class Context:
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
         if not all(map(store.installed, parts)):
             return ""
-        content = self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.prior_deviation
+        content = (
+            self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.before, at.prior_deviation,
+        )  # fmt: skip
         return store.key(store.environment(), repr(parts), self.records.window, *content)
 
     @property

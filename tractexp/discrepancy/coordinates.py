@@ -27,7 +27,7 @@ class Coordinates:
     upper: np.ndarray  # (d,)
     catalogue: Catalogue
     base: np.ndarray  # columns
-    before: np.ndarray  # (2 E,) columns
+    before: np.ndarray  # (2 E,) columns of P0 and Q0, or none where the powers measured before the events are taken
     null: np.ndarray  # (D,) every candidate at its null, the base parameters at their defaults
     prior: float  # standard deviation of a fault of the measurement, in its relevant sizes
 
@@ -120,6 +120,10 @@ class Coordinates:
         moved, columns = unit.copy(), self.parameters(names)
         moved[columns] = self.null[columns]
         return moved
+
+    def at_measured_power(self, unit: np.ndarray) -> np.ndarray:
+        """Coordinates (D,) with P0 and Q0 of each event as measured."""
+        return np.r_[unit[: len(self.names)], self.null[len(self.names) :]]
 
     def widened(self, unit: np.ndarray) -> np.ndarray:
         """Coordinates (D,) from those of the first of these events, the others as before any fit.

@@ -40,9 +40,9 @@ class Disagreement:
     def context(self) -> Context:
         return self.tangent.context
 
-    def at(self, fit: Refit, noise: Noise) -> "Disagreement":
+    def at(self, context: Context, fit: Refit, noise: Noise) -> "Disagreement":
         """The scores at another fit under a noise, by what chance does at this one."""
-        t = tangent(self.context, fit, noise)
+        t = tangent(context, fit, noise)
         projection = t.whitened(noise)
         return Disagreement(fit, noise, t, projection, self.chance, projection.scores())
 

@@ -198,7 +198,7 @@ def from_other_valleys(
         fit = refit(context, first.noise, [((), minimum)])[0]
         if np.linalg.norm((fit.unit - first.fit.unit)[context.coordinates.base]) < DISTINCT:
             continue
-        there = first.at(fit, first.noise)
+        there = first.at(context, fit, first.noise)
         if best.suffices:
             nearer = first.fit.deviance - fit.deviance
             promising = [(s.name,) for s in there.scores if context.criteria.promises(nearer + s.drop, explained)]

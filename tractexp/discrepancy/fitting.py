@@ -256,8 +256,10 @@ def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> l
 
 
 def settled(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
-    """Coordinates (D,) with P0 and Q0 of each event fitted, and nothing else."""
+    """Coordinates (D,) with P0 and Q0 of each event fitted where they are free, and nothing else."""
     before = context.coordinates.before
+    if not len(before):
+        return unit
 
     def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
         whole = np.tile(unit, (len(x), 1))

@@ -48,7 +48,7 @@ class Findings:
 
     @property
     def context(self) -> Context:
-        return self.base.context
+        return self.first.context
 
     @property
     def catalogue(self) -> Catalogue:
@@ -228,7 +228,7 @@ def investigate(
             by_likelihood=by_likelihood,
             held_out=weighed,
             verdict=said,
-            train=_gap(base.context, weighed, said),
+            train=_gap(weighed.first.context, weighed, said),
             withheld=tuple(validate),
             proposed=proposed,
         )

@@ -7,6 +7,8 @@ where residuals are correlated within blocks, and where they are noise.
 Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.identification.sandwich`.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from tractexp.discrepancy.chance import chance_at
@@ -32,6 +34,7 @@ def residual_noise(context: Context, fit: Refit) -> Noise:
 def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
     """All tests at a fit by least squares, under the noise that it shows where little happens, and a covariance of its
     parameters that holds where what it leaves is no noise. It was fitted under `noise`, that of `residual_noise`."""
+    quiet = replace(quiet, context=quiet.context.with_measured_power)
     t = tangent(quiet.context, fit, noise)
     root = _robust(quiet.context, t.whitened(noise))
     own = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)

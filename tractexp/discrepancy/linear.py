@@ -19,9 +19,11 @@ def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np
 
 
 def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Difference quotients (k, ...) of what there is (2 k, ...) at such points."""
+    """Difference quotients (k, ...) of what there is (2 k, ...) at such points; 0 where that diverges."""
     k = len(width)
-    return (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))
+    with np.errstate(over="ignore", invalid="ignore"):
+        quotients = (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))
+    return np.nan_to_num(quotients, posinf=0.0, neginf=0.0)
 
 
 def linearised(
@@ -35,7 +37,7 @@ def linearised(
     points, width = two_sided(unit, columns)
     raw = context.residuals(np.concatenate([unit[None], points]), names)
     k = len(columns)
-    white = context.whiten(noise, np.concatenate([raw[:1], np.nan_to_num(slopes(raw[1:], width))]))
+    white = context.whiten(noise, np.concatenate([raw[:1], slopes(raw[1:], width)]))
     held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
     prior = np.zeros((1 + k, len(held)))
     for row, (i, c) in enumerate(held):

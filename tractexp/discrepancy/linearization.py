@@ -78,7 +78,7 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     sets += [(fit.names, True)] * (m + len(injected))
     raw = context.residuals_of(np.concatenate([fit.unit[None], moved, points, injected]), sets)
     base = raw[0]
-    nuisance = np.nan_to_num(slopes(raw[1 : 1 + 2 * k], width))
+    nuisance = slopes(raw[1 : 1 + 2 * k], width)
     further = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
     perturbed = np.nan_to_num(raw[1 + 2 * k + m :] - base)
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)

@@ -29,9 +29,8 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searched, wide_starts
 from tractexp.discrepancy.families import member_fits
-from tractexp.discrepancy.fitting import Refit, best_of, refit, settled, wide_refits
+from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
-from tractexp.discrepancy.noise_in_quiet import white
 from tractexp.discrepancy.records import Records
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import block_sums, noise_variance
@@ -130,9 +129,9 @@ class Predictions(Generic[OneSet]):
         """The set that predicts best and needs each of its members; the base model where none is ahead of it."""
         chosen = self.bare
         for size in range(1, 1 + max(map(len, self.sets))):
-            best = next((p for p in self.ranked(size, criteria.ahead) if len(p.names) == size), None)
-            if best is not None and best.ahead_of(chosen, criteria.ahead):
-                chosen = best
+            ranked = self.ranked(size, criteria.ahead)
+            ahead = (p for p in ranked if len(p.names) == size and p.ahead_of(chosen, criteria.ahead))
+            chosen = next(ahead, chosen)
         return chosen
 
     def nearest(self, criteria: Criteria) -> OneSet | None:
@@ -183,30 +182,33 @@ class ErrorPredictions(Predictions[PredictionError]):
 
 def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredictions:
     """Fit single effects and sets of two by least squares, and what the search by likelihood ended with; carry all of
-    them over to the held-out events."""
-    context = explained.base.context
-    noise = residual_noise(context, explained.chosen)
+    them over to the held-out events. The powers before events are those measured, as in an identification."""
+    context = explained.base.context.with_measured_power
+    noise = residual_noise(explained.base.context, explained.chosen)
     there = context.on(Records.of(events, context.records.window))
-    fits = {f.names: f for f in _fits(explained, noise)}
+    fits = {f.names: f for f in _fits(context, explained, noise)}
     predicted = each_apart(lambda f: _predicted(there, f), list(fits.values()), context.effort.parts)
     sets = dict(zip(fits, predicted, strict=True))
     result = ErrorPredictions(context.catalogue, sets, there, noise)
     best = result.ranked(max(map(len, fits)), context.criteria.ahead)[:1]
     subsets = [s for p in best for k in range(1, len(p.names)) for s in itertools.combinations(p.names, k)]
     if missing := [s for s in subsets if s not in sets]:
-        again = refit(context, noise, [(s, fits[best[0].names].unit) for s in missing])
+        again = refit(context, noise, [(s, fits[best[0].names].unit) for s in missing], faults=())
         sets |= {f.names: _predicted(there, f) for f in again}
     return ErrorPredictions(context.catalogue, sets, there, noise)
 
 
-def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
-    """The base model and sets of effects, each as it fits best by least squares."""
-    base, context = explained.base, explained.base.context
+def _fits(context: Context, explained: Explanations, noise: Noise) -> list[Refit]:
+    """The base model and sets of effects, each as it fits best by least squares.
+
+    Faults of the measurement are free while sets are looked for; what is told of them is without.
+    """
+    base, at = explained.base, context.coordinates
     say = lambda line: context.effort.say(f"{line}, by least squares")  # noqa: E731
-    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0]).with_initial_power
-    begun = [explained.steps[0].fit.unit, *base.local_minima, *minima_of(context, squares)]
-    bare = refit(context, noise, [((), unit) for unit in begun])[0]
-    ground = explained.steps[0].at(bare, noise)
+    squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
+    by_likelihood = map(at.at_measured_power, (explained.steps[0].fit.unit, *base.local_minima))
+    bare = refit(context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))])[0]
+    ground = explained.steps[0].at(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 
     def add(fits: Iterable[Refit]) -> None:
@@ -216,21 +218,20 @@ def _fits(explained: Explanations, noise: Noise) -> list[Refit]:
     add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
     carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[:CARRIED]
     if carried:
-        add(refit(context, noise, [(f.names, f.unit) for f in carried]))
+        add(refit(context, noise, [(f.names, at.at_measured_power(f.unit)) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
     of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:FAMILIES]}
     add(member_fits(context, noise, refits, of_family))
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
     for single in of_load[:FAMILIES]:
-        add(searched([ground, ground.at(single, noise)], refits, 2, say))
-    return list(refits.values())
+        add(searched([ground, ground.at(context, single, noise)], refits, 2, say))
+    return refit(context, noise, [(f.names, at.without_faults(f.unit, ())) for f in refits.values()], faults=())
 
 
 def _predicted(there: Context, fit: Refit) -> PredictionError:
-    """A fit on other events: all keeps its fitted value but P0 and Q0 of each."""
+    """A fit on other events."""
     unit, d = there.coordinates.null.copy(), len(there.coordinates.names)
     unit[:d] = fit.unit[:d]
-    unit = settled(there, unit, white(there), fit.names)
     calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
     left, noise, response = [], [], []
     for e, event in enumerate(there.events):

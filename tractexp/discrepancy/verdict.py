@@ -163,7 +163,8 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         return _by_deviance(weighed, sets)
     chosen = [predicted.sets[tuple(names)] for names in sets]
     size = len(chosen[0].names)
-    rest = [p for p in predicted.ranked(size, predicted.context.criteria.ahead) if p.names not in sets]
+    ranked = predicted.ranked(size, predicted.context.criteria.ahead)
+    rest = [p for p in ranked if p.names not in sets and p.left > chosen[0].left]  # what leaves less does so by chance
     off = listed([p.error for p in chosen], in_percent)
     following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
     worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
@@ -214,12 +215,14 @@ def _too_far_off(weighed: HeldOut) -> str:
         return f"the model and the records disagree, and {none}, which misses {bare} of the response there"
     near = predicted.sets[rivals[0].fit.names]
     spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
+    why = f"a name must divide that by {criteria.divides:g}"
+    if near.left * criteria.divides**2 <= predicted.bare.left:
+        why = "that may be chance in so few blocks of 0.1 s"
     none = f"none of the {_tested(weighed)} effects tested{_together(near.names)} predicts the held-out events"
     misses = f"miss{'es' * (len(near.names) == 1)}"
     return (
         f"the model and the records disagree, and {none} well enough to be named: {spoken}, the nearest, {misses} {off}"
-        f" of the response there, where the base model misses {bare}, which a name must divide by {criteria.divides:g}"
-        " and by more than chance"
+        f" of the response there, where the base model misses {bare}; {why}"
     )
 
 
@@ -245,7 +248,7 @@ def _denied(weighed: HeldOut) -> str:
 
 def _nearest(weighed: HeldOut, validate: Sequence[Event]) -> Nearest | None:
     """The best of the sets that were compared; None where that is the base model."""
-    rivals, context = weighed.survivors.rivals[:4], weighed.survivors.explanations.base.context
+    rivals, context = weighed.survivors.rivals[:4], weighed.first.context
     if not rivals or not rivals[0].fit.names:
         return None
     fits = [weighed.bare, *(r.fit for r in rivals)]

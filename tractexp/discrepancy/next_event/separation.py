@@ -101,7 +101,7 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     """
     at, names = context.coordinates, side.fit.names
     drives = [driven(context, event) for event in events]
-    inside = list(side.columns[: -len(at.before)])
+    inside = list(side.columns[: len(side.columns) - len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
     points, width = two_sided(middle, inside)
     moved = _simulated(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
