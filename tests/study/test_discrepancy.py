@@ -697,7 +697,7 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     record = shared_data / "dfr220kv-shandong" / "xtz.cfg"
     data = ["data=comtrade", f"data.path={record}", "data.voltages=[4,5,6]", "data.currents=[8,9,10]", "data.train=[1]",
             "data.validate=[2]", "tracking.enabled=false"]  # fmt: skip
-    only = "task.effects=[static_var_compensator]"
+    only = "task.effects=[exponential_recovery]"
     done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())

@@ -66,7 +66,7 @@ def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
     assert named(bare, best, clear) == [("a", "c")]
     sets = {one.names: one for one in (bare, best)}
     assert Predictions(Catalogue(), sets).nearest(Criteria()) is best
-    assert Predictions(Catalogue(), {(): off(error=0.1), ("a",): off("a", error=0.2)}).nearest(Criteria()) is None
+    assert Predictions(Catalogue(), {(): off(error=0.1), ("a",): off("a", error=0.2)}).nearest(Criteria()).names == ()
 
 
 def test_sets_that_predict_alike_are_tied_the_better_one_first():

@@ -114,14 +114,13 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     criteria, quiet = explained.base.context.criteria, explained.base.quiet
     predicted = predictions(explained, events)
     there, bare, explaining = predicted.context, predicted.bare, predicted.explaining(criteria)
-    near = predicted.nearest(criteria)
-    ranked = explaining or [near] * (near is not None)
-    ranked = [*ranked, *(p for p in predicted.ranked(max(map(len, predicted.sets)), criteria.ahead) if p not in ranked)]
+    leading = explaining or [predicted.nearest(criteria)]
+    tests = {p.names: least_squares_tests(quiet, p.fit, predicted.noise, seed) for p in (bare, *leading)}
+    rest = [p for p in predicted.ranked(max(map(len, predicted.sets)), criteria.ahead) if p not in leading]
 
     def rival(one: PredictionError) -> Rival:
-        told = one is near or one in explaining
-        tests = least_squares_tests(quiet, one.fit, predicted.noise, seed) if told else None
-        return Rival(one.fit, np.nan, one.fit.cost - ranked[0].fit.cost, one not in explaining, tests)
+        behind = one.fit.cost - leading[0].fit.cost
+        return Rival(one.fit, np.nan, behind, one not in explaining, tests.get(one.names))
 
     def assessed(one: PredictionError) -> Assessment:
         left = there.residuals(one.unit[None], one.names)[0]
@@ -129,13 +128,15 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
         judged = gap(there, bare.unit, one.unit, one.names, noise, there.coordinates.before)
         return Assessment(judged, there, (bare.unit, one.unit))
 
-    first = least_squares_tests(quiet, bare.fit, predicted.noise, seed)
-    rivals = [rival(p) for p in ranked]
+    rivals = [rival(p) for p in (*leading, *rest)]
     retained, others = rivals[: len(explaining)], rivals[len(explaining) :]
     own = {
-        "first": first, "last": (rivals[0].tests if rivals else None) or first, "noise": predicted.noise, "faults": (),
+        "first": tests[()],
+        "last": tests[leading[0].names],
+        "noise": predicted.noise,
+        "faults": (),
         "bare": bare.fit,
-    }  # fmt: skip
+    }
     return _named(weighed, retained, others, {p.names: assessed(p) for p in explaining}, predicted, **own)
 
 

@@ -134,12 +134,10 @@ class Predictions(Generic[OneSet]):
             chosen = next(ahead, chosen)
         return chosen
 
-    def nearest(self, criteria: Criteria) -> OneSet | None:
-        """The same, or else the one that leaves least; None where none leaves less than the base model."""
+    def nearest(self, criteria: Criteria) -> OneSet:
+        """The same, or else what leaves least."""
         best = self.best(criteria)
-        if not best.names:
-            best = min(self.sets.values(), key=_rank)
-        return best if best.names else None
+        return best if best.names else min(self.sets.values(), key=_rank)
 
     def explaining(self, criteria: Criteria) -> list[OneSet]:
         """The set that predicts best and those tied with it; none where none divides what the base model leaves."""

@@ -210,7 +210,7 @@ def _too_far_off(weighed: HeldOut) -> str:
     predicted, rivals = weighed.predictions, weighed.survivors.rivals
     assert isinstance(predicted, ErrorPredictions)
     bare, criteria = in_percent(predicted.bare.error), predicted.context.criteria
-    if not rivals:
+    if not rivals[0].fit.names:
         none = f"none of the {_tested(weighed)} effects tested predicts the held-out events better than the base model"
         return f"the model and the records disagree, and {none}, which misses {bare} of the response there"
     near = predicted.sets[rivals[0].fit.names]
@@ -249,7 +249,7 @@ def _denied(weighed: HeldOut) -> str:
 def _nearest(weighed: HeldOut, validate: Sequence[Event]) -> Nearest | None:
     """The best of the sets that were compared; None where that is the base model."""
     rivals, context = weighed.survivors.rivals[:4], weighed.first.context
-    if not rivals or not rivals[0].fit.names:
+    if not rivals[0].fit.names:
         return None
     fits = [weighed.bare, *(r.fit for r in rivals)]
     before, *after = (curves(context, f.unit, weighed.last.noise, f.names) for f in fits)
