@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.discrepancy.catalogue import catalogue
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.effort import Effort
+from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
@@ -17,9 +20,11 @@ from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import PredictionError, Predictions, predictions
 from tractexp.discrepancy.recommended import adequacy
+from tractexp.discrepancy.records import Records
 from tractexp.identification.model_error import in_percent
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
+from tractexp.noise import Noise
 from tractexp.plugin import get
 from tractexp.record import Record, detect
 
@@ -222,6 +227,21 @@ def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
     assert [inexact.catalogue.textbook(one.names) for one in best] == [("undervoltage_trip",)]
     assert {n for names in predicted.sets for n in names} - set(inexact.catalogue.of_load)
     assert best[0].error * inexact.context.criteria.divides < predicted.bare.error
+
+
+def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identification_has_it():
+    """No coordinate of such a fit is of one event only: P0 and Q0 are none."""
+    events = dips((0.5, 0.35, 0.6, 0.4))
+    model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+    missing = catalogue(model, events, ("dc_link_lag",), 0.05)
+    context = Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort(lambda line: None))
+    noise = Noise(Noise.white(0.01, 0.01).pairs, np.eye(2))
+    alone = tractexp.identify(events, progress=False).result
+    begin = context.coordinates.placed(context.coordinates.null, {n: 0.97 * v for n, v in alone.parameters.items()})
+    fit = refit(context.with_measured_power, noise, [((), begin)], faults=())[0]
+    values = np.array([context.coordinates.value(name, fit.unit) for name in alone.parameters])
+    assert values == pytest.approx([*alone.parameters.values()], rel=0.02)
+    assert (fit.unit[context.coordinates.before] == 0.5).all()
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():

@@ -147,5 +147,6 @@ class Context:
 
     @property
     def apart(self) -> SeparableColumns:
-        """P0 and Q0 of each event, which act on its own rows only."""
-        return SeparableColumns.of_power(self.drive, len(self.coordinates.base))
+        """P0 and Q0 of each event where they are free, which act on its own rows only."""
+        first = len(self.coordinates.base) if len(self.coordinates.before) else None
+        return SeparableColumns.of_power(self.drive, first)
