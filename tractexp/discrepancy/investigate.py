@@ -152,7 +152,7 @@ class Findings:
         alone = [self._left([replace(overlay, nearest=None) for overlay in self.overlays])]
         if self.by_likelihood is not self.held_out:
             alone.append(self._left(of_fit(self.context, self.by_likelihood.bare, self.last.noise)))
-        return max(alone, key=_told)
+        return max(alone, key=_share_of)
 
     @property
     def headline(self) -> str:
@@ -164,7 +164,7 @@ class Findings:
         ]
         if not remainders_left:
             return ""
-        shapes, base = max(remainders_left, key=lambda item: _told(item[0]))
+        shapes, base = max(remainders_left, key=lambda item: _share_of(item[0]))
         held_out = shapes[0].event in {event.record.name for event in self.withheld}
         base |= self.verdict.nearest is None
         whose = "the base model misses this" if base else "the nearest candidates miss this"
@@ -234,8 +234,8 @@ def investigate(
         )
 
 
-def _told(shapes: Sequence[Remainder]) -> float:
-    """What share of what is left these shapes tell."""
+def _share_of(shapes: Sequence[Remainder]) -> float:
+    """The share of what is left that these shapes make up."""
     return sum(shape.share for shape in shapes)
 
 

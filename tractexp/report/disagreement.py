@@ -36,6 +36,11 @@ def noise(page: Report, findings: Findings) -> None:
     quiet = fit.noise.loudest_input_mode <= context.criteria.blurred
     about = context.domain.about_noise(findings.catalogue.of_measurement, quiet)
     page.heading("Noise").text(f"{context.describe(fit.noise)}. {about}")
+    if fit.robust is not None:
+        page.text(
+            "What is left is louder, so all is told by least squares, without faults of the measurement and at the"
+            " powers measured before the events."
+        )
     if (window := context.records.window) is not None:
         model = " The extended configuration does not do so." if findings.names else ""
         page.text(

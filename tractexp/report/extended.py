@@ -63,9 +63,10 @@ def parameters(page: Report, findings: Findings) -> None:
         entries = [value(was) if was else "not in it"] if findings.names else []
         rows.append([p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)])
     stages = ["before", "after"] if findings.names else ["value"]
+    how = "the curvature" if findings.tests.robust is None else "blocks of 0.1 s left out in turn"
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     page.table(
-        columns, rows, "± one standard error, from the curvature at the fit to the fitted events.",
+        columns, rows, f"± one standard error, from {how} in the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
     if retained := held(findings):

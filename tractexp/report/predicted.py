@@ -38,8 +38,8 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
             for one in rows
         ],
         f"A name divides the error of the base model by {criteria.divides:g} and is ahead of every other set of its"
-        f" size or smaller by {criteria.ahead:g}, both by more than chance (blocks of 0.1 s left out in turn). Of"
-        f" {len(predictions.sets) - 1} sets that were fitted {len(rows) - (bare in rows)} are shown.",
+        f" size or smaller by {criteria.ahead:g}, both by more than chance (blocks of 0.1 s left out in turn)."
+        + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
         words=(0, 3, 4),
     )  # fmt: skip
 
