@@ -39,9 +39,9 @@ def section(page: Report, choice: NextEvent) -> None:
     chances = _chances(choice, best)
     page.heading("Rival by rival", 3)
     page.table(
-        ["if the truth is", *(f"{name} is rejected [%]" for name in choice.rivals)],
+        ["if the truth is", *(f"{k} is rejected [%]" for k in range(1, 1 + len(choice.rivals)))],
         [
-            [name, *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(chances.pairs[a]))]
+            [f"{a + 1}: {name}", *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(chances.pairs[a]))]
             for a, name in enumerate(choice.rivals)
         ],
         f"By {best.event.words}.",
