@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.injection import perturbations
-from tractexp.discrepancy.linear import two_sided
+from tractexp.discrepancy.linear import finite, two_sided
 from tractexp.discrepancy.linearization import resting
 from tractexp.domain.playback import relative_error
 from tractexp.identification.model_error import ModelError, model_error
@@ -120,7 +120,7 @@ def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Nois
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
     points, _ = perturbations(context, unit)
     raw = context.residuals_of(np.concatenate([unit[None], points]), [(names, True)] * (1 + len(points)))
-    return context.whiten(noise, np.nan_to_num(raw[1:] - raw[0]))
+    return context.whiten(noise, finite(raw[1:] - raw[0]))
 
 
 def beyond_chance(

@@ -18,12 +18,17 @@ def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
 
 
+def finite(changes: np.ndarray) -> np.ndarray:
+    """Changes of a residual; none where a simulation diverges: that tells nothing of what little would do."""
+    return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
+
+
 def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
     """Difference quotients (k, ...) of what there is (2 k, ...) at such points; 0 where that diverges."""
     k = len(width)
     with np.errstate(over="ignore", invalid="ignore"):
         quotients = (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))
-    return np.nan_to_num(quotients, posinf=0.0, neginf=0.0)
+    return finite(quotients)
 
 
 def linearised(

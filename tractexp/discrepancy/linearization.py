@@ -10,7 +10,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fit_effort import BOUND_MARGIN
 from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.injection import perturbations
-from tractexp.discrepancy.linear import slopes, two_sided
+from tractexp.discrepancy.linear import finite, slopes, two_sided
 from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
@@ -79,8 +79,8 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     raw = context.residuals_of(np.concatenate([fit.unit[None], moved, points, injected]), sets)
     base = raw[0]
     nuisance = slopes(raw[1 : 1 + 2 * k], width)
-    further = np.nan_to_num((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
-    perturbed = np.nan_to_num(raw[1 + 2 * k + m :] - base)
+    further = finite((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
+    perturbed = finite(raw[1 + 2 * k + m :] - base)
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))

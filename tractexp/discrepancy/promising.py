@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.linear import linearised
+from tractexp.discrepancy.linear import finite, linearised
 from tractexp.noise import Noise
 
 LEAST = 1e-9  # of the deviance: a change below that is none
@@ -45,7 +45,7 @@ def _expected(
     raw, rows = linearised(context, ground, noise, nuisances, ())
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)
-    white = context.whiten(noise, np.nan_to_num(context.residuals(units, names) - raw))
+    white = context.whiten(noise, finite(context.residuals(units, names) - raw))
     changes = np.concatenate([white, np.zeros((len(white), len(r) - white.shape[1]))], axis=1)
     changes -= (changes @ Q) @ Q.T
     power = np.einsum("nr,nr->n", changes, changes)
