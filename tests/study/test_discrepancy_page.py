@@ -218,6 +218,7 @@ def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(na
     left = SimpleNamespace(retained=[best], explanations=explained)
     weighed = SimpleNamespace(survivors=left, faults=faults, first=tests)
     assert told in verdict._unexplained(weighed, SimpleNamespace(closed=(0.66, 0.5)))
+    assert "nan" not in verdict._unexplained(weighed, SimpleNamespace(closed=(np.nan, np.nan)))
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):

@@ -122,12 +122,13 @@ def test_too_few_samples_before_a_dip_show_no_noise():
 
 
 def test_shares_are_told_to_two_digits():
-    assert [in_percent(x) for x in (0.00571, 0.0567, 0.12345, 1.004, 12.3)] == [
+    assert [in_percent(x) for x in (0.00571, 0.0567, 0.12345, 1.004, 12.3, np.inf)] == [
         "0.57 %",
         "5.7 %",
         "12 %",
         "100 %",
         "1230 %",
+        "over 10000 %",
     ]
 
 

@@ -197,7 +197,9 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
     sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
     one = len(names or faults) == 1
-    share = f"close{'s' * one} {nearest.closed[0]:.0%} of the gap" if nearest else f"help{'s' * one}"
+    share = f"help{'s' * one}"
+    if nearest and np.isfinite(nearest.closed[0]):
+        share = f"close{'s' * one} {nearest.closed[0]:.0%} of the gap"
     none = f"none of the {_tested(weighed)} effects tested{_together(best.fit.names)} explains it all"
     return (
         f"the model and the records disagree, and {none}: {sentence}, the nearest, {share}, but what is left {chance};"

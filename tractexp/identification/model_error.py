@@ -18,6 +18,8 @@ from tractexp.identification.blocks import LENGTH, quantile
 from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
+MOST = 10_000  # percent: more tells no more
+
 
 @dataclass(frozen=True)
 class ModelError:
@@ -45,8 +47,10 @@ class ModelError:
 
 
 def in_percent(share: float) -> str:
-    """A share to two digits: '0.57 %', '12 %'."""
+    """A share to two digits: '0.57 %', '12 %'; 'over 10000 %' where a model diverges."""
     percent = 100 * share
+    if percent > MOST:
+        return f"over {MOST} %"
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 

@@ -197,8 +197,8 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     assert near.rival.tests is not None
     by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
     own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
-    rows = [[joined(near.names), *(f"{share:.0%}" if np.isfinite(share) else "" for share in near.closed)]]
-    rows += [[joined(names), f"{share:.0%}", ""] for names, share in near.others]
+    rows = [[joined(near.names), *map(_share, near.closed)]]
+    rows += [[joined(names), _share(share), ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
     page.table(["nearest candidates", "gap closed, fitted", "held out"], rows, words=(0,))
     with page.folded(f"How large {joined(near.names)} would be"):
@@ -208,6 +208,11 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
             "As if they were right; something else is missing, so that the intervals may miss the truth.",
             words=(1, 2, 5),
         )  # fmt: skip
+
+
+def _share(closed: float) -> str:
+    """The share of a gap, nothing where there was none to speak of."""
+    return f"{closed:.0%}" if np.isfinite(closed) else ""
 
 
 def _number(value: float | None) -> str:
