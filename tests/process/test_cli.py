@@ -37,12 +37,12 @@ def test_the_main_job_prints_what_it_read_did_and_found(main_job):
 
 
 def test_the_first_line_of_the_answer_is_what_it_is_good_for(main_job):
-    """The stand-in's stator transients are missing in the model: the size of its error comes first, then one table."""
+    """The stand-in's stator transients are missing in the model: the size of its error comes first, then two tables."""
     _, done = main_job
     answer = done.stdout.partition("optimizer: issa, seed 0")[2]
     answer = re.sub(r"(?m)^ *iteration .*\n", "", answer).strip()  # a slow machine tells how far the search is
     assert answer.startswith("The model describes this load within 1.8 % of its response (0.47 % of S); an effect is")
-    assert answer.count("95 % interval") == 1
+    assert answer.count("95 % interval") == 2  # of the parameters and of the model's error
     assert "task=discrepancy" in answer
 
 
