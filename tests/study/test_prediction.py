@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.blocks import Report
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
@@ -27,6 +28,7 @@ from tractexp.model.model import compose
 from tractexp.noise import Noise
 from tractexp.plugin import get
 from tractexp.record import Record, detect
+from tractexp.report.predicted import predicted
 
 BLOCKS = 20
 SAMPLES, STEP = 400, 2e-3  # of a generated dip
@@ -242,6 +244,23 @@ def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identifi
     values = np.array([context.coordinates.value(name, fit.unit) for name in alone.parameters])
     assert values == pytest.approx([*alone.parameters.values()], rel=0.02)
     assert (fit.unit[context.coordinates.before] == 0.5).all()
+
+
+def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where_all_diverge(
+    inexact, tmp_path, monkeypatch
+):
+    def page_of(predictions):
+        predicted(page := Report("candidates", ""), inexact, predictions)
+        return page.save(tmp_path / "page.html").read_text(encoding="utf-8")
+
+    made = inexact.held_out.predictions
+    monkeypatch.setattr("tractexp.report.predicted.MOST", 0)
+    shown = page_of(made)
+    assert "undervoltage_trip" in shown
+    assert "the base model" in shown
+    assert "dc_link_lag" not in shown
+    lost = {names: replace(one, squares=np.full_like(one.squares, np.inf)) for names, one in made.sets.items()}
+    assert "No set has a steady state on the held-out events" in page_of(replace(made, sets=lost))
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():

@@ -122,7 +122,7 @@ class Coordinates:
         return moved
 
     def at_measured_power(self, unit: np.ndarray) -> np.ndarray:
-        """Coordinates (D,) with P0 and Q0 of each event as measured."""
+        """Coordinates (D,) from those of these or other events, with P0 and Q0 of each of these as measured."""
         return np.r_[unit[: len(self.names)], self.null[len(self.names) :]]
 
     def widened(self, unit: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import ParameterEstimate, standard_errors
+from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
 from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.wording import joined
@@ -95,12 +95,9 @@ def _of_set(findings: Findings, rival: Rival) -> Evidence:
     weighed, names = findings.held_out, rival.fit.names or findings.held_out.faults
     drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
     status, why = _fate(findings, rival)
-    unit = weighed.extended.get(rival.fit.names, rival.fit).unit
-    errors = {} if rival.tests is None else standard_errors(rival.tests)
-    at = findings.context.coordinates
-    own = findings.catalogue.sizes(names)
-    sizes = tuple(ParameterEstimate(p, at.value(p.name, unit), errors.get(p.name, np.nan)) for p in own)
-    return Evidence(names, max(drop, 0.0), FITTED, status, sizes, why)
+    fit = weighed.extended.get(rival.fit.names, rival.fit)
+    sizes = effect_sizes(findings.context, fit, names, rival.tests)
+    return Evidence(names, max(drop, 0.0), FITTED, status, tuple(sizes), why)
 
 
 def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:

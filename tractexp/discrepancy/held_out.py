@@ -236,12 +236,9 @@ def carried(
     Returns the context of those events, the coordinates of each fit there, and the noise of the last one that has a
     steady state there.
     """
-    other, d = context.on(Records.of(events, context.records.window)), len(context.coordinates.names)
-    units = []
-    for fit in fits:
-        unit = other.coordinates.null.copy()
-        unit[:d] = fit.unit[:d]
-        units.append(settled(other, unit, white(other), fit.names))
+    other = context.on(Records.of(events, context.records.window))
+    at = other.coordinates.at_measured_power
+    units = [settled(other, at(fit.unit), white(other), fit.names) for fit in fits]
     noise = white(other)
     for unit, fit in zip(reversed(units), reversed(fits), strict=True):
         if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():

@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -130,24 +129,19 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
 
     rivals = [rival(p) for p in (*leading, *rest)]
     retained, others = rivals[: len(explaining)], rivals[len(explaining) :]
-    own = {
-        "first": tests[()],
-        "last": tests[leading[0].names],
-        "noise": predicted.noise,
-        "faults": (),
-        "bare": bare.fit,
-    }
-    return _named(weighed, retained, others, {p.names: assessed(p) for p in explaining}, predicted, **own)
+    weighed = replace(
+        weighed, first=tests[()], last=tests[leading[0].names], noise=predicted.noise, faults=(), bare=bare.fit
+    )
+    return _named(weighed, retained, others, {p.names: assessed(p) for p in explaining}, predicted)
 
 
 def _named(
     weighed: HeldOut, retained: Sequence[Rival], others: Sequence[Rival], assessments: Mapping[Names, Assessment],
-    predicted: Predictions, **own: Any,
+    predicted: Predictions,
 ) -> HeldOut:  # fmt: skip
-    """The sets retained in place of those that leave noise only; `own` is what they were fitted with."""
+    """The sets retained in place of those that leave noise only."""
     surviving = replace(weighed.survivors, retained=tuple(retained), rivals=(*retained, *others))
     extended = {r.fit.names: r.fit for r in retained}
     return replace(
-        weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted,
-        **own,
-    )  # fmt: skip
+        weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted
+    )

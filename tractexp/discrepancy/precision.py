@@ -8,7 +8,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from tractexp import files
+from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.fitting import Refit
 from tractexp.identification.information import Information
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.identification.verdict import BOUND, judge
@@ -60,6 +62,15 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     ranges = np.ones(len(columns))
     spread = Information(tuple(map(str, columns)), 0 * ranges, ranges, seen).standard_errors
     return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
+
+
+def effect_sizes(
+    context: Context, fit: Refit, names: Sequence[str], tests: Disagreement | None
+) -> list[ParameterEstimate]:
+    """How large the named effects are in a fit; with standard errors where its `tests` were made."""
+    errors = {} if tests is None else standard_errors(tests)
+    at, own = context.coordinates, context.catalogue.sizes(names)
+    return [ParameterEstimate(p, at.value(p.name, fit.unit), errors.get(p.name, np.nan)) for p in own]
 
 
 def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:

@@ -228,8 +228,7 @@ def _fits(context: Context, explained: Explanations, noise: Noise) -> list[Refit
 
 def _predicted(there: Context, fit: Refit) -> PredictionError:
     """A fit on other events."""
-    unit, d = there.coordinates.null.copy(), len(there.coordinates.names)
-    unit[:d] = fit.unit[:d]
+    unit = there.coordinates.at_measured_power(fit.unit)
     calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
     left, noise, response = [], [], []
     for e, event in enumerate(there.events):

@@ -192,19 +192,15 @@ def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
     chance = f"would come about by chance with a probability of {by_draws(best.tests.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
-        none = f"none of the {_tested(weighed)} effects tested helps more than chance does"
-        return f"the model and the records disagree, and {none}: what the base model leaves {chance}; {loudest}"
+        return f"{_none(weighed)} helps more than chance does: what the base model leaves {chance}; {loudest}"
     names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
     sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
     one = len(names or faults) == 1
     share = f"help{'s' * one}"
     if nearest and np.isfinite(nearest.closed[0]):
         share = f"close{'s' * one} {nearest.closed[0]:.0%} of the gap"
-    none = f"none of the {_tested(weighed)} effects tested{_together(best.fit.names)} explains it all"
-    return (
-        f"the model and the records disagree, and {none}: {sentence}, the nearest, {share}, but what is left {chance};"
-        f" {loudest}"
-    )
+    none = f"{_none(weighed, len(best.fit.names))} explains it all"
+    return f"{none}: {sentence}, the nearest, {share}, but what is left {chance}; {loudest}"
 
 
 def _too_far_off(weighed: HeldOut) -> str:
@@ -213,28 +209,23 @@ def _too_far_off(weighed: HeldOut) -> str:
     assert isinstance(predicted, ErrorPredictions)
     bare, criteria = in_percent(predicted.bare.error), predicted.context.criteria
     if not rivals[0].fit.names:
-        none = f"none of the {_tested(weighed)} effects tested predicts the held-out events better than the base model"
-        return f"the model and the records disagree, and {none}, which misses {bare} of the response there"
+        better = "predicts the held-out events better than the base model"
+        return f"{_none(weighed)} {better}, which misses {bare} of the response there"
     near = predicted.sets[rivals[0].fit.names]
     spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
     if near.left * criteria.divides**2 <= predicted.bare.left:
         why = "that may be chance in so few blocks of 0.1 s"
-    none = f"none of the {_tested(weighed)} effects tested{_together(near.names)} predicts the held-out events"
-    misses = f"miss{'es' * (len(near.names) == 1)}"
-    return (
-        f"the model and the records disagree, and {none} well enough to be named: {spoken}, the nearest, {misses} {off}"
-        f" of the response there, where the base model misses {bare}; {why}"
-    )
+    none = f"{_none(weighed, len(near.names))} predicts the held-out events well enough to be named"
+    misses = f"miss{'es' * (len(near.names) == 1)} {off} of the response there"
+    return f"{none}: {spoken}, the nearest, {misses}, where the base model misses {bare}; {why}"
 
 
-def _tested(weighed: HeldOut) -> int:
-    return len(weighed.first.context.catalogue.candidates)
-
-
-def _together(names: Sequence[str]) -> str:
-    """That sets were tried, too, where the nearest is one."""
-    return f", alone or up to {len(names)} together," if len(names) > 1 else ""
+def _none(weighed: HeldOut, most: int = 1) -> str:
+    """How a sentence begins that says what no effect does, nor a set of so many where the nearest is one."""
+    tested = len(weighed.first.context.catalogue.candidates)
+    together = f", alone or up to {most} together," * (most > 1)
+    return f"the model and the records disagree, and none of the {tested} effects tested{together}"
 
 
 def _denied(weighed: HeldOut) -> str:

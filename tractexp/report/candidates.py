@@ -6,6 +6,7 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.evidence import (
     CHOSEN,
@@ -21,12 +22,12 @@ from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.verdict import TIED
-from tractexp.report.predicted import predicted
+from tractexp.report.predicted import BAR, predicted
 from tractexp.wording import joined
 
-COLORS = {CHOSEN: "#009E73", TIED: "#E69F00"}
-REFITTED, ESTIMATED = "#0072B2", "#9A9A9A"
-BAR, ROOM = 24, 1.2  # pixels; of the longest bar, for what stands beside the bars
+COLORS = {CHOSEN: PALETTE[2], TIED: PALETTE[4]}
+REFITTED, ESTIMATED = PALETTE[0], MEASURED
+ROOM = 1.2  # of the longest bar, for what stands beside the bars
 MOST_SETS = 12  # that are compared in a table
 
 

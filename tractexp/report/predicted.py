@@ -6,14 +6,15 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
+from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.precision import ParameterEstimate, standard_errors
+from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
 from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
 from tractexp.identification.model_error import in_percent
 from tractexp.wording import joined
 
-ADDED, TIED, OTHER, BASE = "#009E73", "#E69F00", "#0072B2", "#9A9A9A"
-MOST = 16  # sets that are shown
+ADDED, TIED, OTHER, BASE = PALETTE[2], PALETTE[4], PALETTE[0], MEASURED
+MOST = 16  # sets that are shown beside those named
 BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the bars
 
 
@@ -21,9 +22,12 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     """The model's error on the held-out events with each set, and by what it divides that of the base model."""
     criteria, bare = findings.context.criteria, predictions.bare
     every = [one for one in sorted(predictions.sets.values(), key=lambda p: p.left) if np.isfinite(one.error)]
-    some = every[:MOST]
-    rows = some if bare in some or bare not in every else [*some[: MOST - 1], bare]
+    always = ((), *findings.verdict.sets)
+    rows = [one for k, one in enumerate(every) if k < MOST or one.names in always]
     page.heading("Candidates by what they predict")
+    if not rows:
+        page.text("No set has a steady state on the held-out events.")
+        return
     page.chart(
         _bars(findings, rows),
         "The model's error on the held-out events, in percent of the response, with the sets that predict them best"
@@ -55,10 +59,10 @@ def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
         else TIED if one.names in findings.verdict.sets else OTHER
         for one in rows
     ]  # fmt: skip
-    bare = next((error for one, error in zip(rows, errors, strict=True) if not one.names), max(errors))
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
     chart.bars("", [_label(one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
-    chart.edge(bare / findings.context.criteria.divides, dash="dash")
+    for bare in (error for one, error in zip(rows, errors, strict=True) if not one.names):
+        chart.edge(bare / findings.context.criteria.divides, dash="dash")
     return chart.limits(None, 0.0, ROOM * max(errors))
 
 
@@ -72,8 +76,5 @@ def _status(findings: Findings, one: PredictionError) -> str:
 
 def _sizes(findings: Findings, one: PredictionError) -> list[ParameterEstimate]:
     """How large its effects are, with standard errors where they were reckoned."""
-    rival = next((r for r in findings.survivors.rivals if r.fit.names == one.names), None)
-    errors = {} if rival is None or rival.tests is None else standard_errors(rival.tests)
-    at = findings.context.coordinates
-    own = findings.catalogue.sizes(one.names)
-    return [ParameterEstimate(p, at.value(p.name, one.fit.unit), errors.get(p.name, np.nan)) for p in own]
+    tests = next((r.tests for r in findings.survivors.rivals if r.fit.names == one.names), None)
+    return effect_sizes(findings.context, one.fit, one.names, tests)
