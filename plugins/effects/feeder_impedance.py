@@ -46,7 +46,7 @@ class FeederImpedance(Effect):
         0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0, power_exponent=-1
     )
     places, kind = ("bus",), "law"
-    order = 2
+    order, iterates = 2, True
     relevant = {"R_f": 0.01, "X_f": 0.02}
     confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
 

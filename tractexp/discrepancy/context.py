@@ -1,7 +1,7 @@
 """What every step of an investigation works with: records, coordinates and the kernels that simulate them."""
 
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -21,6 +21,11 @@ from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.record import Event
+
+
+def finite(changes: np.ndarray) -> np.ndarray:
+    """Changes of a residual; none where a simulation diverges: that tells nothing of what little would do."""
+    return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +76,8 @@ class Context:
         if not all(map(store.installed, parts)):
             return ""
         content = (
-            self.problem.digest(), self.kernels.bare.digest(), self.criteria, at.null, at.before, at.prior_deviation,
+            self.kernels.bare.digest(), self.kernels.substeps, self.criteria, at.lower, at.upper, at.null, at.before,
+            at.prior_deviation, sorted(self.kernels.fixed.items()),
         )  # fmt: skip
         return store.key(store.environment(), repr(parts), self.records.window, *content)
 
@@ -85,7 +91,7 @@ class Context:
 
     @property
     def problem(self) -> Problem:
-        """The problem of everything: base model, all candidates, pushes."""
+        """The problem of everything: base model, all candidates, pushes. It is not simulated."""
         return self.kernels.whole
 
     @property
@@ -107,26 +113,39 @@ class Context:
         labels = noise.describe(self.drive.spoken).split(", ")
         return ", ".join(part for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True) if there)
 
-    def residuals(self, unit: np.ndarray, names: Sequence[str], tested: bool = False) -> np.ndarray:
+    def residuals(self, unit: np.ndarray, names: Sequence[str], beside: str = "") -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
 
-        Where it is `tested` what they leave, any effect and any push may be there, by the largest kernel.
+        Of what they leave one more effect `beside` them, or the pushes, may be off theirs.
         """
         self.effort.spend(len(unit))
-        key = self.kernels.family.key(names, tested)
+        key = self.kernels.family.key(names, beside)
         return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
 
-    def residuals_of(self, unit: np.ndarray, sets: Sequence[tuple[Sequence[str], bool]]) -> np.ndarray:
-        """As `residuals`, with a set of names for each of the coordinates, and whether it is tested."""
-        lanes: dict[Key, list[int]] = {}
-        for lane, (names, tested) in enumerate(sets):
-            lanes.setdefault(self.kernels.family.key(names, tested), []).append(lane)
-        if len(lanes) == 1:
-            return self.residuals(unit, *sets[0])
+    def residuals_of(self, unit: np.ndarray, sets: Sequence[Sequence[str]]) -> np.ndarray:
+        """As `residuals`, with a set of names for each of the coordinates."""
         residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
-        for mine in lanes.values():
-            residuals[mine] = self.residuals(unit[mine], *sets[mine[0]])
+        for mine in self._of_one_kernel([(names, "") for names in sets]):
+            residuals[mine] = self.residuals(unit[mine], sets[mine[0]])
         return residuals
+
+    def changes(self, unit: np.ndarray, points: np.ndarray, names: Sequence[str], beside: Sequence[str]) -> np.ndarray:
+        """What each of the points (n, D) changes (n, C, N) [pu] against coordinates (D,): one effect beside the names.
+
+        Both by the same kernel, so that what changes nothing is exactly 0; 0 where a simulation diverges, too.
+        """
+        changes = np.empty((len(points), self.drive.channels, self.drive.samples))
+        for mine in self._of_one_kernel([(names, other) for other in beside]):
+            both = self.residuals(np.concatenate([unit[None], points[mine]]), names, beside[mine[0]])
+            changes[mine] = finite(both[1:] - both[0])
+        return changes
+
+    def _of_one_kernel(self, sets: Sequence[tuple[Sequence[str], str]]) -> Iterable[list[int]]:
+        """Which of the sets share a kernel."""
+        lanes: dict[Key, list[int]] = {}
+        for lane, (names, beside) in enumerate(sets):
+            lanes.setdefault(self.kernels.family.key(names, beside), []).append(lane)
+        return lanes.values()
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
@@ -139,7 +158,7 @@ class Context:
 
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
         """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
-        raw = self.residuals_of(unit, [(names, False) for names in sets])
+        raw = self.residuals_of(unit, sets)
         white = self.whiten_many(noise, raw)
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]

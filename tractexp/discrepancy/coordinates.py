@@ -88,6 +88,11 @@ class Coordinates:
         free = [*self.base, *self.before, *self.parameters(effects)]
         return free + self.sizes(self.catalogue.of_measurement)
 
+    def present(self, unit: np.ndarray) -> tuple[str, ...]:
+        """The effects of the load that are not at their null at coordinates (D,)."""
+        off, of_load = unit != self.null, (*self.catalogue.of_load, *(m.name for m in self.catalogue.members))
+        return tuple(name for name in of_load if off[self.sizes([name])].any())
+
     def settings(self, effects: Sequence[str]) -> list[int]:
         """Columns of what the effects have beside their sizes, such as thresholds and times."""
         sizes = self.sizes(effects)

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.injection import perturbations
-from tractexp.discrepancy.linear import finite, two_sided
+from tractexp.discrepancy.injection import PUSHES, perturbations
+from tractexp.discrepancy.linear import two_sided
 from tractexp.discrepancy.linearization import resting
 from tractexp.domain.playback import relative_error
 from tractexp.identification.model_error import ModelError, model_error
@@ -119,8 +119,7 @@ def gap(
 def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
     points, _ = perturbations(context, unit)
-    raw = context.residuals_of(np.concatenate([unit[None], points]), [(names, True)] * (1 + len(points)))
-    return context.whiten(noise, finite(raw[1:] - raw[0]))
+    return context.whiten(noise, context.changes(unit, points, names, [PUSHES] * len(points)))
 
 
 def beyond_chance(

@@ -15,6 +15,7 @@ from tractexp.parameter import Parameter
 if TYPE_CHECKING:
     from tractexp.discrepancy.context import Context
 
+PUSHES = "injection"
 SOURCE = "a unit push, for the tangent space only"
 EDGE = 0.002  # s: how sharp a window starts and ends
 
@@ -26,7 +27,7 @@ class Injection(Effect):
     that which lags it by a quarter of a cycle: at that voltage, the same.
     """
 
-    name = "injection"
+    name = PUSHES
 
     def __repr__(self) -> str:
         return "Injection()"

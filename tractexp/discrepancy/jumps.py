@@ -30,7 +30,7 @@ def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
 @functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their context
 def _jumps(context: Context, key: bytes) -> np.ndarray:
     at, unit = context.coordinates, np.frombuffer(key)
-    there = tuple(n for n in context.catalogue.of_load if (unit != at.null)[at.sizes([n])].any())
+    there = at.present(unit)
     if not there:
         return np.empty((0, *context.drive.measured.shape))
     without = unit.copy()

@@ -1,7 +1,8 @@
 """Which kernel simulates which set of effects.
 
-A set is fitted by a kernel of its own, no larger than it needs. What it leaves is tested by one that has every other
-effect and the pushes beside it, for all sets of textbook effects the same. All give the same response up to rounding.
+A set is fitted by a kernel of its own, no larger than it needs. What it leaves is tested by kernels that have further
+effects beside it: one for all that are cheap, the same for all sets of them, one for the pushes, and one for each
+effect that makes every other dear. All give the same response up to rounding.
 """
 
 import functools
@@ -13,17 +14,18 @@ import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.cores import side_by_side
-from tractexp.discrepancy.injection import Injection
+from tractexp.discrepancy.injection import PUSHES, Injection
 from tractexp.domain import domain_of
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.problem import Problem
 from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
+from tractexp.model.parts import Effect
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-Key = tuple[frozenset[str], bool]  # load effects, and whether the other effects and the pushes are beside them
+Key = tuple[frozenset[str], frozenset[str]]  # load effects, and what is tested beside them
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,38 +35,44 @@ class Family:
     model: Model
     catalogue: Catalogue
 
-    def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
-        """The model with these load effects, every fault of the measurement and, where `pushed`, the pushes."""
-        effects = [self.catalogue[n].effect for n in sorted({*names, *self.catalogue.of_measurement})]
-        pushes = [Injection()] if pushed else []
+    def with_effects(self, names: Iterable[str]) -> Model:
+        """The model with these load effects, every fault of the measurement and, where they are named, the pushes."""
+        own = {*names, *self.catalogue.of_measurement}
+        effects = [self._effect(name) for name in sorted(own, key=lambda name: (name == PUSHES, name))]
         base = self.model
-        model = compose(base.motor, base.static, [*base.effects, *effects, *pushes], base.integration, base.domain)
+        model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain)
         return model.behind(base.recorder)
+
+    def _effect(self, name: str) -> Effect:
+        return Injection() if name == PUSHES else self.catalogue[name].effect
 
     @functools.cached_property
     def whole(self) -> Model:
-        """The model with every textbook effect and the pushes."""
-        return self.with_effects(self.catalogue.of_load, True)
+        """The model with every textbook effect and the pushes; too large to be simulated."""
+        return self.with_effects((*self.catalogue.of_load, PUSHES))
 
-    def key(self, names: Iterable[str], tested: bool = False) -> Key:
-        """The kernel that fits a set of names, or by which what it leaves is tested."""
-        load = frozenset(names) - set(self.catalogue.of_measurement)
-        return (load.difference(self.catalogue.of_load) if tested else load), tested
+    def key(self, names: Iterable[str], beside: str = "") -> Key:
+        """The kernel that fits a set of names, or that tells what one more effect, or the pushes, change beside it."""
+        load = frozenset(names) - {*self.catalogue.of_measurement}
+        tested = frozenset[str]()
+        if beside:
+            cheap = {name for name in self.catalogue.of_load if not self.catalogue[name].effect.iterates}
+            tested = frozenset(cheap if beside in cheap else (beside,))
+        return load - tested, tested
 
     def of(self, key: Key) -> Model:
         """The model of a kernel. An effect that a member of a family does not take beside it is not tested there."""
         names, tested = key
-        if not tested:
-            return self.with_effects(names)
-        model = self.with_effects({*names, *self.catalogue.of_load}, True)
+        model = self.with_effects(names | tested)
         try:
-            model.compile()
+            if tested:
+                model.compile()
         except Refused:
             beside = set(names)
-            for name in self.catalogue.of_load:
-                if self.with_effects(beside, True).acceptance(self.catalogue[name].effect).refusal is None:
+            for name in sorted(tested):
+                if self.with_effects(beside).acceptance(self._effect(name)).refusal is None:
                     beside.add(name)
-            return self.with_effects(beside, True)
+            return self.with_effects(beside)
         return model
 
 
@@ -82,31 +90,38 @@ class Kernels:
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps)
         self.substeps = max(int(self.bare.step.substeps.max()), self._fewest() if substeps is None else 1)
-        self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
+        self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)  # of all coordinates
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
         self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {}
         self._one_at_a_time = threading.Lock()
 
     def _fewest(self) -> int:
-        """Steps that the model of everything needs where every effect is at its null: some are stiff."""
-        domain = domain_of(self.family.model)
+        """Steps that the models need by which effects are tested, every effect at its null: some are stiff."""
+        domain, family = domain_of(self.family.model), self.family
         if not domain.stiff:
             return 1
-        whole = Problem(self.family.whole, self.events, self.bounds, self.fixed, 1)
-        null = [p.default if p.null is None else p.null for p in whole.parameters]
-        return int(whole.model.substeps(whole.drive, np.array(null), domain.finest)[0].max())
+        keys = {family.key((), name) for name in (*family.catalogue.of_load, PUSHES)}
+        return max(self._needed(self._problem(key, 1), domain.finest) for key in keys)
+
+    def _needed(self, problem: Problem, tolerance: float) -> int:
+        null = [p.default if p.null is None else p.null for p in problem.parameters]
+        return int(problem.model.substeps(problem.drive, np.array(null), tolerance)[0].max())
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""
         likelihood, columns = self._of(key)
         return likelihood.residuals(unit[:, columns])
 
+    def at(self, names: Iterable[str], unit: np.ndarray) -> tuple[Problem, np.ndarray]:
+        """The problem of a set of names, and its free values (..., d) at coordinates (..., D)."""
+        likelihood, columns = self._of(self.family.key(names))
+        return likelihood.problem, likelihood.values(unit[..., columns])
+
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
         """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
-        likelihood, columns = self._of(self.family.key(names))
-        problem = likelihood.problem
-        values = problem.full(likelihood.values(unit[:, columns]))
+        problem, free = self.at(names, unit)
+        values = problem.full(free)
 
         def simulated(part: np.ndarray) -> np.ndarray:
             response = problem.model.simulate(drive, part, self.substeps)
@@ -118,12 +133,15 @@ class Kernels:
         """The likelihood by one kernel, and where its coordinates stand among all."""
         with self._one_at_a_time:
             if key not in self._likelihoods:
-                model = self.family.of(key)
-                bounds = {n: v for n, v in self.bounds.items() if n in model.names}
-                fixed = {n: v for n, v in self.fixed.items() if n in model.names}
-                problem = Problem(model, self.events, bounds, fixed, self.substeps)
+                problem = self._problem(key, self.substeps)
                 unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
                 own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
                 columns = np.r_[own, len(self._column) + before].astype(int)
                 self._likelihoods[key] = Likelihood.of(problem, unweighted), columns
             return self._likelihoods[key]
+
+    def _problem(self, key: Key, substeps: int) -> Problem:
+        model = self.family.of(key)
+        bounds = {n: v for n, v in self.bounds.items() if n in model.names}
+        fixed = {n: v for n, v in self.fixed.items() if n in model.names}
+        return Problem(model, self.events, bounds, fixed, substeps)

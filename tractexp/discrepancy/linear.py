@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.context import Context, finite
 from tractexp.noise import Noise
 
 STEP = 1e-4  # of a coordinate's range
@@ -16,11 +16,6 @@ def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np
     points[0][at] = np.minimum(unit[at[1]] + STEP, 1.0)
     points[1][at] = np.maximum(unit[at[1]] - STEP, 0.0)
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
-
-
-def finite(changes: np.ndarray) -> np.ndarray:
-    """Changes of a residual; none where a simulation diverges: that tells nothing of what little would do."""
-    return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
 
 def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:

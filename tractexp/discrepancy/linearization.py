@@ -9,8 +9,8 @@ import numpy as np
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fit_effort import BOUND_MARGIN
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.injection import perturbations
-from tractexp.discrepancy.linear import finite, slopes, two_sided
+from tractexp.discrepancy.injection import PUSHES, perturbations
+from tractexp.discrepancy.linear import slopes, two_sided
 from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
@@ -73,14 +73,14 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     moved, width = two_sided(fit.unit, nuisances)
     points, spans, labels = _candidate_points(context, fit)
     injected, groups = perturbations(context, fit.unit)
-    k, m = len(nuisances), len(points)
-    sets = [(fit.names, False)] * (1 + 2 * k)
-    sets += [(fit.names, True)] * (m + len(injected))
-    raw = context.residuals_of(np.concatenate([fit.unit[None], moved, points, injected]), sets)
-    base = raw[0]
-    nuisance = slopes(raw[1 : 1 + 2 * k], width)
-    further = finite((raw[1 + 2 * k : 1 + 2 * k + m] - base) / spans[:, None, None])
-    perturbed = finite(raw[1 + 2 * k + m :] - base)
+    k = len(nuisances)
+    raw = context.residuals(np.concatenate([fit.unit[None], moved]), fit.names)
+    base, nuisance = raw[0], slopes(raw[1:], width)
+    beside = [candidate.name for candidate, _, first, last in labels for _ in range(first, last)]
+    changes = context.changes(
+        fit.unit, np.concatenate([points, injected]), fit.names, beside + [PUSHES] * len(injected)
+    )
+    further, perturbed = changes[: len(points)] / spans[:, None, None], changes[len(points) :]
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))

@@ -55,8 +55,9 @@ class QuietNoise:
             seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
         )  # fmt: skip
         errors = [shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None]
-        values, shapes = _values(context, unit), np.concatenate(errors) if errors else None
-        return context.domain.noise(residual, context.valid, problem.quiet, problem, values, walk, shapes)
+        shapes = np.concatenate(errors) if errors else None
+        there = context.kernels.at(context.coordinates.present(unit), unit)
+        return context.domain.noise(residual, context.valid, problem.quiet, *there, walk, shapes)
 
 
 def white(context: Context) -> Noise:
@@ -64,9 +65,3 @@ def white(context: Context) -> Noise:
     each = zip(*(e.levels for e in context.events), strict=True)
     levels = [float(np.sqrt(np.mean([level**2 for level in channel]))) for channel in each]
     return Noise(Noise.white(*levels).pairs, np.eye(len(levels)))
-
-
-def _values(context: Context, unit: np.ndarray) -> np.ndarray:
-    """Free values (d,) of the problem of everything at coordinates (D,)."""
-    space = context.problem.space
-    return space.from_unit(unit[: space.dimension])

@@ -136,7 +136,8 @@ class Effect(Part):
     ones; `relevant` is the smallest departure from it that matters. The others vanish there, and `grid` names the
     values of each at which to look for the effect. `reads` names the recorded channels without which it cannot be
     seen, `confused_with` the effects that look alike on ordinary dips. `places` and `kind` say where it acts and what
-    it does there, of `sites.PLACES` and `sites.KINDS`.
+    it does there, of `sites.PLACES` and `sites.KINDS`. One that `iterates` solves its equations anew at each stage of
+    a step, by parts that other effects have enlarged, which makes all of them dear: it is simulated beside few.
 
     A member of a family names the textbook effect as its `family`: the same kind of effect at another place, or at the
     same place by another law, tried beside a single textbook effect. `differs` ends the
@@ -154,6 +155,7 @@ class Effect(Part):
     confused_with: ClassVar[tuple[str, ...]] = ()
     places: ClassVar[tuple[str, ...]] = ()
     kind: ClassVar[str] = ""
+    iterates: ClassVar[bool] = False
     family: ClassVar[str] = ""
     differs: ClassVar[str] = ""
     as_textbook: ClassVar[Mapping[str, str]] = {}

@@ -25,14 +25,12 @@ Setting = Mapping[str, float]  # the parameters of a signal by their own names
 class Terms(Family):
     """A base model with the library: terms, named `kind:balance:signal[:clock]`, by the kernel of their kind."""
 
-    def with_effects(self, names: Iterable[str], pushed: bool = False) -> Model:
-        return super().with_effects({kind_of(n) for n in names}, pushed)
+    def with_effects(self, names: Iterable[str]) -> Model:
+        return super().with_effects({kind_of(n) for n in names})
 
-    def key(self, names: Iterable[str], tested: bool = False) -> Key:
-        return frozenset(kind_of(n) for n in set(names) - set(self.catalogue.of_measurement)), tested
-
-    def of(self, key: Key) -> Model:
-        return self.with_effects(*key)
+    def key(self, names: Iterable[str], beside: str = "") -> Key:
+        load = {*names, beside} - {"", *self.catalogue.of_measurement}
+        return frozenset(map(kind_of, load)), frozenset()
 
 
 def kind_of(name: str) -> str:
