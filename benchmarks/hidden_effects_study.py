@@ -202,7 +202,7 @@ def _compared(found, trial: cases.Trial) -> dict:
     if found.assessment is not None:
         other = found.assessment.context
         N = other.drive.samples
-        sets = [((), False), (found.names, False)]  # members of families have kernels of their own
+        sets = [(), found.names]  # members of families have kernels of their own
         got = other.residuals_of(np.array(found.assessment.units), sets) + other.drive.measured - clean[:, -N:]
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before

@@ -30,6 +30,7 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import from_other_valleys, without_needless
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.held_out import carried, judged_on, weighed
+from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.linearization import tangent
@@ -477,12 +478,25 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise
 
 
-def test_a_sets_own_kernel_gives_what_the_kernel_of_everything_gives(silent):
-    at = silent.context.coordinates
+@pytest.mark.parametrize("beside", ["stator_resistance", "feeder_impedance", PUSHES])
+def test_a_sets_own_kernel_gives_what_those_with_more_beside_it_give(beside):
+    made = bench(base(), events(), only=())
+    at = made.coordinates
     unit = at.null.copy()
     unit[at.sizes(["stator_resistance"])] = at.to_unit("R_s", 0.02)
-    own, whole = (silent.context.residuals(unit[None], ("stator_resistance",), tested) for tested in (False, True))
-    assert own == pytest.approx(whole, abs=1e-10)
+    own, wider = (made.residuals(unit[None], ("stator_resistance",), more) for more in ("", beside))
+    assert own == pytest.approx(wider, abs=1e-10)
+
+
+def test_what_changes_nothing_is_exactly_zero():
+    """Of two kernels the difference would be rounding, and a direction of its own once it is scaled to length one."""
+    made = bench(base(), events(), only=())
+    at = made.coordinates
+    unit, names = at.null.copy(), ("stator_resistance", "feeder_impedance", PUSHES)
+    unit[at.sizes(["stator_resistance"])] = at.to_unit("R_s", 0.02)
+    assert not made.changes(unit, np.array([unit] * 3), ("stator_resistance",), names).any()
+    moved = at.placed(unit, {"X_f": 0.02})
+    assert made.changes(unit, moved[None], ("stator_resistance",), ("feeder_impedance",)).any()
 
 
 def test_coordinates_that_act_on_different_rows_share_one_difference():
@@ -613,13 +627,14 @@ def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):
-    """The union of all candidates, every one at its null, gives the base model's residuals."""
-    made = bench(base(), events())
+    """All kernels by which they are tested, every one at its null, give the base model's residuals."""
+    made = bench(base(), events(), only=())
     alone, null = made.kernels.bare, made.coordinates.null
     values = alone.space.from_unit(null[made.coordinates.base])
     response = alone.model.simulate(alone.drive, alone.full(values), made.problem.step.substeps)
-    rows = made.residuals(null[None], (), tested=True)[0]
-    assert rows[0] == pytest.approx(response.P[0] - alone.drive.measured[0], abs=1e-10)
+    for beside in ("stator_resistance", "feeder_impedance", PUSHES):
+        rows = made.residuals(null[None], (), beside)[0]
+        assert rows[0] == pytest.approx(response.P[0] - alone.drive.measured[0], abs=1e-10)
 
 
 def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):

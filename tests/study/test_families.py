@@ -19,6 +19,7 @@ from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment, HeldOut, searched_again, weighed
+from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.kernels import Family
 from tractexp.discrepancy.linearization import tangent
@@ -57,7 +58,7 @@ def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
 class Narrow(Family):
     """A family in which effects `b` and `m` do not go together."""
 
-    def with_effects(self, names, pushed=False):
+    def with_effects(self, names):
         names = {*names}
         clashes = lambda more: {"b", "m"} <= {*names, *more}  # noqa: E731
 
@@ -65,20 +66,32 @@ class Narrow(Family):
             if clashes(()):
                 raise Refused("m", "the model has a state 'x' already")
 
-        def acceptance(name):
-            return SimpleNamespace(refusal="the model has a state 'x' already" if clashes([name]) else None)
+        def acceptance(effect):
+            return SimpleNamespace(refusal="the model has a state 'x' already" if clashes([effect.name]) else None)
 
-        return SimpleNamespace(names=names, pushed=pushed, compile=compiled, acceptance=acceptance)
+        return SimpleNamespace(names=names, compile=compiled, acceptance=acceptance)
+
+
+def narrow():
+    some = type("", (dict,), {"of_load": ("a", "b", "c", "i"), "of_measurement": ()})
+    effects = {n: SimpleNamespace(effect=SimpleNamespace(name=n, iterates=n == "i")) for n in "abcim"}
+    return Narrow(None, some(effects))
 
 
 def test_what_a_member_does_not_take_beside_it_is_not_tested_there():
-    some = type("", (dict,), {"of_load": ("a", "b", "c"), "of_measurement": ()})
-    here = Narrow(None, some({n: SimpleNamespace(effect=n) for n in "abcm"}))
+    here = narrow()
     for names, tested in (((), "abc"), (("a", "b"), "abc"), (("m",), "acm")):
-        model = here.of(here.key(names, tested=True))
-        assert (model.names, model.pushed) == ({*tested}, True)
-    fitted = here.of(here.key(("m", "a")))
-    assert (fitted.names, fitted.pushed) == ({"m", "a"}, False)
+        assert here.of(here.key(names, beside="c")).names == {*tested}
+    assert here.of(here.key(("m",), beside=PUSHES)).names == {"m", PUSHES}
+    assert here.of(here.key(("m", "a"))).names == {"m", "a"}
+
+
+def test_an_effect_that_iterates_and_the_pushes_are_simulated_by_themselves():
+    """One such effect beside all others made each of their columns thirty times as dear."""
+    here = narrow()
+    assert here.key(("a",), beside="i") == ({"a"}, {"i"})
+    assert here.key(("a", "i"), beside=PUSHES) == ({"a", "i"}, {PUSHES})
+    assert here.key(("a", "i"), beside="b") == ({"i"}, {"a", "b", "c"})  # the same for all sets of cheap effects
 
 
 def fit(deviance, parameters, *names):

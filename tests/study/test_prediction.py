@@ -19,9 +19,11 @@ from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
-from tractexp.discrepancy.prediction import PredictionError, Predictions, predictions
+from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError, Predictions, predictions
+from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.records import Records
+from tractexp.discrepancy.verdict import verdict
 from tractexp.identification.model_error import in_percent
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
@@ -117,6 +119,15 @@ def test_of_one_family_a_larger_member_must_be_ahead(error, name):
     assert chosen.names == (name,)
 
 
+@pytest.mark.parametrize(("error", "stays"), [(0.3, True), (0.2 / 1.45, True), (0.2 / 1.55, False)])
+def test_a_term_of_the_library_that_is_ahead_takes_a_name(error, stays):
+    """What has no name predicts better then. One that only imitates the name's effect does not."""
+    sets = {one.names: one for one in (off(error=1.0), off("a", error=0.2), off("b", error=0.9))}
+    found = ErrorPredictions(Catalogue(), sets, None, None, off("term", error=error))
+    assert [one.names for one in found.explaining(Criteria())] == [("a",)] * stays
+    assert [one.names for one in found.beaten(Criteria())] == [("a",)] * (not stays)
+
+
 def test_contributions_begin_with_the_member_that_helps_most():
     sets = [off(error=1.0), off("a", error=0.5), off("b", error=0.3), off("a", "b", error=0.1)]
     steps = Predictions(Catalogue(), {one.names: one for one in sets}).contributions(("a", "b"))
@@ -176,6 +187,18 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
     assert inexact.validate.closed > 1 - 1 / inexact.context.criteria.divides**2
     assert inexact.remainder
     assert "beside undervoltage_trip this is left" in inexact.headline
+
+
+def test_the_sentence_says_what_the_best_term_misses_and_takes_the_name_where_that_is_less(inexact):
+    made = inexact.held_out.predictions
+    words = f"the best term of the library, {term(made.term.names[0]).words}, misses"
+    assert f"{words} {in_percent(made.term.error)}" in inexact.verdict.reason
+    ahead = replace(made.term, squares=made.term.noise + 1e-3 * (made.sets["undervoltage_trip",].squares))
+    weighed = replace(inexact.held_out, predictions=replace(made, term=ahead))
+    weighed = replace(weighed, survivors=replace(weighed.survivors, retained=()))
+    reason = verdict(weighed, inexact.withheld).reason
+    assert "undervoltage_trip would be named, but misses" in reason
+    assert f"{words} {in_percent(ahead.error)}" in reason
 
 
 def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
@@ -259,8 +282,10 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert "undervoltage_trip" in shown
     assert "the base model" in shown
     assert "dc_link_lag" not in shown
+    assert "the best term of the library" in shown
+    assert term(made.term.names[0]).words in shown
     lost = {names: replace(one, squares=np.full_like(one.squares, np.inf)) for names, one in made.sets.items()}
-    assert "No set has a steady state on the held-out events" in page_of(replace(made, sets=lost))
+    assert "No set has a steady state on the held-out events" in page_of(replace(made, sets=lost, term=None))
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():
@@ -281,6 +306,8 @@ def test_the_files_say_what_is_left(investigation, tmp_path):
     assert left["share"] == pytest.approx(1 - gap["closed"])
     assert made["contributions"][0]["effects"] == []
     assert made["contributions"][-1]["effects"] == ["undervoltage_trip"]
+    assert left["best_term"]["model_error"] > gap["after"]["model_error"]["value"]
+    assert left["best_term"]["words"] in made["reason"]
     extended = (tmp_path / "run" / "conf" / "model" / "extended.yaml").read_text()
     assert "Something is missing still" in extended
     assert (tmp_path / "run" / "unexplained.csv").exists()

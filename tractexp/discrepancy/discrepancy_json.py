@@ -11,7 +11,9 @@ from tractexp.discrepancy.gap import Curves, closed
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
+from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.proposal import generate
+from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
@@ -123,10 +125,19 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
+        "best_term": _best_term(investigation),
         "of_names": [asdict(shape) for shape in investigation.remainder if investigation.names],
         "of_nearest": [asdict(shape) for shape in investigation.remainder if near],
         "of_base": [asdict(shape) for shape in investigation.remainder_of_base],
     }
+
+
+def _best_term(investigation: Findings) -> dict[str, Any] | None:
+    """The term of the library that predicts the held-out events best, where it was a rival of names."""
+    predicted = investigation.held_out.predictions
+    if not isinstance(predicted, ErrorPredictions) or predicted.term is None:
+        return None
+    return {"words": term(predicted.term.names[0]).words, "model_error": files.plain(predicted.term.error)}
 
 
 def _error(error: ModelError) -> dict[str, Any]:

@@ -38,7 +38,7 @@ class Family:
     def with_effects(self, names: Iterable[str]) -> Model:
         """The model with these load effects, every fault of the measurement and, where they are named, the pushes."""
         own = {*names, *self.catalogue.of_measurement}
-        effects = [self._effect(name) for name in sorted(own, key=lambda name: (name == PUSHES, name))]
+        effects = [self._effect(name) for name in own]
         base = self.model
         model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain)
         return model.behind(base.recorder)

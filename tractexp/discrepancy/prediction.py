@@ -6,7 +6,8 @@ set is named that
 
 - divides what the base model leaves of the held-out events (`criteria.divides`),
 - is ahead of every other set of its size or smaller, so that it needs each of its members (`criteria.ahead`),
-- and both by more than chance.
+- has no term of the library ahead of it,
+- and all by more than chance.
 
 Sets that it is not ahead of are tied with it where they are ahead of the base model. What is left has two measures.
 Where the disagreement is of the noise's size it is what pushes into the balances would still gain of the deviance, with
@@ -17,7 +18,7 @@ fitted by least squares (`least_squares`).
 import itertools
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -31,6 +32,7 @@ from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searc
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
+from tractexp.discrepancy.proposal.best_term import best_terms
 from tractexp.discrepancy.records import Records
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import block_sums, noise_variance
@@ -172,10 +174,20 @@ def _simplest(members: Sequence[OneSet], factor: float) -> OneSet:
 
 @dataclass(frozen=True, eq=False)
 class ErrorPredictions(Predictions[PredictionError]):
-    """Those by the model's error; `noise` is that under which they were fitted."""
+    """Those by the model's error; `noise` is that under which they were fitted. Where a set explains `term` is what
+    predicts best of the library of terms."""
 
     context: Context  # of the held-out events
     noise: Noise
+    term: PredictionError | None = None
+
+    def beaten(self, criteria: Criteria) -> list[PredictionError]:
+        """The sets that would explain, were the term not ahead of them."""
+        best = super().explaining(criteria)
+        return best if best and self.term is not None and self.term.ahead_of(best[0], criteria.ahead) else []
+
+    def explaining(self, criteria: Criteria) -> list[PredictionError]:
+        return [] if self.beaten(criteria) else super().explaining(criteria)
 
 
 def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredictions:
@@ -193,7 +205,12 @@ def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredic
     if missing := [s for s in subsets if s not in sets]:
         again = refit(context, noise, [(s, fits[best[0].names].unit) for s in missing], faults=())
         sets |= {f.names: _predicted(there, f) for f in again}
-    return ErrorPredictions(context.catalogue, sets, there, noise)
+    result = ErrorPredictions(context.catalogue, sets, there, noise)
+    if not result.explaining(context.criteria):
+        return result
+    of_terms, terms = best_terms(context, result.bare.fit, noise)
+    beside = of_terms.on(there.records)
+    return replace(result, term=min((_predicted(beside, fit) for fit in terms), key=_rank))
 
 
 def _fits(context: Context, explained: Explanations, noise: Noise) -> list[Refit]:

@@ -10,6 +10,7 @@ from tractexp.discrepancy.gap import Curves, closed, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions
+from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
 from tractexp.record import Event
@@ -169,6 +170,7 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
     worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
     worse += f" {in_percent(rest[0].error)}" if rest else ""
+    worse += f", and the best term of the library, {_term(predicted)}"
     spoken = alternatives([_spoken(names, weighed) for names in sets])
     if len(sets) > 1:
         sentence = (
@@ -211,6 +213,10 @@ def _too_far_off(weighed: HeldOut) -> str:
     if not rivals[0].fit.names:
         better = "predicts the held-out events better than the base model"
         return f"{_none(weighed)} {better}, which misses {bare} of the response there"
+    if beaten := predicted.beaten(criteria):
+        better = f"the best term of the library, {_term(predicted)}"
+        name, sure = joined(_spoken(beaten[0].names, weighed)), in_percent(beaten[0].error)
+        return f"{name} would be named, but misses {sure} of the response of the held-out events, and {better}"
     near = predicted.sets[rivals[0].fit.names]
     spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
@@ -219,6 +225,12 @@ def _too_far_off(weighed: HeldOut) -> str:
     none = f"{_none(weighed, len(near.names))} predicts the held-out events well enough to be named"
     misses = f"miss{'es' * (len(near.names) == 1)} {off} of the response there"
     return f"{none}: {spoken}, the nearest, {misses}, where the base model misses {bare}; {why}"
+
+
+def _term(predicted: ErrorPredictions) -> str:
+    """What the best term is, and how far it is off, as the end of a sentence."""
+    assert predicted.term is not None
+    return f"{term(predicted.term.names[0]).words}, misses {in_percent(predicted.term.error)}"
 
 
 def _none(weighed: HeldOut, most: int = 1) -> str:

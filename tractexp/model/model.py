@@ -191,7 +191,7 @@ class Model:
                 outputs[:, :, part] = averaged_power(outputs[:, :, part], drive.inputs[0, part], window)
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
-            outputs = effect.observe(outputs, drive, columns)
+            outputs = _observed(effect, outputs, drive, columns)
         return ModelResponse(outputs, miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
@@ -321,6 +321,17 @@ class Model:
             outputs,
         )
         return sums, miss
+
+
+def _observed(effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Outputs (C, n, N) as a recorder shows them: changed are those of candidates with an effect off its null."""
+    sizes = [columns[p.name] != p.null for p in effect.parameters if p.null is not None]
+    off = np.any(sizes, axis=(0, 1)) if sizes else np.ones(outputs.shape[1], dtype=bool)
+    if off.all():
+        return effect.observe(outputs, drive, columns)
+    if off.any():
+        outputs[:, off] = effect.observe(outputs[:, off], drive, {name: each[:, off] for name, each in columns.items()})
+    return outputs
 
 
 def compose(

@@ -10,6 +10,7 @@ from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
 from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
+from tractexp.discrepancy.proposal.library import term
 from tractexp.identification.model_error import in_percent
 from tractexp.wording import joined
 
@@ -21,8 +22,10 @@ BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the b
 def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -> None:
     """The model's error on the held-out events with each set, and by what it divides that of the base model."""
     criteria, bare = findings.context.criteria, predictions.bare
-    every = [one for one in sorted(predictions.sets.values(), key=lambda p: p.left) if np.isfinite(one.error)]
-    always = ((), *findings.verdict.sets)
+    best = [predictions.term] if predictions.term else []
+    every = sorted((*predictions.sets.values(), *best), key=lambda p: p.left)
+    every = [one for one in every if np.isfinite(one.error)]
+    always = ((), *findings.verdict.sets, *(one.names for one in best))
     rows = [one for k, one in enumerate(every) if k < MOST or one.names in always]
     page.heading("Candidates by what they predict")
     if not rows:
@@ -37,19 +40,27 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
         [
-            [_label(one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}", _status(findings, one),
-             "; ".join(map(str, _sizes(findings, one)))]
+            [_label(findings, one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}",
+             _status(findings, one), "; ".join(map(str, _sizes(findings, one)))]
             for one in rows
         ],
         f"A name divides the error of the base model by {criteria.divides:g} and is ahead of every other set of its"
-        f" size or smaller by {criteria.ahead:g}, both by more than chance (blocks of 0.1 s left out in turn)."
+        f" size or smaller by {criteria.ahead:g}, and no term of the library is ahead of it by that, all by more than"
+        " chance (blocks of 0.1 s left out in turn)."
         + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
         words=(0, 3, 4),
     )  # fmt: skip
 
 
-def _label(one: PredictionError) -> str:
+def _label(findings: Findings, one: PredictionError) -> str:
+    if _is_term(findings, one):
+        return term(one.names[0]).words
     return joined(one.names) or "the base model"
+
+
+def _is_term(findings: Findings, one: PredictionError) -> bool:
+    predictions = findings.held_out.predictions
+    return isinstance(predictions, ErrorPredictions) and one is predictions.term
 
 
 def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
@@ -60,7 +71,7 @@ def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
         for one in rows
     ]  # fmt: skip
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
-    chart.bars("", [_label(one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
+    chart.bars("", [_label(findings, one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
     for bare in (error for one, error in zip(rows, errors, strict=True) if not one.names):
         chart.edge(bare / findings.context.criteria.divides, dash="dash")
     return chart.limits(None, 0.0, ROOM * max(errors))
@@ -69,6 +80,8 @@ def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
 def _status(findings: Findings, one: PredictionError) -> str:
     if not one.names:
         return ""
+    if _is_term(findings, one):
+        return "the best term of the library"
     if one.names in findings.verdict.sets:
         return "added" if one.names == findings.names else "tied"
     return "not named"
@@ -76,5 +89,7 @@ def _status(findings: Findings, one: PredictionError) -> str:
 
 def _sizes(findings: Findings, one: PredictionError) -> list[ParameterEstimate]:
     """How large its effects are, with standard errors where they were reckoned."""
+    if _is_term(findings, one):
+        return []
     tests = next((r.tests for r in findings.survivors.rivals if r.fit.names == one.names), None)
     return effect_sizes(findings.context, one.fit, one.names, tests)
