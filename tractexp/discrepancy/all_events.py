@@ -87,7 +87,7 @@ class AllEvents:
         """Explanations fitted to all events from where they were, and what leaves something there from every setting,
         too."""
         joint = {t.fit.names: t for t in self.together(alone, seed)}
-        doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.stands]
+        doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.false_alarms]
         better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 

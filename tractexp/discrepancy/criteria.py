@@ -30,8 +30,8 @@ class Criteria:
     """The decision thresholds of an investigation; set single ones by `task.criteria.NAME=value`."""
 
     false_alarms: float = _criterion(
-        0.05, (0.001, 0.5), "probability of naming or doubting anything where nothing is missing", DERIVED,
-        "the usual level of a test; the user's to set",
+        0.05, (0.001, 0.5), "probability of naming or doubting anything where nothing is missing, and p that a doubted"
+        " explanation must leave in a fit to all events", DERIVED, "the usual level of a test; the user's to set",
     )  # fmt: skip
     naming_share: float = _criterion(
         0.4, (0.0, 1.0), "part of the false alarms that chance's draws may give to naming", CHOSEN,
@@ -64,7 +64,8 @@ class Criteria:
         "no formula is exact to this",
     )  # fmt: skip
     shown: float = _criterion(
-        10.8, (0.0, 1e6), "expected gain of the deviance from which held-out events can deny an explanation", DERIVED,
+        10.8, (0.0, 1e6), "expected gain of the deviance from which held-out events can deny an explanation, and gain"
+        " that a recorder's window must have", DERIVED,
         "(2 x 1.645)^2: a true explanation then fails to gain anything in 5 % of cases",
     )  # fmt: skip
     divides: float = _criterion(
@@ -74,20 +75,12 @@ class Criteria:
     )  # fmt: skip
     ahead: float = _criterion(
         1.5, (1.0, 1e6), "factor by which the error of a set that leaves more than noise must be below that of every"
-        " other set of its size or smaller", CHOSEN,
+        " other set of its size or smaller, and that of the base model with a proposed term below its own", CHOSEN,
         "a right effect by a wrong formula is no farther from a wrong effect than that, and tied with it",
-    )  # fmt: skip
-    stands: float = _criterion(
-        0.05, (0.0, 1.0), "p that a doubted explanation must leave in a fit to all events", CHOSEN,
-        "every second wrong name lies below, one true one in twenty",
     )  # fmt: skip
     quieter: float = _criterion(
         3.0, (0.0, 1e6), "deviance by which all events may speak less for an explanation than the fitted ones", CHOSEN,
         "what held-out events that do not show an effect cost by chance",
-    )  # fmt: skip
-    window_least: float = _criterion(
-        10.0, (0.0, 1e6), "deviance that a recorder's window must explain", CHOSEN,
-        "chance explains that with p = 0.002 by one parameter",
     )  # fmt: skip
     window_behind: float = _criterion(
         5.0, (0.0, 1e6), "deviance by which the best effect may explain more than the window does", CHOSEN,
@@ -133,10 +126,6 @@ class Criteria:
         0.8, (0.0, 1.0), "power at the smallest relevant size below which an effect is called not testable", DERIVED,
         "the usual power of a planned test (Saris, Satorra and van der Veld 2009)",
     )  # fmt: skip
-    proposal_closed: float = _criterion(
-        0.6, (0.0, 1.0), "share of the explainable gap on held-out events that a proposed term must close", CHOSEN,
-        "wrong terms on nulls made held-out events worse, right ones closed three quarters and more (prototype)",
-    )  # fmt: skip
     proposal_left: float = _criterion(
         1.7, (1.0, 1e6), "variance over the noise's that a proposed term may leave on any role's events", CHOSEN,
         "right terms left 0.9 to 1.5, a wrong one that closed nine tenths left 3.3 (prototype)",
@@ -176,7 +165,7 @@ class Criteria:
     def least_window(self, best: float) -> float:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
         near = min(best - self.window_behind, self.window_clear)
-        return max(self.window_least, near, self.window_share * best)
+        return max(self.shown, near, self.window_share * best)
 
     def promises(self, drop: float, explained: float) -> bool:
         """Whether an effect that would lower the deviance so far is looked for beside a name that explains so much."""

@@ -38,7 +38,7 @@ class Assessment:
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
         criteria = self.context.criteria
-        least = criteria.stands if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
+        least = criteria.false_alarms if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
         return self.gap.helps and self.p_left >= least and not self.behind
 
     @property
@@ -173,7 +173,7 @@ def weighed(
     again = [
         fitted.fit for names, fitted in joint.items()
         if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria, doubted)
-        and (not helping or fitted.p_left >= criteria.stands)
+        and (not helping or fitted.p_left >= criteria.false_alarms)
     ]  # fmt: skip
     return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
 
@@ -199,7 +199,7 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     tried = both.carried_back([s.fit for s in of_all.values()], seed)
     criteria, fits = context.criteria, list[tuple[Refit, Refit]]()
     for alone, fitted in tried:  # several effects, chosen among hundreds of sets, must leave nothing
-        least = criteria.stands if len(fitted.fit.names) > 1 else criteria.adequate_p
+        least = criteria.false_alarms if len(fitted.fit.names) > 1 else criteria.adequate_p
         if fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least:
             fits.append((alone, fitted.fit))
     if not fits:
