@@ -638,6 +638,18 @@ def test_measurement_effects_see_each_event_by_itself():
         assert np.array_equal(together.P[:, -alone.P.shape[1] :], alone.P)
 
 
+def test_a_measurement_is_asked_only_for_candidates_off_their_null():
+    """Beside them those at their null are the base model's to the last bit, and each is as it is alone."""
+    for name in ("time_skew", "measurement_window", "load_drift"):
+        rows, drive = np.array([values(name, halfway), values(name), values(name, halfway)]), Drive.of([dip()])
+        together, base = (model(*names).simulate(drive, some) for names, some in (((name,), rows), ((), TRUTH)))
+        assert np.array_equal(together.outputs[:, 1], base.outputs[:, 0]), name
+        alone = model(name).simulate(drive, rows[0]).outputs[:, 0]
+        assert np.array_equal(together.outputs[:, 0], alone), name
+        assert np.array_equal(together.outputs[:, 2], alone), name
+        assert np.abs(alone - base.outputs[:, 0]).max() > 1e-4, name
+
+
 # members of families
 
 
