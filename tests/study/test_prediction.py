@@ -191,7 +191,7 @@ def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(
 
 def test_the_sentence_says_what_the_best_term_misses_and_takes_the_name_where_that_is_less(inexact):
     made = inexact.held_out.predictions
-    words = f"the best term of the library, {term(made.term.names[0]).words}, misses"
+    words = f"the best term of the library ({term(made.term.names[0]).words})"
     assert f"{words} {in_percent(made.term.error)}" in inexact.verdict.reason
     ahead = replace(made.term, squares=made.term.noise + 1e-3 * (made.sets["undervoltage_trip",].squares))
     weighed = replace(inexact.held_out, predictions=replace(made, term=ahead))

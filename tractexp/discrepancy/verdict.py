@@ -167,10 +167,11 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     ranked = predicted.ranked(size, predicted.context.criteria.ahead)
     rest = [p for p in ranked if p.names not in sets and p.left > chosen[0].left]  # what leaves less does so by chance
     off = listed([p.error for p in chosen], in_percent)
-    following = f", the next best of {len(rest)} other sets, {joined(_spoken(rest[0].names, weighed))}," if rest else ""
-    worse = f"the base model misses {in_percent(predicted.bare.error)} of it{' and' * bool(rest)}{following}"
-    worse += f" {in_percent(rest[0].error)}" if rest else ""
-    worse += f", and the best term of the library, {_term(predicted)}"
+    worse = [f"the base model misses {in_percent(predicted.bare.error)}"]
+    if rest:
+        following = joined(_spoken(rest[0].names, weighed))
+        worse.append(f"the next best of {len(rest)} other sets ({following}) {in_percent(rest[0].error)}")
+    worse.append(_term(predicted))
     spoken = alternatives([_spoken(names, weighed) for names in sets])
     if len(sets) > 1:
         sentence = (
@@ -178,7 +179,7 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         )
     else:
         sentence = f"{spoken} predict{'s' * (size == 1)} the held-out events within {off} of the response"
-    return f"{sentence}, where {worse}; {CHOSEN_BY}"
+    return f"{sentence}, where {joined(worse)}; {CHOSEN_BY}"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:
@@ -214,9 +215,8 @@ def _too_far_off(weighed: HeldOut) -> str:
         better = "predicts the held-out events better than the base model"
         return f"{_none(weighed)} {better}, which misses {bare} of the response there"
     if beaten := predicted.beaten(criteria):
-        better = f"the best term of the library, {_term(predicted)}"
-        name, sure = joined(_spoken(beaten[0].names, weighed)), in_percent(beaten[0].error)
-        return f"{name} would be named, but misses {sure} of the response of the held-out events, and {better}"
+        name, off = joined(_spoken(beaten[0].names, weighed)), in_percent(beaten[0].error)
+        return f"{name} would be named, but misses {off} of the response of the held-out events, and {_term(predicted)}"
     near = predicted.sets[rivals[0].fit.names]
     spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
@@ -230,7 +230,8 @@ def _too_far_off(weighed: HeldOut) -> str:
 def _term(predicted: ErrorPredictions) -> str:
     """What the best term is, and how far it is off, as the end of a sentence."""
     assert predicted.term is not None
-    return f"{term(predicted.term.names[0]).words}, misses {in_percent(predicted.term.error)}"
+    words, off = term(predicted.term.names[0]).words, in_percent(predicted.term.error)
+    return f"the best term of the library ({words}) {off}"
 
 
 def _none(weighed: HeldOut, most: int = 1) -> str:
