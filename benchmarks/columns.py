@@ -24,6 +24,11 @@ SAMPLES, STEP, SUBSTEPS, LANES, RUNS = 1000, 2e-3, 2, 224, 3
 DEPTHS = (0.3, 0.5, 0.6)
 
 
+def base() -> Model:
+    """The model that effects are tested beside."""
+    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+
+
 def drive_of(depths: tuple[float, ...]) -> Drive:
     """Dips of a quarter of a second."""
     t, flat = np.arange(SAMPLES) * STEP, np.ones(SAMPLES)
@@ -33,13 +38,10 @@ def drive_of(depths: tuple[float, ...]) -> Drive:
 
 def tested() -> Catalogue:
     """What an investigation of such dips tests."""
-    base, drive = (
-        compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")()),
-        drive_of((0.5,)),
-    )
-    P, Q = base.simulate(drive, np.array([p.default for p in base.parameters]), 8).outputs[:, 0]
+    load, drive = base(), drive_of((0.5,))
+    P, Q = load.simulate(drive, np.array([p.default for p in load.parameters]), 8).outputs[:, 0]
     record = Record("dip", t=np.arange(SAMPLES) * STEP, U=drive.inputs[0], P=P, Q=Q, source="made").check()
-    return catalogue(base, [detect(record)])
+    return catalogue(load, [detect(record)])
 
 
 def cost(model: Model, drive: Drive) -> float:
@@ -54,9 +56,8 @@ def cost(model: Model, drive: Drive) -> float:
 
 
 def main() -> None:
-    base = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    family, drive = Family(base, tested()), drive_of(DEPTHS)
-    kernels = {"the base model": base, "everything": family.whole}
+    family, drive = Family(base(), tested()), drive_of(DEPTHS)
+    kernels = {"the base model": family.model, "everything": family.whole}
     for name in (*family.catalogue.of_load, PUSHES):
         _, beside = family.key((), name)
         kernels.setdefault("effects that are cheap" if len(beside) > 1 else name, family.of(family.key((), name)))

@@ -13,7 +13,6 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
@@ -137,7 +136,7 @@ def _best_term(investigation: Findings) -> dict[str, Any] | None:
     predicted = investigation.held_out.predictions
     if not isinstance(predicted, ErrorPredictions) or predicted.term is None:
         return None
-    return {"words": term(predicted.term.names[0]).words, "model_error": files.plain(predicted.term.error)}
+    return {"words": predicted.term.words, "model_error": files.plain(predicted.term.error)}
 
 
 def _error(error: ModelError) -> dict[str, Any]:

@@ -37,8 +37,7 @@ class Family:
 
     def with_effects(self, names: Iterable[str]) -> Model:
         """The model with these load effects, every fault of the measurement and, where they are named, the pushes."""
-        own = {*names, *self.catalogue.of_measurement}
-        effects = [self._effect(name) for name in own]
+        effects = [self._effect(name) for name in {*names, *self.catalogue.of_measurement}]
         base = self.model
         model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain)
         return model.behind(base.recorder)
@@ -51,13 +50,17 @@ class Family:
         """The model with every textbook effect and the pushes; too large to be simulated."""
         return self.with_effects((*self.catalogue.of_load, PUSHES))
 
+    @functools.cached_property
+    def cheap(self) -> frozenset[str]:
+        """The textbook effects of the load that one kernel may have side by side."""
+        return frozenset(name for name in self.catalogue.of_load if not self.catalogue[name].effect.iterates)
+
     def key(self, names: Iterable[str], beside: str = "") -> Key:
         """The kernel that fits a set of names, or that tells what one more effect, or the pushes, change beside it."""
         load = frozenset(names) - {*self.catalogue.of_measurement}
         tested = frozenset[str]()
         if beside:
-            cheap = {name for name in self.catalogue.of_load if not self.catalogue[name].effect.iterates}
-            tested = frozenset(cheap if beside in cheap else (beside,))
+            tested = self.cheap if beside in self.cheap else frozenset((beside,))
         return load - tested, tested
 
     def of(self, key: Key) -> Model:
@@ -102,11 +105,11 @@ class Kernels:
         if not domain.stiff:
             return 1
         keys = {family.key((), name) for name in (*family.catalogue.of_load, PUSHES)}
-        return max(self._needed(self._problem(key, 1), domain.finest) for key in keys)
-
-    def _needed(self, problem: Problem, tolerance: float) -> int:
-        null = [p.default if p.null is None else p.null for p in problem.parameters]
-        return int(problem.model.substeps(problem.drive, np.array(null), tolerance)[0].max())
+        most = 1
+        for problem in (self._problem(key, 1) for key in keys):
+            null = np.array([p.default if p.null is None else p.null for p in problem.parameters])
+            most = max(most, int(problem.model.substeps(problem.drive, null, domain.finest)[0].max()))
+        return most
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""

@@ -33,6 +33,7 @@ from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
+from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.records import Records
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import block_sums, noise_variance
@@ -104,7 +105,17 @@ class PredictionError(Prediction):
         return float(np.log(others / total)) > CLEAR * error
 
 
+@dataclass(frozen=True, eq=False)
+class PredictedTerm(PredictionError):
+    """A term of the library in place of a set: its coordinates are those of a context of terms."""
+
+    @property
+    def words(self) -> str:
+        return term(self.names[0]).words
+
+
 OneSet = TypeVar("OneSet", bound=Prediction)
+OneError = TypeVar("OneError", bound=PredictionError)
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +190,7 @@ class ErrorPredictions(Predictions[PredictionError]):
 
     context: Context  # of the held-out events
     noise: Noise
-    term: PredictionError | None = None
+    term: PredictedTerm | None = None
 
     def beaten(self, criteria: Criteria) -> list[PredictionError]:
         """The sets that would explain, were the term not ahead of them."""
@@ -210,7 +221,7 @@ def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredic
         return result
     of_terms, terms = best_terms(context, result.bare.fit, noise)
     beside = of_terms.on(there.records)
-    return replace(result, term=min((_predicted(beside, fit) for fit in terms), key=_rank))
+    return replace(result, term=min((_predicted(beside, fit, PredictedTerm) for fit in terms), key=_rank))
 
 
 def _fits(context: Context, explained: Explanations, noise: Noise) -> list[Refit]:
@@ -243,7 +254,7 @@ def _fits(context: Context, explained: Explanations, noise: Noise) -> list[Refit
     return refit(context, noise, [(f.names, at.without_faults(f.unit, ())) for f in refits.values()], faults=())
 
 
-def _predicted(there: Context, fit: Refit) -> PredictionError:
+def _predicted(there: Context, fit: Refit, kind: type[OneError] = PredictionError) -> OneError:
     """A fit on other events."""
     unit = there.coordinates.at_measured_power(fit.unit)
     calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
@@ -255,4 +266,4 @@ def _predicted(there: Context, fit: Refit) -> PredictionError:
         left.append(sums[:, 0] + own)
         noise.append(np.full(len(sums), own))
         response.append(sums[:, 1])
-    return PredictionError(fit, unit, np.concatenate(left), np.concatenate(noise), np.concatenate(response))
+    return kind(fit, unit, np.concatenate(left), np.concatenate(noise), np.concatenate(response))

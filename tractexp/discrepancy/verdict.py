@@ -10,7 +10,6 @@ from tractexp.discrepancy.gap import Curves, closed, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions
-from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
 from tractexp.record import Event
@@ -230,8 +229,7 @@ def _too_far_off(weighed: HeldOut) -> str:
 def _term(predicted: ErrorPredictions) -> str:
     """What the best term is, and how far it is off, as the end of a sentence."""
     assert predicted.term is not None
-    words, off = term(predicted.term.names[0]).words, in_percent(predicted.term.error)
-    return f"the best term of the library ({words}) {off}"
+    return f"the best term of the library ({predicted.term.words}) {in_percent(predicted.term.error)}"
 
 
 def _none(weighed: HeldOut, most: int = 1) -> str:

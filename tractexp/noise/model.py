@@ -6,6 +6,7 @@ the voltage's noise, which enters the model and leaves it in P and Q at once.
 
 import functools
 import itertools
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
@@ -89,7 +90,7 @@ class Noise:
                 white = self._fast(mixed[:, :, part], valid[:, part], e)
                 events.append(self._without_shapes(white, valid[:, part], part, e))
         rows = events[0] if len(events) == 1 else np.concatenate(events, axis=2)
-        return rows.reshape(len(rows), -1)
+        return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
 
     def prepare(self, drive: Drive, valid: np.ndarray) -> None:
         """Make ready what `whiten` keeps of the shapes, once, where many threads are about to call it."""
@@ -191,7 +192,7 @@ class Noise:
         if (shrinkage := self._shrinkage(valid, part, event)) is None:
             return white
         basis, share = shrinkage
-        flat = white.reshape(len(white), -1)
+        flat = white.reshape(len(white), math.prod(white.shape[1:]))
         return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
 
     def _shrinkage(self, valid: np.ndarray, part: slice, event: int) -> Shrunk | None:

@@ -9,8 +9,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
-from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
-from tractexp.discrepancy.proposal.library import term
+from tractexp.discrepancy.prediction import ErrorPredictions, PredictedTerm, PredictionError
 from tractexp.identification.model_error import in_percent
 from tractexp.wording import joined
 
@@ -40,7 +39,7 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
         [
-            [_label(findings, one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}",
+            [_label(one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}",
              _status(findings, one), "; ".join(map(str, _sizes(findings, one)))]
             for one in rows
         ],
@@ -52,15 +51,10 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     )  # fmt: skip
 
 
-def _label(findings: Findings, one: PredictionError) -> str:
-    if _is_term(findings, one):
-        return term(one.names[0]).words
+def _label(one: PredictionError) -> str:
+    if isinstance(one, PredictedTerm):
+        return one.words
     return joined(one.names) or "the base model"
-
-
-def _is_term(findings: Findings, one: PredictionError) -> bool:
-    predictions = findings.held_out.predictions
-    return isinstance(predictions, ErrorPredictions) and one is predictions.term
 
 
 def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
@@ -71,7 +65,7 @@ def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
         for one in rows
     ]  # fmt: skip
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
-    chart.bars("", [_label(findings, one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
+    chart.bars("", [_label(one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
     for bare in (error for one, error in zip(rows, errors, strict=True) if not one.names):
         chart.edge(bare / findings.context.criteria.divides, dash="dash")
     return chart.limits(None, 0.0, ROOM * max(errors))
@@ -80,7 +74,7 @@ def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
 def _status(findings: Findings, one: PredictionError) -> str:
     if not one.names:
         return ""
-    if _is_term(findings, one):
+    if isinstance(one, PredictedTerm):
         return "the best term of the library"
     if one.names in findings.verdict.sets:
         return "added" if one.names == findings.names else "tied"
@@ -89,7 +83,7 @@ def _status(findings: Findings, one: PredictionError) -> str:
 
 def _sizes(findings: Findings, one: PredictionError) -> list[ParameterEstimate]:
     """How large its effects are, with standard errors where they were reckoned."""
-    if _is_term(findings, one):
+    if isinstance(one, PredictedTerm):
         return []
     tests = next((r.tests for r in findings.survivors.rivals if r.fit.names == one.names), None)
     return effect_sizes(findings.context, one.fit, one.names, tests)

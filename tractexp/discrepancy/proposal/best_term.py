@@ -2,30 +2,25 @@
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
-from tractexp.discrepancy.proposal.refit import fitted
-from tractexp.discrepancy.proposal.screen import Ground, Screened, scores
+from tractexp.discrepancy.proposal.refit import JUDGED, fitted
+from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.noise import Noise
-
-JUDGED = 5  # terms that are carried over to held-out events, the best of the fitted ones
 
 
 def best_terms(context: Context, bare: Refit, noise: Noise) -> tuple[Context, Sequence[Refit]]:
     """The terms that explain most beside the base model's fit `bare` under `noise`, and the context of their fits.
 
-    As the sets they are rivals of they are fitted without P0, Q0 and faults of the measurement, which are free while
-    they are looked for.
+    As the sets they are rivals of they take P0 and Q0 as measured, and are fitted without faults of the measurement,
+    which are free while they are looked for.
     """
     context.effort.say("looking for a term of the library that predicts better")
     under = context_of_terms(context).with_measured_power
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
-    scored = scores(ground, [(term, setting) for term in terms() for setting in term.signal.settings])
-    result = fitted(Screened(ground, sorted(scored, key=lambda one: -one.drop), np.zeros(0)), [])
+    result = fitted(screen(ground, terms(), seed=0, draws=0), [])
     there, at = result.context, result.context.coordinates
     chosen = [(fit.names, at.without_faults(fit.unit, ())) for fit in result.fits[:JUDGED]]
     return there, refit(there, noise, chosen, faults=())

@@ -16,12 +16,10 @@ from tractexp.discrepancy.fitting import Refit, distances
 from tractexp.discrepancy.gap import Curves, beyond_chance, curves, pushed
 from tractexp.discrepancy.held_out import carried
 from tractexp.discrepancy.proposal.bed import carried_over
-from tractexp.discrepancy.proposal.refit import Fitted
+from tractexp.discrepancy.proposal.refit import JUDGED, Fitted
 from tractexp.discrepancy.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
-
-JUDGED = 5  # terms that held-out events are asked about
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,6 +24,7 @@ ALIKE = 4  # of one signal and clock at most, so that others are tried, too
 ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the distance to the grid's neighbors
 CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
 EXACT = 6  # of them at most
+JUDGED = 5  # of the best, that held-out events are asked about
 PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
 ROUND_ABOUT = 1  # how often the best term is begun anew around its fit
 REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
