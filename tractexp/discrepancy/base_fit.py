@@ -9,7 +9,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.local_minima import distinct, explored
+from tractexp.identification.local_minima import valleys
 from tractexp.noise import Noise
 
 ROUNDS = 2  # of noise and fit in turn
@@ -40,7 +40,7 @@ def base_fit(context: Context) -> BaseFit:
 
 def minima_of(context: Context, bare: Likelihood) -> list[np.ndarray]:
     """Coordinates (D,) of the best fits of the base model alone by this likelihood, from all over its box."""
-    at, ends = context.coordinates, distinct(explored(bare), bare.free)
+    at, ends = context.coordinates, valleys(bare)
     minima = np.tile(at.null, (len(ends), 1))
     minima[:, [*at.base, *at.before]] = ends
     return list(minima)

@@ -39,6 +39,14 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
     return ends.unit[best_distinct(ends.unit[:, :free], ends.deviance, DISTINCT, MOST, norm=2)]
 
 
+def valleys(likelihood: Likelihood) -> np.ndarray:
+    """Coordinates (at most 4, D) of distinct best fits from all over the box and beside the best, the best first."""
+    ends = explored(likelihood)
+    beside = likelihood.descent(along_least_certain(likelihood, ends.unit[ends.deviance.argmin()]))
+    unit, deviance = np.concatenate([ends.unit, beside.unit]), np.concatenate([ends.deviance, beside.deviance])
+    return distinct(Descent(unit, deviance, 0), likelihood.free)
+
+
 def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Points (6, D) on either side of an optimum (D,), in the direction that the records know least.
 
