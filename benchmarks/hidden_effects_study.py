@@ -43,7 +43,11 @@ PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
 FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
 NEWEST = HERE / "judgement.jsonl"  # the judgement set
-KNOWN = {"rotor_skin_effect": "second_cage", "stator_transients": "stator_transients"}  # the catalogue has them, too
+KNOWN = {  # strangers that the catalogue has, too
+    "rotor_skin_effect": "second_cage",
+    "stator_transients": "stator_transients",
+    "load_step": "load_change",
+}
 HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
     "single": ("", cases.MULTIPLES, (*CATALOG, *KNOWN)),
     "laws": ("law ", (4.0,), FAMILY),

@@ -32,7 +32,7 @@ SUBSTEPS = {PHASORS: (2, 3), WAVES: (4, 2)}
 PAIRS = (
     ("speed_dependent_torque", "magnetic_saturation"), ("undervoltage_trip", "second_motor_group"),
     ("feeder_impedance", "second_motor_group"), ("stator_resistance", "exponential_recovery"),
-    ("time_skew", "undervoltage_trip"), ("measurement_window", "load_drift"),
+    ("time_skew", "undervoltage_trip"), ("measurement_window", "load_change"),
 )  # fmt: skip
 SEVEN = (
     "exponential_recovery", "feeder_impedance", "magnetic_saturation", "second_motor_group", "shunt_capacitor",

@@ -4,9 +4,8 @@
 
 Small effects of `hidden_effects` in two mild dips, of which an investigation leaves several. The event it recommends is
 simulated by the same generator, which shares nothing with the product, and added to the others; the investigation is
-made again. Where no event is likely to decide by the product's own rule, the event recommended with formulas taken as
-exact is simulated instead, and the investigation is made again with `alike` = 0, as its sentence says. Only plain dips
-and switching are recommended here: the generator has no phase jump. Seeds begin at 931000 and are used nowhere else.
+made again. Only plain dips and switching are recommended here: the generator has no phase jump. Seeds begin at 931000
+and are used nowhere else.
 """
 
 import argparse
@@ -28,10 +27,9 @@ from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.next_event import choose
-from tractexp.discrepancy.next_event.choose import HOPELESS, NextEvent
+from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagined
 from tractexp.domain import PHASORS
 from tractexp.model.model import compose
@@ -65,18 +63,16 @@ def plain(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     return [event for event in imagined(bench, reads) if not event.burden[0]]
 
 
-def with_event(made: Scene, chosen: NextEvent, by_noise: bool) -> Scene:
+def with_event(made: Scene, chosen: NextEvent) -> Scene:
     """The scene with the recommended event at the end."""
-    tried = chosen.by_noise if by_noise else chosen.best
-    assert tried is not None
-    event = tried.event
+    event = chosen.best.event
     dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
     return replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
 
 
-def investigated(events: list[Event], **criteria: float) -> Findings:
+def investigated(events: list[Event]) -> Findings:
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    return investigate(model, events, (), {}, {}, only=AMONG, criteria=Criteria.of(criteria))
+    return investigate(model, events, (), {}, {}, only=AMONG)
 
 
 def row(seed: int) -> dict | None:
@@ -87,24 +83,20 @@ def row(seed: int) -> dict | None:
     told = {"seed": seed, "effect": name, "size": size, "verdict": found.verdict.word, "sets": names}
     if found.verdict.word != "tied":
         return told
-    by_noise = chosen.best.chances.least < HOPELESS and chosen.by_noise is not None
-    tried = chosen.by_noise if by_noise else chosen.best
-    chances = tried.exact if by_noise else tried.chances
+    chances = chosen.best.chances
     told |= {
-        "rule": "alike=0" if by_noise else "default",
-        "event": tried.event.words,
+        "event": chosen.best.event.words,
         "predicted_least": chances.least,
         "predicted": float(chances.alone[names.index([name])]) if [name] in names else None,
-        "by_default_rule": chosen.probability,
         "indistinguishable": len(chosen.same),
         "no_event": len(chosen.hopeless),
     }
-    more = with_event(made, chosen, by_noise)
+    more = with_event(made, chosen)
     try:
         again = recorded(more, seed)
     except (ValueError, ArithmeticError) as error:  # a motor that stalls
         return told | {"after": None, "why": str(error)}
-    after = investigated(again, **({"alike": 0.0} if by_noise else {}))
+    after = investigated(again)
     return told | {"after": after.verdict.word, "sets_after": [list(names) for names in after.verdict.sets]}
 
 
@@ -120,12 +112,8 @@ def table(rows: Sequence[dict]) -> str:
             mean = sum(r["predicted"] for r in own) / len(own)
             seen = sum(r in right for r in own)
             lines.append(f"| {low:.0%} to {min(high, 1.0):.0%} | {len(own)} | {mean:.0%} | {seen} |")
-    by_rule = [r for r in ties if r["rule"] == "default"]
-    ended = sum(r in gone for r in by_rule)
-    told = (
-        f"{len(rows)} data sets, {len(ties)} ties; {len(gone)} ended with one event, {len(right)} of them with the"
-        f" truth. By the product's own rule an event was recommended for {len(by_rule)}, and ended {ended} of them."
-    )
+    ended = f"{len(gone)} ended with one event, {len(right)} of them with the truth"
+    told = f"{len(rows)} data sets, {len(ties)} ties; {ended}."
     return "\n".join(lines) + "\n\n" + textwrap.fill(told, 120)
 
 

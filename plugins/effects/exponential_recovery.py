@@ -26,7 +26,7 @@ class ExponentialRecovery(Effect):
     places, kind = ("static P", "static Q"), "lag"
     grid = {"recovery_time": (0.1, 0.3, 1.0, 3.0, 10.0)}
     relevant = {"recovery_P": 0.2, "recovery_Q": 0.2}
-    confused_with = ("undervoltage_trip", "load_drift", "second_motor_group")
+    confused_with = ("undervoltage_trip", "load_change", "second_motor_group")
 
     def edit(self, eq, recovery_P, recovery_Q, recovery_time):
         u = eq[sites.static_voltage]

@@ -27,7 +27,7 @@ class FrequencyDependence(Effect):
         "the frame of waveforms turns at the frequency before the event, and what changes it is in the voltage"
     )
     relevant = {"k_pf": 1.0, "k_qf": 1.0}
-    confused_with = ("load_drift",)
+    confused_with = ("load_change",)
 
     def refusal(self, eq):
         return "its static load depends on the frequency already" if "static_frequency" in eq else None

@@ -8,7 +8,7 @@ SOURCE = "ordinary change of load; rates of feeders and trains stay below some p
 
 
 @plugin
-class LoadDrift(Measurement):
+class LoadChange(Measurement):
     """The load changes by itself while the event is recorded, for trains accelerate and others come and go.
 
         P -> P (1 + d_P t),   Q -> Q (1 + d_Q t),   t since the first sample of the event

@@ -30,10 +30,10 @@ class LoadChangeAfterDip(Effect):
 
     order = 3
     places, kind = ("bus",), "drift"
-    family, differs = "load_drift", "after the dip"
+    family, differs = "load_change", "after the dip"
     grid = {"after_change_wait": (0.0, 0.2, 0.4), "after_change_time": (0.1, 5.0), "after_change_static": (0.0, 1.0)}
     relevant = {"after_change_P": 0.02, "after_change_Q": 0.02}
-    confused_with = ("load_drift", "exponential_recovery", "undervoltage_trip")
+    confused_with = ("load_change", "exponential_recovery", "undervoltage_trip")
 
     def edit(self, eq, **values):
         changes(eq, True, "after_dip", *values.values())

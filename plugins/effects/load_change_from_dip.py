@@ -30,10 +30,10 @@ class LoadChangeFromDip(Effect):
 
     order = 3
     places, kind = ("bus",), "drift"
-    family, differs = "load_drift", "from the dip on"
+    family, differs = "load_change", "from the dip on"
     grid = {"dip_change_wait": (0.0, 0.4), "dip_change_time": (0.1, 5.0), "dip_change_static": (0.0, 1.0)}
     relevant = {"dip_change_P": 0.02, "dip_change_Q": 0.02}
-    confused_with = ("load_drift", "exponential_recovery", "undervoltage_trip")
+    confused_with = ("load_change", "exponential_recovery", "undervoltage_trip")
 
     def edit(self, eq, **values):
         changes(eq, False, "from_dip", *values.values())

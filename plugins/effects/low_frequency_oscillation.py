@@ -33,7 +33,7 @@ class LowFrequencyOscillation(Effect):
     places, kind = ("bus",), "oscillation"
     grid = {"mode_frequency": (0.7, 1.0, 1.5, 2.2, 3.3, 5.0, 7.5), "mode_phase": (0.0, 1.570796)}
     relevant = {"oscillation_P": 0.05, "oscillation_Q": 0.05}
-    confused_with = ("load_drift", "second_motor_group")
+    confused_with = ("load_change", "second_motor_group")
 
     def edit(self, eq, oscillation_P, oscillation_Q, mode_frequency, mode_damping, mode_phase):
         import sympy

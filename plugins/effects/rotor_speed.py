@@ -28,7 +28,7 @@ class RotorSpeed(Effect):
     places, kind = ("speed",), "lag"
     order = -1
     relevant = {"swing": 10.0}
-    confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
+    confused_with = ("exponential_recovery", "second_motor_group", "load_change")
 
     def refusal(self, eq):
         return "its speed moves already" if _orders.moving(eq, _orders.SPEED) else None

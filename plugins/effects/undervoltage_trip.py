@@ -31,4 +31,4 @@ class UndervoltageTrip(_Trip):
     wave_sites = sites.current, sites.zero_current
     places = ("bus",)
     relevant = {"tripped_share": 0.02}
-    confused_with = ("exponential_recovery", "second_motor_group", "load_drift")
+    confused_with = ("exponential_recovery", "second_motor_group", "load_change")

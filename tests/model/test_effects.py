@@ -623,7 +623,7 @@ def test_a_window_shorter_than_a_step_is_the_mean_of_straight_lines():
 
 def test_drift_is_a_slope():
     excitation = dip()
-    P, Q = run("load_drift", excitation, values("load_drift", drift_P=0.02, drift_Q=-0.01))
+    P, Q = run("load_change", excitation, values("load_change", drift_P=0.02, drift_Q=-0.01))
     t = np.arange(len(P)) * 1e-3
     assert pytest.approx(1 + 0.02 * t, abs=1e-12) == P / base(excitation)[0]
     assert pytest.approx(1 - 0.01 * t, abs=1e-12) == Q / base(excitation)[1]
@@ -631,7 +631,7 @@ def test_drift_is_a_slope():
 
 def test_measurement_effects_see_each_event_by_itself():
     """The first event's end does not leak into the second's beginning."""
-    for name in ("time_skew", "measurement_window", "load_drift"):
+    for name in ("time_skew", "measurement_window", "load_change"):
         on = values(name, halfway)
         together = model(name).simulate(Drive.of([dip(0.3), dip(0.6)]), on)
         alone = model(name).simulate(Drive.of([dip(0.6)]), on)
@@ -640,7 +640,7 @@ def test_measurement_effects_see_each_event_by_itself():
 
 def test_a_measurement_is_asked_only_for_candidates_off_their_null():
     """Beside them those at their null are the base model's to the last bit, and each is as it is alone."""
-    for name in ("time_skew", "measurement_window", "load_drift"):
+    for name in ("time_skew", "measurement_window", "load_change"):
         rows, drive = np.array([values(name, halfway), values(name), values(name, halfway)]), Drive.of([dip()])
         together, base = (model(*names).simulate(drive, some) for names, some in (((name,), rows), ((), TRUTH)))
         assert np.array_equal(together.outputs[:, 1], base.outputs[:, 0]), name

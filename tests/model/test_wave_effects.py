@@ -221,7 +221,7 @@ def test_a_trip_takes_its_share_of_the_currents():
 
 
 def test_a_drift_grows_with_its_part_of_the_current():
-    seen, whole = run("load_drift", drift_P=0.05, drift_Q=-0.03)[0], run()[0]
+    seen, whole = run("load_change", drift_P=0.05, drift_Q=-0.03)[0], run()[0]
     t = DIPS.inputs[INPUTS.index("t")]
     known = whole.real * (1 + 0.05 * t) + 1j * whole.imag * (1 - 0.03 * t)
     assert np.abs(seen - known).max() < 1e-12

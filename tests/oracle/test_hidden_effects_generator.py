@@ -376,7 +376,7 @@ def test_a_linear_load_does_not_show_that_both_channels_are_averaged_alike():
 
 def test_a_drifting_load_grows_by_what_it_says():
     flat = Dip(depth=0.0, start=0.5, duration=0.1)
-    record = clean("load_drift", dip=flat)
+    record = clean("load_change", dip=flat)
     for channel in ("P", "Q"):
         grown = record[channel][0] * (1 + 0.01 * record["t"])
         np.testing.assert_allclose(record[channel], grown, atol=SOLVED)
@@ -753,7 +753,7 @@ def test_a_pair_s_joint_limit_is_where_no_single_effect_of_the_catalogue_could_t
 def test_an_effect_is_measured_against_what_the_base_model_cannot_imitate():
     """Load drift alone, nothing else to imitate it: its limit is that of a straight line in white noise."""
     flat = Dip(depth=1e-6, start=0.5, duration=0.1)
-    made = replace(case("load_drift", dip=flat), noise=Noise(0.005))
+    made = replace(case("load_change", dip=flat), noise=Noise(0.005))
     t, P0, Q0 = np.arange(1000) / 500, clean(None, dip=flat)["P"][0], clean(None, dip=flat)["Q"][0]
     line = 0.01 * np.linalg.norm(t - t.mean()) / 0.005 * np.hypot(1, Q0 / P0)  # the level is free, per event
     z = 3.0048 + 1.2816  # one in 20 over 19 effects, two-sided, and nine in ten

@@ -118,12 +118,10 @@ def status(c):
 
 def chosen_dip(c):
     tried = [
-        EventTrial(
-            ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))), Chances(np.array([p]), np.ones((1, 1)))
-        )
+        EventTrial(ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))))
         for depth, p in ((0.2, 0.93), (0.6, 0.99))
     ]
-    return mildest(tried, c.decided, lambda t: t.chances).event.depth
+    return mildest(tried, c.decided).event.depth
 
 
 def proposed(closed=0.9, left=1.0, p=1e-6):
@@ -143,8 +141,8 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
-    "rejected": (3.0, lambda c: c.rejects(10.0, 1.0, 2, 100.0), False),
-    "alike": (0.04, lambda c: c.rejects(45.0, 1e4, 2, 1000.0), False),
+    "rejected": (0.06, lambda c: bool(c.rejects(5.9)), False),
+    "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
     "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
     "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
@@ -165,7 +163,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "decided": (0.9, chosen_dip, 0.6),
 }
 FURTHER = [  # decisions by a criterion that has one above, too
-    ("false_alarms", 0.04, lambda c: judged_by(c, p_left=0.045).helps, False),
+    ("adequate_p", 0.002, lambda c: judged_by(c, p_left=0.0025).helps, False),
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
     ("ahead", 1.45, lambda c: proposed(closed=0.54).stands(c), False),
 ]

@@ -38,7 +38,7 @@ from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.score_test import ScoreTest, signed_drop
 from tractexp.errors import UserError
-from tractexp.identification import observed, surprises
+from tractexp.identification import local_minima, observed, surprises
 from tractexp.identification.descent import normal
 from tractexp.identification.separable import SeparableColumns
 from tractexp.identification.surprises import Scale, tail
@@ -102,6 +102,14 @@ def test_stays_silent_when_nothing_is_missing(silent):
     assert silent.train.after.chi2_per_sample == pytest.approx(1.0, abs=0.1)
 
 
+def test_the_base_model_is_fitted_in_the_better_of_two_valleys(monkeypatch):
+    """Where the reactive static load may stand for a part of the motor's, the box alone led to the worse side."""
+    made = events("feeder_impedance", size=0.6377, seed=287367529, count=4, noise=LOUD, recorder=FAST)[:3]
+    best = base_fit(bench(base(), made, ())).fit.deviance
+    monkeypatch.setattr(local_minima, "along_least_certain", lambda likelihood, unit: unit[None])
+    assert base_fit(bench(base(), made, ())).fit.deviance > best + 100
+
+
 def test_a_batch_of_descents_says_how_many_have_ended(monkeypatch):
     @contextmanager
     def parts(total):
@@ -130,12 +138,10 @@ def test_what_explains_as_well_is_told_as_a_tie_with_the_dip_that_decides():
     assert found.verdict.word == "tied"
     assert {*found.verdict.sets} == {(name,) for name in alike}
     assert found.verdict.reason.endswith("either explains the disagreement, and these events cannot tell them apart")
-    event = found.verdict.next_event
-    assert event.probability < 0.5  # no formula is trusted to 5 % of what it explains
-    assert event.by_noise.exact.least > 0.9
+    assert found.verdict.next_event.probability > 0.9
     made = content(found)
     assert (made["verdict"], made["effects"]) == ("tied", [*found.names])
-    assert "where formulas are exact" in made["recommendation"]
+    assert made["recommendation"] == found.verdict.next_event.sentence()
 
 
 def test_the_gap_shrinks_on_fitted_and_on_held_out_events(planted):
@@ -157,7 +163,7 @@ def test_the_place_found_is_the_dip_and_what_follows(planted):
 def test_every_effect_is_judged_and_what_cannot_be_seen_is_said(planted):
     judged = {j.name: j for j in judgements(planted)}
     assert judged["stator_resistance"].status == "relevant"
-    assert {"time_skew", "measurement_window", "load_drift"} <= judged.keys()
+    assert {"time_skew", "measurement_window", "load_change"} <= judged.keys()
     silent_channels = catalogue(base(), planted.context.events).untestable
     assert "not recorded" in silent_channels["frequency_dependence"]
     assert "U2" in silent_channels["negative_sequence_braking"]

@@ -119,7 +119,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
     drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
     assert drops == sorted(drops, reverse=True)
-    assert {row.names[0] for row in rows} >= {*FEW, "time_skew", "measurement_window", "load_drift"}
+    assert {row.names[0] for row in rows} >= {*FEW, "time_skew", "measurement_window", "load_change"}
     words, charts = page(named, tmp_path)
     bars = charts[-1]["data"][0]
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
@@ -201,11 +201,11 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     [
         (
             ("dc_link_lag", "inrush"),
-            ("load_drift",),
-            "dc_link_lag and inrush beside load_drift, the nearest, close 66% of the gap",
+            ("load_change",),
+            "dc_link_lag and inrush beside load_change, the nearest, close 66% of the gap",
         ),
-        (("dc_link_lag",), ("load_drift",), "dc_link_lag beside load_drift, the nearest, closes 66%"),
-        ((), ("load_drift", "time_skew"), "load_drift and time_skew, the nearest, close 66%"),
+        (("dc_link_lag",), ("load_change",), "dc_link_lag beside load_change, the nearest, closes 66%"),
+        ((), ("load_change", "time_skew"), "load_change and time_skew, the nearest, close 66%"),
         (("dc_link_lag",), (), "dc_link_lag, the nearest, closes 66%"),
     ],
 )

@@ -324,7 +324,7 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     """One of the two leaves nothing of the fitted dips; of all events it does, and only both do not."""
     pair = ("negative_sequence_braking", "transformer_inrush")
     made = events(pair, (0.048, 0.043), 652317836, count=4, noise=LOUD, negative=True, recorder=FAST)
-    told = investigate(base(), made[:3], made[3:], {}, {}, only=(*pair, "load_drift"))
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=(*pair, "load_change"))
     assert told.explanations.chosen.names == pair[1:]
     assert told.explanations.last.suffices
     assert not told.held_out.assessments[pair[1:]].helps
@@ -361,7 +361,7 @@ def test_members_belong_to_the_effects_that_are_asked_for():
 def test_a_member_is_no_candidate_of_the_first_search():
     missing = catalogue(base(), events(count=1))
     assert not {c.name for c in missing.candidates} & set(MEMBERS)
-    assert missing.textbook(("saturation_curve", "load_drift")) == ("magnetic_saturation", "load_drift")
+    assert missing.textbook(("saturation_curve", "load_change")) == ("magnetic_saturation", "load_change")
 
 
 def test_a_member_that_nests_the_textbook_starts_from_its_fit():

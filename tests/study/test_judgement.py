@@ -105,10 +105,10 @@ def test_sparse_regression_keeps_what_is_there_and_little_else():
 
 def row(**changes) -> dict:
     return {
-        "group": "4 x", "label": "load_drift", "truth": ["load_drift"], "seed": 1, "held": 1, "events": 4,
-        "multiples": [4.0], "verdict": "named", "names": ["load_drift"], "sets": [["load_drift"]], "untestable": [],
-        "sparse": ["load_drift"], "samples": 6000, "proposal": None, "seconds": 1.0,
-        "refits": [[["load_drift"], 20.0, 1], [["time_skew"], 3.0, 1], [["load_drift", "time_skew"], 22.5, 2]],
+        "group": "4 x", "label": "load_change", "truth": ["load_change"], "seed": 1, "held": 1, "events": 4,
+        "multiples": [4.0], "verdict": "named", "names": ["load_change"], "sets": [["load_change"]], "untestable": [],
+        "sparse": ["load_change"], "samples": 6000, "proposal": None, "seconds": 1.0,
+        "refits": [[["load_change"], 20.0, 1], [["time_skew"], 3.0, 1], [["load_change", "time_skew"], 22.5, 2]],
         "imperfect": False,
     } | changes  # fmt: skip
 
@@ -131,10 +131,10 @@ def test_names_are_counted_by_law(changes, named, right):
 
 def test_criteria_choose_among_all_sets_that_were_fitted():
     """A second name gains 2.5: enough for Akaike's price of 2, not for Schwarz's of ln 6000."""
-    assert evidence.aic(row()) == "load_drift + time_skew"
-    assert evidence.bic(row()) == "load_drift"
-    assert evidence.rmse(row()) == "load_drift + time_skew"
-    assert evidence.bic(row(refits=[[["load_drift"], 5.0, 1]])) == ""
+    assert evidence.aic(row()) == "load_change + time_skew"
+    assert evidence.bic(row()) == "load_change"
+    assert evidence.rmse(row()) == "load_change + time_skew"
+    assert evidence.bic(row(refits=[[["load_change"], 5.0, 1]])) == ""
 
 
 @pytest.mark.parametrize(
@@ -143,7 +143,7 @@ def test_criteria_choose_among_all_sets_that_were_fitted():
 def test_proposals_are_right_by_balance_and_signal(balance, signal, right):
     made = {"balance": balance, "signal": signal, "clock": "of_return", "closed": {"train": 1.0, "validate": 0.9}}
     stranger = row(
-        group="outside 4 x", label="load_step", truth=["load_step"], verdict="unexplained", names=[], sets=[]
+        group="outside 4 x", label="two_load_steps", truth=["two_load_steps"], verdict="unexplained", names=[], sets=[]
     )
     table = evidence.tables([stranger | {"proposal": made, "lambda_left": 100.0}])
     (line,) = [line for line in table.splitlines() if line.startswith("| outside the catalogue, above 80 |")]

@@ -118,7 +118,7 @@ def test_what_is_recommended_stands_in_what_machines_read(tied):
     chances = told["next_event"]["recommended"]
     assert chances["probability"] == min(chances["by_truth"].values())
     assert set(chances["by_truth"]) == set(TIE)
-    assert {"words", "depth", "duration", "probability", "by_noise_alone"} <= told["next_event"]["tried"][0].keys()
+    assert {"words", "depth", "duration", "probability"} <= told["next_event"]["tried"][0].keys()
 
 
 def test_an_equation_in_another_parameter_is_proved_to_be_the_same(alike):
@@ -150,8 +150,8 @@ def test_a_rival_is_linearised_as_its_refit_moves(alike):
     rows = _reduced([np.vstack([v.f - views[0].f, v.K]) for v in views])
     from tractexp.discrepancy.next_event.choose import _fitted_to
 
-    linear, *_ = separation._fitted(2, (rows[2][0] - rows[1][0])[None], rows[2][1:])
-    exact, *_ = separation._fitted(1, np.zeros((1, len(rows[1][0]))), rows[1][1:])
+    linear = separation._deviance(2, (rows[2][0] - rows[1][0])[None], rows[2][1:])
+    exact = separation._deviance(1, np.zeros((1, len(rows[1][0]))), rows[1][1:])
     moved = _fitted_to(bench, noise, sides, sides[1], event)[2]
     refitted = moved.deviance - truth.deviance
     assert float(exact[0]) == pytest.approx(truth.deviance, rel=1e-3)
@@ -173,7 +173,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
     bench, noise, bare, fits = alike
     fit, at = fits["stator_resistance"], bench.coordinates
     unit = fit.unit.copy()
-    unit[at.parameters(["time_skew", "load_drift"])] += 0.1
+    unit[at.parameters(["time_skew", "load_change"])] += 0.1
     sides = [sided(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
     event = ImaginedDip(0.5, 0.4)
     own, other = (seen(bench, noise, side, [event])[0].f for side in sides[1:])

@@ -47,10 +47,9 @@ class Recommended(Written):
 
     def table(self) -> Table:
         """Every event tried, the surest first."""
-        ranked = sorted(self.content["tried"], key=lambda t: (-t["probability"], -t["by_noise_alone"]))
-        rows = [[t["words"], f"{t['probability']:.0%}", f"{t['by_noise_alone']:.0%}"] for t in ranked[:10]]
-        columns = ["event", "probability", "where formulas are exact"]
-        return Table(columns, rows, "the ten surest events")
+        ranked = sorted(self.content["tried"], key=lambda t: -t["probability"])
+        rows = [[t["words"], f"{t['probability']:.0%}"] for t in ranked[:10]]
+        return Table(["event", "probability"], rows, "the ten surest events")
 
     def summary(self) -> Report:
         return Report().add(self.table()).text(f"next: {self.sentence}")

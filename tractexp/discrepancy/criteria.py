@@ -30,8 +30,8 @@ class Criteria:
     """The decision thresholds of an investigation; set single ones by `task.criteria.NAME=value`."""
 
     false_alarms: float = _criterion(
-        0.05, (0.001, 0.5), "probability of naming or doubting anything where nothing is missing, and p that a doubted"
-        " explanation must leave in a fit to all events", DERIVED, "the usual level of a test; the user's to set",
+        0.05, (0.001, 0.5), "probability of naming or doubting anything where nothing is missing", DERIVED,
+        "the usual level of a test; the user's to set",
     )  # fmt: skip
     naming_share: float = _criterion(
         0.4, (0.0, 1.0), "part of the false alarms that chance's draws may give to naming", CHOSEN,
@@ -56,12 +56,12 @@ class Criteria:
         "what imitates a fault of the measurement badly leaves a little for an effect of the load",
     )  # fmt: skip
     rejected: float = _criterion(
-        3.5, (0.0, 100.0), "standard deviations by which a rival set is rejected", CHOSEN,
-        "more than the 1.64 of a 5 % test, since a true effect's formula is not quite its physics",
+        0.05, (1e-9, 1.0), "relative likelihood, by Akaike's criterion, below which a rival is rejected", DERIVED,
+        "one to twenty, the usual level of a test",
     )  # fmt: skip
-    alike: float = _criterion(
-        0.05, (0.0, 1.0), "part of what the best set explains within which no rival is rejected", CHOSEN,
-        "no formula is exact to this",
+    mended: float = _criterion(
+        0.05, (0.0, 1.0), "part of what an effect explains that a fault of the measurement beside it must explain more",
+        CHOSEN, "no formula is exact to this, and a fault mends a little of it",
     )  # fmt: skip
     shown: float = _criterion(
         10.8, (0.0, 1e6), "expected gain of the deviance from which held-out events can deny an explanation, and gain"
@@ -171,12 +171,13 @@ class Criteria:
         """Whether an effect that would lower the deviance so far is looked for beside a name that explains so much."""
         return drop >= self.other_valley * explained
 
-    def rejects(self, behind: Any, distance: Any, parameters: int, explained: Any) -> Any:
-        """Whether a rival this far behind the best set is rejected; numbers, or arrays of one shape (n,).
+    def stands_out(self, drop: float, explained: float) -> bool:
+        """Whether a fault of the measurement does more for the deviance than mend an effect that explains so much."""
+        return drop > self.mended * explained
 
-        `distance` of the two curves [squared standard deviations]; `parameters` of both, whose noise moves the curves
-        apart too; `explained` by the best set, of the deviance.
+    def rejects(self, behind: Any) -> Any:
+        """Whether a rival this far behind the best set in Akaike's criterion is rejected; a number, or an array (n,).
+
+        exp(-behind / 2) is its relative likelihood (Akaike 1978).
         """
-        far = np.maximum(distance - parameters, self.rejected**2)
-        least = np.maximum(2 * self.rejected * far**0.5 - far, self.alike * np.maximum(explained, 0.0))
-        return behind > least
+        return behind > -2 * np.log(self.rejected)

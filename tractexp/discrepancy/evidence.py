@@ -111,7 +111,7 @@ def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
     if rival.rejected:
         names = findings.held_out.names_of(findings.survivors.rivals[0])
         best = names[0] if len(names) == 1 else "the best set"
-        return "rejected", f"were it true, {best} would not fit better by {rival.behind:.0f}"
+        return "rejected", f"{best} is better by {rival.behind:.0f} of Akaike's criterion"
     if rival.tests is None:
         return "not rejected", "among too many that fit alike to be tested further"
     if not rival.adequate:

@@ -239,13 +239,6 @@ def _with_prior(
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
-def distances(context: Context, noise: Noise, fits: Sequence[Refit]) -> np.ndarray:
-    """Squared distances (n,) of fits from the first of them, in standard deviations; the faults' priors count."""
-    prior = context.coordinates.parameters(context.catalogue.of_measurement)
-    rows = context.rows(np.array([f.unit for f in fits]), noise, prior, [f.names for f in fits])
-    return ((rows - rows[0]) ** 2).sum(axis=1)
-
-
 def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
     """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`: there it has no
     slope. None where nothing rests."""

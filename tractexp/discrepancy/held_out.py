@@ -37,20 +37,12 @@ class Assessment:
     @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
-        criteria = self.context.criteria
-        least = criteria.false_alarms if self.gap.telling else criteria.adequate_p  # a mild event denies nothing
-        return self.gap.helps and self.p_left >= least and not self.behind
+        return self.gap.helps and self.p_left >= self.context.criteria.adequate_p and not self.behind
 
     @property
     def convincing(self) -> bool:
         """Whether it closes as much of the gap there as a true explanation does."""
         return self.gap.explained >= 1 - 1 / self.context.criteria.divides**2
-
-    @property
-    def tolerable(self) -> bool:
-        """Whether it is kept beside one that helps: what would not do for a name is not enough to deny a rival."""
-        least = self.context.criteria.adequate_p
-        return self.convincing and self.gap.helps and not self.behind and self.p_left >= least
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +78,6 @@ class HeldOut:
             return self.survivors.retained
         assessments, adequate = self.assessments, self.survivors.adequate
         helping = {s.fit.names for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps}
-        if helping:
-            helping |= {names for names, one in assessments.items() if one.tolerable}
         of_family: dict[Names, Rival] = {}
         for rival in (s for s in adequate if s.fit.names in helping):  # places and laws of a family: by the best's name
             of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
@@ -129,7 +119,7 @@ def telling(explained: Explanations, bare: Refit) -> Names:
     """The faults of the measurement that stand out, but for those that only mend the formula of an effect.
 
     Beside an effect of the load they must explain more, together with those left out before, than the part of all that
-    is explained to which no formula is exact (`alike`).
+    is explained to which no formula is exact (`mended`).
     """
     context, noise, fit, faults = explained.base.context, explained.last.noise, explained.chosen, explained.faults
     if not fit.names:
@@ -142,7 +132,7 @@ def telling(explained: Explanations, bare: Refit) -> Names:
     most = left(faults) if faults else 0.0
     while faults:
         fewer = {left(rest): rest for rest in itertools.combinations(faults, len(faults) - 1)}
-        if min(fewer) - most > context.criteria.alike * (bare.deviance - most):
+        if context.criteria.stands_out(min(fewer) - most, bare.deviance - most):
             break
         faults = fewer[min(fewer)]
     return faults
@@ -164,16 +154,15 @@ def weighed(
     if both.undoubted(fits) and assessments[fits[0].names].convincing and assessments[fits[0].names].helps:
         return assessments, []
     joint = {t.fit.names: t for t in both.compared(fits, seed)}
-    best, plain = min(t.fit.cost for t in joint.values()), both.plain.cost
+    best = min(t.fit.cost for t in joint.values())
     helping = {names for names, one in assessments.items() if one.gap.helps}
     sufficing = {names for names in helping if assessments[names].gap.left <= criteria.shown}
     for names, fitted in joint.items():
-        behind = bool(criteria.rejects(fitted.fit.cost - best, 0.0, 0, plain - best))
+        behind = bool(criteria.rejects(fitted.fit.cost - best))
         assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
     again = [
         fitted.fit for names, fitted in joint.items()
         if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria, doubted)
-        and (not helping or fitted.p_left >= criteria.false_alarms)
     ]  # fmt: skip
     return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
 
@@ -197,11 +186,7 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     plain = refit(both.context, search.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
     both = replace(both, faults=telling(search.explanations, plain))
     tried = both.carried_back([s.fit for s in of_all.values()], seed)
-    criteria, fits = context.criteria, list[tuple[Refit, Refit]]()
-    for alone, fitted in tried:  # several effects, chosen among hundreds of sets, must leave nothing
-        least = criteria.false_alarms if len(fitted.fit.names) > 1 else criteria.adequate_p
-        if fitted.confirmed(criteria, doubted=True) and fitted.p_left >= least:
-            fits.append((alone, fitted.fit))
+    fits = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(context.criteria, doubted=True)]
     if not fits:
         return result
     quiet = surviving.explanations.base.quiet

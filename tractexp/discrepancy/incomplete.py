@@ -54,10 +54,10 @@ class PredictedDeviance(Prediction):
 def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets that predict the held-out events, if any does; what else there is stays as it was.
 
-    None without held-out events: a larger set always fits better what it was fitted to. Nor where those deny what
-    leaves noise only on the fitted ones. Where what is left is loud all is told as least squares fit it, named or not.
+    None without held-out events: a larger set always fits better what it was fitted to. Where what is left is loud all
+    is told as least squares fit it, named or not.
     """
-    if not events or weighed.survivors.adequate:
+    if not events:
         return weighed
     context = weighed.survivors.explanations.base.context
     context.effort.say("judging what leaves something on the held-out events")

@@ -1,11 +1,8 @@
 """How sure: the sets of names that the data do not reject, and whether any of them is an adequate explanation.
 
-A rival is rejected when, were it the truth, the chosen set would not fit as well as it does (a test of separate
-hypotheses, Cox 1961): with lambda the squared distance between the two fitted curves in standard deviations, the
-rival's advantage would be normal with mean lambda and variance 4 lambda. Curves closer than the test's own quantile,
-and rivals that explain nearly as much, are never told apart: effects are formulas, not the physics. Adequacy is
-tested at each survivor: what is named must leave nothing that a push into some balance, or other parameters in each
-event, would still explain.
+A rival is rejected by its relative likelihood (Akaike 1978): all sets leave nothing but noise or are judged by what
+they predict, so that how well each fits can be weighed. Adequacy is tested at each survivor: what is named must leave
+nothing that a push into some balance, or other parameters in each event, would still explain.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +10,7 @@ from dataclasses import dataclass, replace
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, distances, refit
+from tractexp.discrepancy.fitting import Refit, refit
 
 MOST = 6  # survivors whose adequacy is tested
 
@@ -71,8 +68,8 @@ def rivals(explained: Explanations) -> list[Rival]:
     base = refit(context, noise, [((), explained.steps[0].fit.unit)])[0]
     best = fits[0]
     ranked = []
-    for fit, distance in zip(fits, distances(context, noise, fits).tolist(), strict=True):
-        behind, parameters = fit.cost - best.cost, fit.parameters + best.parameters
-        rejected = fit is not best and context.criteria.rejects(behind, distance, parameters, base.cost - best.cost)
+    for fit in fits:
+        behind = fit.cost - best.cost
+        rejected = fit is not best and bool(context.criteria.rejects(behind))
         ranked.append(Rival(fit, base.deviance - fit.deviance, behind, rejected))
     return ranked

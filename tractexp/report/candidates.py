@@ -102,8 +102,9 @@ def _sets(page: Report, findings: Findings) -> None:
     with page.folded("How the refitted sets compare"):
         page.table(
             ["set", "deviance", "behind", "verdict", "chance leaves as much"], rows,
-            "Every set of this size that was refitted. A set is rejected when, were it true, the best would not fit so"
-            " well; it is adequate when chance may leave as much as it does.", words=(3, 4),
+            "Every set of this size that was refitted; behind is that of Akaike's criterion. A set is rejected when its"
+            f" relative likelihood is below {findings.context.criteria.rejected:g}; it is adequate when chance may"
+            " leave as much as it does.", words=(3, 4),
         )  # fmt: skip
 
 

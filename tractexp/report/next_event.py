@@ -6,7 +6,6 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 from tractexp.discrepancy.next_event.choose import EventTrial, NextEvent
-from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.wording import as_sentence
 
 LISTED = 2  # events of each kind that a table has
@@ -24,24 +23,22 @@ def report(choice: NextEvent, title: str) -> Report:
 
 def section(page: Report, choice: NextEvent) -> None:
     """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
-    rule = f"the rule of this investigation, which trusts no formula to {choice.criteria.alike:.0%} of what it explains"
     if not choice.same or len(choice.rivals) > 2:
         page.chart(_chart(choice), _caption(choice))
     page.heading("What each kind of event would do", 3)
     page.table(
-        ["event", "by the rule [%]", "by noise [%]"],
+        ["event", "probability [%]"],
         [_row(t) for kind in KINDS for t in _best(choice, kind)],
-        f"Probability that all rivals but the true one are rejected, the least over all of them as the truth: by"
-        f" {rule}; and by noise, with formulas taken as exact. The best events of each kind.",
+        "Probability that all rivals but the true one are rejected, the least over all of them as the truth. The best"
+        " events of each kind.",
         words=(0,),
     )
-    best = choice.by_noise or choice.best
-    chances = _chances(choice, best)
+    best = choice.best
     page.heading("Rival by rival", 3)
     page.table(
         ["if the truth is", *(f"{k} is rejected [%]" for k in range(1, 1 + len(choice.rivals)))],
         [
-            [f"{a + 1}: {name}", *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(chances.pairs[a]))]
+            [f"{a + 1}: {name}", *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(best.chances.pairs[a]))]
             for a, name in enumerate(choice.rivals)
         ],
         f"By {best.event.words}.",
@@ -56,25 +53,19 @@ def section(page: Report, choice: NextEvent) -> None:
 
 
 def _caption(choice: NextEvent) -> str:
-    exact = ", where formulas are exact" * (choice.by_noise is not None)
     decided = f"Dashed: the {choice.criteria.decided:.0%} from which an event is recommended as sure."
-    return f"Probability that one dip more tells all rivals apart{exact}, by its depth and duration. {decided}"
+    return f"Probability that one dip more tells all rivals apart, by its depth and duration. {decided}"
 
 
 def _chart(choice: NextEvent) -> Chart:
-    """Probability by depth, a line for each duration: by the rule, or by noise where that is not sure to decide."""
+    """Probability by depth, a line for each duration."""
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
     plain = [t for t in choice.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
-        line = sorted((t.event.depth, _chances(choice, t).least) for t in plain if t.event.duration == duration)
+        line = sorted((t.event.depth, t.chances.least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
     return chart.level(100 * choice.criteria.decided).limits(0, -3, 103)
-
-
-def _chances(choice: NextEvent, tried: EventTrial) -> Chances:
-    """By the rule, or where that is not sure to decide, by the noise alone."""
-    return tried.chances if choice.by_noise is None else tried.exact
 
 
 def _kind(tried: EventTrial) -> str:
@@ -89,11 +80,9 @@ def _kind(tried: EventTrial) -> str:
 
 
 def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
-    ranked = sorted(
-        (t for t in choice.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, -t.exact.least, t.event.burden)
-    )
+    ranked = sorted((t for t in choice.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, t.event.burden))
     return ranked[:LISTED]
 
 
 def _row(tried: EventTrial) -> list[str]:
-    return [tried.event.words, f"{100 * tried.chances.least:.0f}", f"{100 * tried.exact.least:.0f}"]
+    return [tried.event.words, f"{100 * tried.chances.least:.0f}"]

@@ -76,7 +76,7 @@ def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
         chosen = {
             "time_skew": rng.uniform(0.0, 0.003),
             str(rng.choice(["measurement_window", "phasor_window"])): 0.02 * rng.integers(1, 5),
-            "load_drift": rng.uniform(-0.005, 0.005),
+            "load_change": rng.uniform(-0.005, 0.005),
         }
         faults = tuple((name, float(amount / NUISANCES[name].reference)) for name, amount in chosen.items())
         yield Planned("nuisances", seed, partial(Trial, "nuisances", Case(nuisances=faults, **settings), seed))

@@ -279,7 +279,7 @@ class PhasorWindow(Hidden):
 
 
 @dataclass(frozen=True)
-class LoadDrift(Hidden):
+class LoadChange(Hidden):
     """Customers switch on: the static load grows steadily, by `amount` of the whole power per second."""
 
     reference, largest, unit = 0.01, 0.3, "1/s"
@@ -309,7 +309,7 @@ PHYSICAL = {
 MEASUREMENT = {
     "time_skew": TimeSkew,
     "measurement_window": MeasurementWindow,
-    "load_drift": LoadDrift,
+    "load_change": LoadChange,
 }
 CATALOG = PHYSICAL | MEASUREMENT
 NUISANCES = MEASUREMENT | {"phasor_window": PhasorWindow}

@@ -1,7 +1,7 @@
 """The event to record next, chosen among those imagined: the mildest that is sure to leave one rival, or the surest."""
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -24,19 +24,13 @@ WORTH = 0.1  # chance below which no refit is worth its time
 REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
 
-Rule = Callable[["EventTrial"], Chances]
-
 
 @dataclass(frozen=True)
 class EventTrial:
-    """An event and how surely it leaves one rival: by the product's own rule, and where formulas are `exact`.
-
-    The rule rejects no rival whose curves differ by less than `Criteria.alike` of what the best explains.
-    """
+    """An event and how surely it leaves one rival."""
 
     event: ImaginedDip
     chances: Chances
-    exact: Chances
     refitted: bool = False  # whether rivals were refitted to it, not only linearised about their fits
     repeated: int | None = None  # how many such events are sure to, where one is not and so many are
 
@@ -45,14 +39,12 @@ class EventTrial:
 class NextEvent:
     """What to record next for `rivals`, and how surely it leaves one of them; `tried` are all events, as imagined.
 
-    `best` is chosen by the product's own rule, and where that is not sure to decide, `by_noise` with formulas taken as
-    exact. `same` are pairs that no voltage at all tells apart, by their places among the rivals, and `hopeless` others
-    that none of the events does.
+    `same` are pairs that no voltage at all tells apart, by their places among the rivals, and `hopeless` others that
+    none of the events does.
     """
 
     rivals: tuple[str, ...]
     best: EventTrial
-    by_noise: EventTrial | None
     tried: tuple[EventTrial, ...]
     criteria: Criteria
     same: tuple[tuple[int, int, Same], ...] = field(default=())
@@ -60,7 +52,7 @@ class NextEvent:
 
     @property
     def probability(self) -> float:
-        """By the product's own rule, the least over all rivals as the truth."""
+        """The least over all rivals as the truth."""
         return self.best.chances.least
 
     def sentence(self) -> str:
@@ -84,7 +76,6 @@ class NextEvent:
             "sentence": self.sentence(),
             "rivals": list(self.rivals),
             "recommended": self._row(self.best),
-            "by_noise_alone": self.by_noise and self._row(self.by_noise),
             "indistinguishable": [
                 {"pair": [self.rivals[a], self.rivals[b]], "rank": s.rank, "off": s.off, "reason": s.reason}
                 for a, b, s in self.same
@@ -93,23 +84,16 @@ class NextEvent:
                 {"pair": [self.rivals[a], self.rivals[b]], "probability": p} for a, b, p in self.hopeless
             ],
             "tried": [
-                {
-                    **t.event.to_dict(),
-                    "words": t.event.words,
-                    "probability": t.chances.least,
-                    "by_noise_alone": t.exact.least,
-                }
-                for t in self.tried
+                {**t.event.to_dict(), "words": t.event.words, "probability": t.chances.least} for t in self.tried
             ],
         }
 
     def _row(self, tried: EventTrial) -> dict[str, Any]:
-        chances = tried.exact if tried is self.by_noise else tried.chances
         return {
             **tried.event.to_dict(),
             "words": tried.event.words,
-            "probability": chances.least,
-            "by_truth": dict(zip(self.rivals, chances.alone.tolist(), strict=True)),
+            "probability": tried.chances.least,
+            "by_truth": dict(zip(self.rivals, tried.chances.alone.tolist(), strict=True)),
             "refitted": tried.refitted,
             "repeated": tried.repeated,
         }
@@ -120,15 +104,8 @@ class NextEvent:
         what, p = self.best.event.words, self.probability
         if p >= self.criteria.decided:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
-        if self.by_noise is None or p >= HOPELESS:
-            sure = f"no event that was tried is sure to tell {them}"
-            return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
-        what, p = self.by_noise.event.words, self.by_noise.exact.least
-        return (
-            f"no event that was tried is likely to tell {them} as long as no formula is trusted to"
-            f" {self.criteria.alike:.0%} of what it explains; record {what}: where formulas are exact"
-            f" (task.criteria.alike=0) it does so with a probability of {p:.0%}{_together(self.by_noise)}"
-        )
+        sure = f"no event that was tried is sure to tell {them}"
+        return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
 
 
 def _together(tried: EventTrial) -> str:
@@ -152,52 +129,48 @@ def next_event(
     for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):  # sampled alike
         for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
             events.append(event)
-            denied.append(np.stack([separation.denied(views, truth) for truth in truths], axis=1))
-    most = np.max([d[1].mean(axis=2) for d in denied], axis=0)  # (a, a), by the noise alone
+            denied.append(np.stack([separation.denied(views, truth) for truth in truths]))
+    most = np.max([d.mean(axis=2) for d in denied], axis=0)  # (a, a)
     apart = [(a, b, float(min(most[a, b], most[b, a]))) for a, b in itertools.combinations(range(len(rivals)), 2)]
     open_pairs = [pair for pair in apart if pair[2] < HOPELESS]
     ignored = np.zeros(most.shape, bool)
     if len(open_pairs) < len(apart):  # what can be told apart shall be
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
-    tried = [
-        EventTrial(e, Chances.of(d[0], ignored), Chances.of(d[1], ignored)) for e, d in zip(events, denied, strict=True)
-    ]
-    best = _held(context, noise, sides, tried, ignored, seed, lambda event: event.chances)
-    sure = best.chances.least >= context.criteria.decided
-    by_noise = None if sure else _held(context, noise, sides, tried, ignored, seed, lambda event: event.exact)
+    tried = [EventTrial(e, Chances.of(d, ignored)) for e, d in zip(events, denied, strict=True)]
+    best = _held(context, noise, sides, tried, ignored, seed)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
-    return NextEvent(tuple(labels), best, by_noise, tuple(tried), context.criteria, proved, hopeless)
+    return NextEvent(tuple(labels), best, tuple(tried), context.criteria, proved, hopeless)
 
 
-def mildest(tried: Sequence[EventTrial], decided: float, by: Rule) -> EventTrial:
+def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
-    enough = [t for t in tried if by(t).least >= min(decided, max(by(t).least for t in tried) - NEARLY)]
+    enough = [t for t in tried if t.chances.least >= min(decided, max(t.chances.least for t in tried) - NEARLY)]
     return min(enough, key=lambda t: t.event.burden)
 
 
 def _held(
-    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int,
-    by: Rule,
-) -> EventTrial:  # fmt: skip
+    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int
+) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
-        best = mildest(left, context.criteria.decided, by)
-        if checked and by(best).least < min(HOPELESS, max(by(t).least for t in checked)):
+        best = mildest(left, context.criteria.decided)
+        chance = best.chances.least
+        if checked and chance < min(HOPELESS, max(t.chances.least for t in checked)):
             break
         left.remove(best)
-        checked.append(_refitted(context, noise, sides, best, ignored, seed, by) if by(best).least >= WORTH else best)
-        if by(checked[-1]).least >= context.criteria.decided:
+        checked.append(_refitted(context, noise, sides, best, ignored, seed) if chance >= WORTH else best)
+        if checked[-1].chances.least >= context.criteria.decided:
             return checked[-1]
-    return max(checked, key=lambda t: by(t).least)
+    return max(checked, key=lambda t: t.chances.least)
 
 
 def _refitted(
-    context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int, by: Rule
-) -> EventTrial:  # fmt: skip
+    context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int
+) -> EventTrial:
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
 
     Only of phasors without further channels or rates, which the context has no records of: others stay linearised about
@@ -213,13 +186,13 @@ def _refitted(
         places.append((Separation(there, context.criteria, seed=seed), views))
 
     def again(times: int) -> EventTrial:
-        denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)], axis=1)
-        return EventTrial(event, *(Chances.of(rule, ignored) for rule in denied), refitted=plain)
+        denied = np.stack([s.denied(views, a, times) for a, (s, views) in enumerate(places, 1)])
+        return EventTrial(event, Chances.of(denied, ignored), refitted=plain)
 
     once = again(1)
-    if by(once).least >= context.criteria.decided:
+    if once.chances.least >= context.criteria.decided:
         return once
-    enough = (n for n in REPEATED if by(again(n)).least >= context.criteria.decided)
+    enough = (n for n in REPEATED if again(n).chances.least >= context.criteria.decided)
     return replace(once, repeated=next(enough, None))
 
 

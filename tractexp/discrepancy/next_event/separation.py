@@ -145,13 +145,12 @@ class Separation:
         self.precision = [x.precision for x in sides]
 
     def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
-        """Which rivals (2, a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
+        """Which rivals (a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
 
-        First by the product's rule, then where formulas are exact. None is denied where a side does not survive, the
-        truth itself always where all do.
+        None is denied where a side does not survive, the truth itself always where all do.
         """
         if not all(x.survives for x in seen):
-            return np.zeros((2, len(self.sides) - 1, self.draws), bool)
+            return np.zeros((len(self.sides) - 1, self.draws), bool)
         rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
         f, K = [x[0] for x in rows], [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
@@ -160,21 +159,12 @@ class Separation:
         h = rng.standard_normal((self.draws, k)) @ np.linalg.cholesky(np.linalg.inv(self.precision[truth])).T
         h = np.clip(h, -here, 1 - here)
         y = f[truth] + h @ K[truth][:k] + rng.standard_normal((self.draws, len(f[truth])))
-        fits = [self._fitted(x, f[x] - y, K[x]) for x in range(len(self.sides))]
-        deviance, old, new = fits[truth]
-        explained = fits[0][0] - deviance
-        rules = self.criteria, replace(self.criteria, alike=0.0)
-        denied = np.ones((2, len(self.sides) - 1, self.draws), bool)
-        for x in (x for x in range(1, len(self.sides)) if x != truth):
-            other, parameters = self.sides[x].fit.parameters, side.fit.parameters
-            behind = fits[x][0] - deviance + 2 * (other - parameters)
-            distance = ((fits[x][1] - old) ** 2).sum(axis=1) + ((fits[x][2] - new) ** 2).sum(axis=1)
-            for row, rule in zip(denied, rules, strict=True):
-                row[x - 1] = rule.rejects(behind, distance, other + parameters, explained) & (behind > 0)
-        return denied
+        rivals = range(1, len(self.sides))
+        cost = np.array([self._deviance(x, f[x] - y, K[x]) + 2 * self.sides[x].fit.parameters for x in rivals])
+        return self.criteria.rejects(cost - cost[truth - 1]) | (np.array(rivals) == truth)[:, None]
 
-    def _fitted(self, x: int, off: np.ndarray, K: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Deviance (b,) and rows (b, .) of recorded and new events, of one side fitted to both."""
+    def _deviance(self, x: int, off: np.ndarray, K: np.ndarray) -> np.ndarray:
+        """Of one side fitted to recorded and new events (b,)."""
         side, r, J = self.sides[x], self.r[x], self.J[x]
         k = len(J)
         whole = np.zeros((k + 2, k + 2))
@@ -185,7 +175,7 @@ class Separation:
         slope[:, :k] += J @ r + side.own @ side.s
         d = -np.linalg.solve(whole, slope.T).T
         old, new, prior = r + d[:, :k] @ J, off + d @ K, side.s + d[:, :k] @ side.own
-        return (old**2).sum(axis=1) + (new**2).sum(axis=1) + (prior**2).sum(axis=1), old, new
+        return (old**2).sum(axis=1) + (new**2).sum(axis=1) + (prior**2).sum(axis=1)
 
 
 def _reduced(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit, distances
+from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import Curves, beyond_chance, curves, pushed
 from tractexp.discrepancy.held_out import carried
 from tractexp.discrepancy.proposal.bed import carried_over
@@ -111,13 +111,6 @@ def _compared(
 
 
 def tied(result: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:
-    """Those that neither held-out events nor, were they true, the fit of the chosen one denies."""
+    """Those that neither held-out events nor, by its better fit, the chosen one denies."""
     criteria = result.context.criteria
-    apart = distances(result.context, result.noise, [chosen.fit, *(o.fit for o in others)])[1:]
-    explained = result.bare.deviance - chosen.fit.deviance
-    distinct = []
-    for other, distance in zip(others, apart.tolist(), strict=True):
-        behind, parameters = other.fit.cost - chosen.fit.cost, other.fit.parameters + chosen.fit.parameters
-        if other.stands(criteria) and not criteria.rejects(behind, distance, parameters, explained):
-            distinct.append(other)
-    return distinct
+    return [o for o in others if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)]
