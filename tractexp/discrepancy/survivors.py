@@ -1,8 +1,8 @@
 """How sure: the sets of names that the data do not reject, and whether any of them is an adequate explanation.
 
-A rival is rejected by its relative likelihood (Akaike 1978): all sets leave nothing but noise or are judged by what
-they predict, so that how well each fits can be weighed. Adequacy is tested at each survivor: what is named must leave
-nothing that a push into some balance, or other parameters in each event, would still explain.
+A rival is rejected by its relative likelihood (Akaike 1978). That weighs fits which leave noise only; sets that leave
+more are judged by what they predict. Adequacy is tested at each survivor: what is named must leave nothing that a push
+into some balance, or other parameters in each event, would still explain.
 """
 
 from dataclasses import dataclass, replace
