@@ -239,11 +239,11 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
 @pytest.mark.parametrize(
     ("costs", "p_left", "helps", "standing", "again"),
     [
-        ((100.0, 110.0), (1.0, 1.0), (True, True), ["one", "other"], []),
-        ((100.0, 125.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
-        ((125.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
-        ((100.0, 110.0), (1.0, 0.04), (True, False), ["one"], []),  # it leaves something of all events
-        ((100.0, 110.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
+        ((100.0, 105.0), (1.0, 1.0), (True, True), ["one", "other"], []),
+        ((100.0, 107.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
+        ((107.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
+        ((100.0, 105.0), (1.0, 0.002), (True, False), ["one"], []),  # it leaves something of all events
+        ((100.0, 105.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
     ],
 )
 def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
@@ -257,18 +257,17 @@ def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, hel
 @pytest.mark.parametrize(
     ("chosen", "rival", "kept"),
     [
-        ((1.0, 0.9), (0.03, 0.95), ["chosen", "rival"]),  # too little for a name, enough for a rival
-        ((1.0, 0.9), (0.03, 0.7), ["chosen"]),  # it closes less than a true explanation does
-        ((1.0, 0.9), (0.001, 0.95), ["chosen"]),  # it leaves something
-        ((0.03, 0.9), (0.03, 0.95), []),  # no name
+        (1.0, 0.03, ["chosen", "rival"]),
+        (1.0, 0.001, ["chosen"]),  # it leaves something of all events
+        (0.001, 0.03, ["rival"]),
+        (0.001, 0.001, []),
     ],
 )
-def test_held_out_events_deny_a_rival_only_by_what_it_leaves(chosen, rival, kept):
+def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, kept):
     at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
     told = {("chosen",): chosen, ("rival",): rival}
     judged = {
-        names: Assessment(GapTest(None, None, 100.0, 100.0 * (1 / closed - 1), 100.0, 10.8, None), at, (), p)
-        for names, (p, closed) in told.items()
+        names: Assessment(GapTest(None, None, 100.0, 5.0, 100.0, 10.8, None), at, (), p) for names, p in told.items()
     }
     adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
     surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(context=at)))
