@@ -141,7 +141,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
-    "rejected": (0.06, lambda c: bool(c.rejects(5.9)), False),
+    "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
     "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),

@@ -65,8 +65,8 @@ def recorded(made):
     return [detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)]
 
 
-def judged(events, **criteria):
-    return investigate(base(), events, (), {}, {}, only=TIE, criteria=Criteria.of(criteria))
+def judged(events):
+    return investigate(base(), events, (), {}, {}, only=TIE)
 
 
 @pytest.fixture(scope="module")

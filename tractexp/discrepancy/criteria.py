@@ -9,11 +9,10 @@ Tolerances of fits, sizes of shortlists and numbers of draws are not decisions a
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from tractexp.errors import TASK, UserError, among, check_range
 from tractexp.noise import random_walk
@@ -180,4 +179,4 @@ class Criteria:
 
         exp(-behind / 2) is its relative likelihood (Akaike 1978).
         """
-        return behind > -2 * np.log(self.rejected)
+        return behind > -2 * math.log(self.rejected)

@@ -24,8 +24,8 @@ from tractexp.record import Event
 class Assessment:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
-    Where it was fitted to all events, `p_left` tells how often chance leaves as much, and `behind` whether another
-    explanation is too far ahead there.
+    Where it was fitted to all events, `p_left` tells how often chance leaves as much, and `behind` whether the best
+    explanation there rejects it.
     """
 
     gap: GapTest
@@ -144,7 +144,7 @@ def weighed(
     """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
     A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
-    other must leave nothing in a fit to all events and not be far behind the best one there. That fit may also bear
+    other must leave nothing in a fit to all events and not be rejected there by the best one. That fit may also bear
     out what does not help as it was fitted, or leaves more than chance does, since the fitted events may leave a part
     of it open; it is returned as fitted to all. Where the base model is `doubted` all events need only bear with it:
     the held-out ones may not show it at all.
@@ -158,7 +158,7 @@ def weighed(
     helping = {names for names, one in assessments.items() if one.gap.helps}
     sufficing = {names for names in helping if assessments[names].gap.left <= criteria.shown}
     for names, fitted in joint.items():
-        behind = bool(criteria.rejects(fitted.fit.cost - best))
+        behind = criteria.rejects(fitted.fit.cost - best)
         assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
     again = [
         fitted.fit for names, fitted in joint.items()

@@ -17,7 +17,7 @@ MOST = 6  # survivors whose adequacy is tested
 
 @dataclass(frozen=True, eq=False)
 class Rival:
-    """A set of names of the chosen size: how far behind, how far apart, and whether the data reject it."""
+    """A set of names of the chosen size: how far behind it is, and whether the data reject it."""
 
     fit: Refit
     lowered: float  # by how much its deviance is below that of the base model, nan of a fit by least squares
@@ -70,6 +70,6 @@ def rivals(explained: Explanations) -> list[Rival]:
     ranked = []
     for fit in fits:
         behind = fit.cost - best.cost
-        rejected = fit is not best and bool(context.criteria.rejects(behind))
+        rejected = fit is not best and context.criteria.rejects(behind)
         ranked.append(Rival(fit, base.deviance - fit.deviance, behind, rejected))
     return ranked

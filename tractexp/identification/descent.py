@@ -30,6 +30,16 @@ class Descent:
     deviance: np.ndarray
     simulations: int
 
+    @property
+    def best(self) -> np.ndarray:
+        """Coordinates (D,) of the least deviance."""
+        return self.unit[self.deviance.argmin()]
+
+    def joined(self, more: "Descent") -> "Descent":
+        """These ends and further ones."""
+        unit, deviance = np.concatenate([self.unit, more.unit]), np.concatenate([self.deviance, more.deviance])
+        return Descent(unit, deviance, self.simulations + more.simulations)
+
 
 def forward_differences(
     rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE

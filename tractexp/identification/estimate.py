@@ -85,7 +85,7 @@ class DescentEnds:
     @property
     def best(self) -> np.ndarray:
         """Coordinates (d,) of the least sum of squares."""
-        return self.descent.unit[self.descent.deviance.argmin()]
+        return self.descent.best
 
     @property
     def near(self) -> np.ndarray:
@@ -95,10 +95,7 @@ class DescentEnds:
 
     def joined(self, more: Descent, origin: str) -> "DescentEnds":
         """These and further ends of one origin."""
-        unit = np.concatenate([self.descent.unit, more.unit])
-        deviance = np.concatenate([self.descent.deviance, more.deviance])
-        both = Descent(unit, deviance, self.descent.simulations + more.simulations)
-        return replace(self, descent=both, origins=(*self.origins, *[origin] * len(more.unit)))
+        return replace(self, descent=self.descent.joined(more), origins=(*self.origins, *[origin] * len(more.unit)))
 
     def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""

@@ -42,9 +42,8 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
 def valleys(likelihood: Likelihood) -> np.ndarray:
     """Coordinates (at most 4, D) of distinct best fits from all over the box and beside the best, the best first."""
     ends = explored(likelihood)
-    beside = likelihood.descent(along_least_certain(likelihood, ends.unit[ends.deviance.argmin()]))
-    unit, deviance = np.concatenate([ends.unit, beside.unit]), np.concatenate([ends.deviance, beside.deviance])
-    return distinct(Descent(unit, deviance, 0), likelihood.free)
+    beside = likelihood.descent(along_least_certain(likelihood, ends.best))
+    return distinct(ends.joined(beside), likelihood.free)
 
 
 def along_least_certain(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
