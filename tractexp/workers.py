@@ -160,6 +160,11 @@ def _quiet() -> Iterator[None]:
 def _begin() -> None:
     """Leave Ctrl-C, which reaches the whole group, to the parent, and end with it, even where it is killed."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with_parent()
+
+
+def end_with_parent() -> None:
+    """End this process once its parent has ended."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         threading.Thread(target=_end_with, args=(parent,), daemon=True).start()

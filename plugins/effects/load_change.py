@@ -28,17 +28,18 @@ class LoadChange(Measurement):
     confused_with = ("exponential_recovery", "undervoltage_trip", "frequency_dependence")
 
     def observe(self, power, drive, values):
-        out = np.empty_like(power)
+        from ._recorder import grown
+
+        rate = np.stack([values["drift_P"], values["drift_Q"]], axis=1)
+        if not drive.of_waves:
+            grown(power, drive, rate)
+            return power
         for e in range(drive.events):
             part = drive.part(e)
-            rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
-            rate = np.stack([values[name][e] for name in ("drift_P", "drift_Q")])
-            if "turn_re" not in rows:
-                np.multiply(power[:, :, part], 1 + rate[..., None] * rows["t"], out=out[:, :, part])
-                continue
-            turn, drawn = rows["turn_re"] + 1j * rows["turn_im"], power[:, :, part]
+            rows, drawn = dict(zip(INPUTS, drive.inputs[:, part], strict=True)), power[:, :, part]
+            turn = rows["turn_re"] + 1j * rows["turn_im"]
             rotating = (drawn[0] + 1j * drawn[1]) * np.conj(turn)
-            P, Q = rate[:, :, None] * rows["t"]
+            P, Q = rate[e, :, :, None] * rows["t"]
             rotating = turn * (rotating + P * rotating.real + 1j * Q * rotating.imag)
-            out[0, :, part], out[1, :, part], out[2, :, part] = rotating.real, rotating.imag, drawn[2]
-        return out
+            drawn[0], drawn[1] = rotating.real, rotating.imag
+        return power

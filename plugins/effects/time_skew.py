@@ -1,8 +1,6 @@
 """Time skew between the voltage and the power channels."""
 
-import numpy as np
-
-from tractexp.extend import INPUTS, Measurement, Parameter, plugin
+from tractexp.extend import Measurement, Parameter, plugin
 
 QUIET = 0.005  # of the voltage before: a change between samples that tells how the current follows it
 
@@ -31,13 +29,8 @@ class TimeSkew(Measurement):
     def observe(self, power, drive, values):
         from ._recorder import earlier, moved
 
-        out = np.empty_like(power)
-        for e in range(drive.events):
-            part, step = drive.part(e), drive.event[e, -1]
-            lag, y = values["skew"][e] / step, power[:, :, part]
-            rows = dict(zip(INPUTS, drive.inputs[:, part], strict=False))
-            if "turn_re" in rows:
-                earlier(y, lag, out[:, :, part])
-            else:
-                moved(y, rows["U"], rows["U_rate"] * step, lag, QUIET * drive.event[e, 0], out[:, :, part])
-        return out
+        if drive.of_waves:
+            earlier(power, drive, values["skew"])
+        else:
+            moved(power, drive, values["skew"], QUIET)
+        return power

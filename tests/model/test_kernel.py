@@ -327,34 +327,80 @@ def second_difference(y, each, r):
     return (y(-1) - 2 * y(0) + y(1)) * each(0) + r
 
 
-def test_a_stencil_is_its_expression():
+SECOND = Stencil(second_difference, rows=("y",), shared=("each",), numbers=("r",))
+
+
+def held(x, at):
+    """What an array is at indices beyond its ends, too."""
+    return x[..., np.clip(at, 0, x.shape[-1] - 1)]
+
+
+def test_a_stencil_is_its_expression_within_parts_which_go_on_as_they_end():
     rng = np.random.default_rng(4)
-    y, each, r, shifts = rng.normal(size=(5, 40)), rng.normal(size=40), rng.normal(size=5), np.array([1, 4, 2, 9, 3])
-    out = np.empty((5, 30))
-    Stencil(second_difference, rows=("y",), shared=("each",), numbers=("r",))(out, shifts, y=y, each=each, r=r)
-    for k, shift in enumerate(shifts):
-        at = shift + np.arange(30)
-        theirs = (y[k, at - 1] - 2 * y[k, at] + y[k, at + 1]) * each[at] + r[k]
-        assert out[k] == pytest.approx(theirs, rel=1e-12, abs=1e-12)
+    y, each, r, shifts = (
+        rng.normal(size=(2, 5, 70)),
+        rng.normal(size=70),
+        rng.normal(size=5),
+        np.array([1, -4, 2, 9, 0]),
+    )
+    parts, out = [slice(0, 30), slice(30, 31), slice(33, 70)], np.full((2, 5, 70), 7.0)
+    SECOND(out, parts, shifts, y=y, each=each, r=r)
+    for part in parts:
+        own, shared, n = y[..., part], each[part], part.stop - part.start
+        for k, shift in enumerate(shifts):
+            at = shift + np.arange(n)
+            second = held(own, at - 1) - 2 * held(own, at) + held(own, at + 1)
+            theirs = second * held(shared, at) + r[k]
+            assert out[:, k, part] == pytest.approx(theirs[:, k], rel=1e-12, abs=1e-12)
+    assert np.all(out[..., 31:33] == 7.0)
+    SECOND(y, parts, shifts, y=y, each=each, r=r)  # in place
+    assert np.array_equal(y[..., :31], out[..., :31])
+    assert np.array_equal(y[..., 33:], out[..., 33:])
+
+
+@pytest.mark.parametrize("n", [1, 2, 20])
+def test_rows_may_go_on_by_one_step_of_their_slope(n):
+    onward = Stencil(lambda y: y(0), rows=("y",), onward=True)
+    y = np.random.default_rng(n).normal(size=(1, 2, n))
+    onward(out := np.empty_like(y), [slice(0, n)], np.array([-n - 2, n + 2]), y=y)
+    before, after = (2 * y[..., 0] - y[..., 1], 2 * y[..., -1] - y[..., -2]) if n > 1 else (y[..., 0], y[..., 0])
+    assert out[0, 0] == pytest.approx(np.full(n, before[0, 0]))
+    assert out[0, 1] == pytest.approx(np.full(n, after[0, 1]))
+
+
+@pytest.mark.parametrize("n", [1, 7, 8, 9, 64, 65])
+def test_a_running_sum_goes_on_as_a_straight_line_and_hangs_on_no_other_row(n):
+    def between(y, total):
+        return total(0, "ahead") - total(0, "behind")
+
+    summed = Stencil(between, rows=("y",), sums={"total": "y"}, shifts=("ahead", "behind"))
+    y = np.random.default_rng(n).normal(size=(1, 3, n))
+    ahead = np.array([0, 2, 11])
+    summed(out := np.empty_like(y), [slice(0, n)], {"ahead": ahead, "behind": -ahead}, y=y)
+    for k, reach in enumerate(ahead):
+        theirs = [held(y[0, k], np.arange(t - reach + 1, t + reach + 1)).sum() for t in range(n)]
+        assert out[0, k] == pytest.approx(theirs, rel=1e-12, abs=1e-12)
+    summed(alone := np.empty((1, 1, n)), [slice(0, n)], {"ahead": ahead[1:2], "behind": -ahead[1:2]}, y=y[:, 1:2])
+    assert np.array_equal(alone[0, 0], out[0, 1])
 
 
 @pytest.mark.parametrize(
     ("change", "why"),
     [
-        ({"shifts": np.array([0, 1])}, "does not fit arrays of 40 samples"),
-        ({"shifts": np.array([1, 10])}, "does not fit arrays of 40 samples"),
-        ({"shifts": np.array([1])}, "a stencil's shifts have the shape"),
-        ({"y": np.zeros((3, 40))}, "a stencil's y has the shape"),
+        ({"shifts": np.array([1, 2, 3])}, "a stencil's shifts has the shape"),
+        ({"y": np.zeros((1, 3, 40))}, "a stencil's y has the shape"),
         ({"each": np.zeros(41)}, "a stencil's each has the shape"),
         ({"r": np.zeros(3)}, "a stencil's r has the shape"),
-        ({"out": np.empty((2, 60))[:, ::2]}, "C-contiguous"),
+        ({"parts": [slice(40, 50)]}, "a sample each"),
+        ({"y": np.zeros((1, 2, 40), dtype=np.float32)}, "must be float64"),
+        ({"out": np.empty((1, 2, 80))[..., ::2]}, "contiguous"),
     ],
 )
 def test_a_stencil_does_not_read_or_write_beside_its_arrays(change, why):
-    given = {"out": np.empty((2, 30)), "shifts": np.array([1, 2]), "y": np.zeros((2, 40)), "each": np.zeros(40)}
-    given |= {"r": np.zeros(2)} | change
+    given = {"out": np.empty((1, 2, 40)), "parts": [slice(0, 40)], "shifts": np.array([1, 2])}
+    given |= {"y": np.zeros((1, 2, 40)), "each": np.zeros(40), "r": np.zeros(2)} | change
     with pytest.raises(ValueError, match=why):
-        Stencil(second_difference, rows=("y",), shared=("each",), numbers=("r",))(**given)
+        SECOND(**given)
 
 
 def test_constants_of_the_exponential_are_those_of_a_polynomial_close_to_it():

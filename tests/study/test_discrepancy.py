@@ -28,6 +28,7 @@ from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import from_other_valleys, without_needless
+from tractexp.discrepancy.fit_effort import TOGETHER
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.held_out import carried, judged_on, weighed
 from tractexp.discrepancy.injection import PUSHES
@@ -110,7 +111,7 @@ def test_the_base_model_is_fitted_in_the_better_of_two_valleys(monkeypatch):
     assert base_fit(bench(base(), made, ())).fit.deviance > best + 100
 
 
-def test_a_batch_of_descents_says_how_many_have_ended(monkeypatch):
+def test_descents_on_several_cores_say_how_many_have_ended(monkeypatch):
     @contextmanager
     def parts(total):
         counted.append(total)
@@ -119,7 +120,7 @@ def test_a_batch_of_descents_says_how_many_have_ended(monkeypatch):
     counted = []
     fit = base_fit(bench(base(), events(noise=LOUD)))
     monkeypatch.setattr(fit.context.effort, "parts", parts)
-    starts = [((name,), fit.fit.unit) for name in FEW]
+    starts = [((name,), fit.fit.unit) for name in FEW] * TOGETHER
     monkeypatch.setattr(store.DESCENTS, "read", lambda key: None)  # what was fitted before is read back at once
     refit(fit.context, fit.noise, starts)
     assert counted == [3, "ended", "ended", "ended"]
@@ -736,16 +737,21 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     assert (tmp_path / "run" / "unexplained.csv").read_text().startswith("event,t,P,Q")
 
 
-def test_whitened_bits_do_not_depend_on_the_number_of_cores(planted, monkeypatch):
-    """Products of matrices round by how many rows they have: rows are parted alike on any machine."""
-    from tractexp.discrepancy import cores
+def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(planted, monkeypatch):
+    """Products of matrices round by how many rows they have: the same descents go together on any machine."""
+    from tractexp.discrepancy import cores, fitting
 
     bench = planted.context
     wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.problem.power)
     noise = replace(planted.last.noise, mix=np.eye(2), random_walk=wander)
-    residuals = np.random.default_rng(1).normal(size=(150, *bench.valid.shape))
-    rows = []
+    moved = np.clip(planted.first.fit.unit + np.linspace(-0.02, 0.02, 9)[:, None], 0.0, 1.0)
+    monkeypatch.setattr(fitting.store, "key", lambda *_: "")  # nothing is taken from the store
+    found = []
     for number in (1, 3):
         monkeypatch.setattr(cores, "cores", lambda number=number: number)
-        rows.append(bench.whiten_many(noise, residuals))
-    np.testing.assert_array_equal(rows[0], rows[-1])
+        before = bench.effort.total
+        fits = refit(bench, noise, [(("stator_resistance",), unit) for unit in moved])
+        found.append((fits[0].unit, fits[0].deviance, bench.effort.total - before))
+    np.testing.assert_array_equal(found[0][0], found[1][0])
+    assert found[0][1:] == found[1][1:]
+    assert found[0][2] > 9

@@ -2,15 +2,9 @@
 
 import re
 import time
-from contextlib import nullcontext
-
-import numpy as np
-import pytest
 
 from tractexp.discrepancy import effort
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.effort import Effort
-from tractexp.identification.descent import descend
 
 
 def test_a_long_step_is_not_silent(monkeypatch):
@@ -64,26 +58,3 @@ def test_one_part_alone_says_nothing(monkeypatch):
             while len(lines) < 2:
                 time.sleep(0.01)
     assert re.fullmatch(r"  still fitting: 1 of 5, about \d+ s left", lines[1])
-
-
-def test_independent_items_are_counted_as_they_end():
-    ended = []
-    found = each_apart(lambda x: x + 1, [1, 2, 3], lambda total: nullcontext(lambda: ended.append(total)))
-    assert found == [2, 3, 4]
-    assert ended == [3, 3, 3]
-
-
-def test_descents_of_one_batch_are_counted_as_they_end():
-    def rows(x, lanes):
-        """A bowl ends after a few steps; the valley of Rosenbrock, the last lane, takes some more."""
-        u, v = 4 * x.T - 2
-        bowl, valley = np.stack([u, v], axis=1), np.stack([10 * (v - u**2), 1 - u], axis=1)
-        called.append(len(ended))
-        return np.where(lanes[:, None] < 3, bowl, valley)
-
-    ended, called = [], []
-    end = descend(rows, np.full((4, 2), 0.2), ended=lambda: ended.append(1))
-    assert end.deviance == pytest.approx(0, abs=1e-3)
-    assert len(ended) == 4
-    assert called == sorted(called)
-    assert {0, 3} <= {*called}  # the others went on

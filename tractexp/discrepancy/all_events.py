@@ -76,7 +76,7 @@ class AllEvents:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
         by_name = {fit.names: fit for fit in alone}
         fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
-        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits, self.context.effort.parts)
+        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits, self.context.effort)
 
     def undoubted(self, fits: Sequence[Refit]) -> bool:
         """Whether there is one explanation only, a single effect by the textbook's law."""
@@ -105,7 +105,7 @@ class AllEvents:
         alone = {names: refit(self.fitted, self.noise, [(names, u)], self.faults)[0] for names, u in there.items()}
         again = refit(self.context, self.level, [(f.names, f.unit) for f in fits], self.faults)
         both = lambda f: (alone[f.names], self._joint_fit(f, alone[f.names], seed))  # noqa: E731
-        return each_apart(both, again, self.context.effort.parts)
+        return each_apart(both, again, self.context.effort)
 
     def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])

@@ -83,7 +83,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
         by_test = surprises.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
-    parts = each_apart(part, range(1, MORE + 1), t.context.effort.parts)
+    parts = each_apart(part, range(1, MORE + 1), t.context.effort)
     moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
     return {name: Scale(mean, np.sqrt(square - mean**2) + 1e-12) for name, (mean, square) in moments.items()}
 
@@ -100,7 +100,7 @@ def _drawn(
         seen = quiet.of(t.unit, rest[b])
         return _chance(t, t.whitened(seen).of(t.context.whiten(seen, drawn[b : b + 1])), noise)
 
-    each = each_apart(anew, range(DRAWS), t.context.effort.parts)
+    each = each_apart(anew, range(DRAWS), t.context.effort)
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
     return Chance(np.concatenate([one.least_p for one in each]), left)
 

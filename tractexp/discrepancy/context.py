@@ -1,7 +1,7 @@
 """What every step of an investigation works with: records, coordinates and the kernels that simulate them."""
 
 import functools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,7 +9,6 @@ import numpy as np
 from tractexp import store
 from tractexp.discrepancy.catalogue import Catalogue
 from tractexp.discrepancy.coordinates import Coordinates
-from tractexp.discrepancy.cores import in_same_parts, side_by_side
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.kernels import Family, Kernels, Key
@@ -120,12 +119,15 @@ class Context:
         """
         self.effort.spend(len(unit))
         key = self.kernels.family.key(names, beside)
-        return side_by_side(lambda part: self.kernels.residuals(key, part), unit)
+        return self.kernels.residuals(key, unit)
 
     def residuals_of(self, unit: np.ndarray, sets: Sequence[Sequence[str]]) -> np.ndarray:
         """As `residuals`, with a set of names for each of the coordinates."""
+        of_kernels = self._of_one_kernel([(names, "") for names in sets])
+        if len(of_kernels) == 1:
+            return self.residuals(unit, sets[0])
         residuals = np.empty((len(unit), self.drive.channels, self.drive.samples))
-        for mine in self._of_one_kernel([(names, "") for names in sets]):
+        for mine in of_kernels:
             residuals[mine] = self.residuals(unit[mine], sets[mine[0]])
         return residuals
 
@@ -140,26 +142,21 @@ class Context:
             changes[mine] = finite(both[1:] - both[0])
         return changes
 
-    def _of_one_kernel(self, sets: Sequence[tuple[Sequence[str], str]]) -> Iterable[list[int]]:
+    def _of_one_kernel(self, sets: Sequence[tuple[Sequence[str], str]]) -> list[list[int]]:
         """Which of the sets share a kernel."""
         lanes: dict[Key, list[int]] = {}
         for lane, (names, beside) in enumerate(sets):
             lanes.setdefault(self.kernels.family.key(names, beside), []).append(lane)
-        return lanes.values()
+        return list(lanes.values())
 
     def whiten(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
         return noise.whiten(residuals, self.drive, self.valid)
 
-    def whiten_many(self, noise: Noise, residuals: np.ndarray) -> np.ndarray:
-        """As `whiten`, of many residuals on all cores; not for what itself runs beside others."""
-        noise.prepare(self.drive, self.valid)
-        return in_same_parts(lambda part: self.whiten(noise, part), residuals)
-
     def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
         """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
         raw = self.residuals_of(unit, sets)
-        white = self.whiten_many(noise, raw)
+        white = self.whiten(noise, raw)
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)

@@ -1,65 +1,83 @@
-"""Work on all cores: lanes of one call side by side, and independent items each by themselves."""
+"""Independent items on all cores, each in a process that is forked for it and so knows all that this one knows.
 
-import functools
+A search is thousands of short calls of machine code. Threads that hand the interpreter to each other after each of them
+took longer on two cores than one takes by itself.
+"""
+
+import itertools
+import multiprocessing
 import os
+import signal
+import sys
+import warnings
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from typing import Any, TypeVar
 
-import numpy as np
+from tractexp.discrepancy.effort import Effort
+from tractexp.errors import UserError
+from tractexp.workers import end_with_parent
 
-from tractexp.kernel.layout import LANES
-from tractexp.progress import Counting, uncounted
-
-FEWEST = 16  # lanes that are worth a call
+FORKS = sys.platform == "linux"  # elsewhere it is not safe, or not there
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+_calls: dict[int, Callable[[int], Any]] = {}  # what forked processes do with the position of an item, by number
+_numbers = itertools.count()
 
 
 def cores() -> int:
-    """How many this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    """How many this process may use: one where it was forked itself, or may have no children."""
+    if not FORKS or _calls or multiprocessing.current_process().daemon:
+        return 1
+    return len(os.sched_getaffinity(0))
 
 
-def side_by_side(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
-    """`function` of lanes (n, ...), on all cores: they do not know of each other, so the bits are the same."""
-    return _in_parts(function, lanes, min(cores(), -(-len(lanes) // FEWEST)))
+def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort: Effort) -> list[Result]:
+    """`function` of each item, on all cores. What it returns is data; what it does to objects of this process is lost,
+    but for what it spends of an effort.
 
-
-def in_same_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray) -> np.ndarray:
-    """As `side_by_side`, of a function whose last bits depend on how many lanes it is given, as matrix products do.
-
-    How lanes are parted does not depend on the number of cores, so that no result does.
+    Raises `UserError` where a process is killed.
     """
-    return _in_parts(function, lanes, max(-(-len(lanes) // LANES), min(2, -(-len(lanes) // FEWEST))))
+    processes = min(cores(), len(items))
+    with effort.parts(len(items)) as ended:
+        if processes < 2:
+            return [_counted(function(item), ended) for item in items]
+
+        def call(k: int) -> tuple[Result, list[int]]:
+            before = effort.counts
+            result = function(items[k])
+            return result, effort.spent_since(before)
+
+        number, results = next(_numbers), list[Result]()
+        _calls[number] = call
+        try:
+            with warnings.catch_warnings():
+                warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
+                with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin) as pool:
+                    for result, spent in pool.map(_call, itertools.repeat(number), range(len(items))):
+                        effort.add(spent)
+                        results.append(_counted(result, ended))
+        except BrokenProcessPool as error:
+            raise UserError(
+                "a process at work on a part of this step was killed, as systems do where memory is short; close other"
+                " programs, or allow this one fewer cores (taskset)"
+            ) from error
+        finally:
+            del _calls[number]
+        return results
 
 
-def _in_parts(function: Callable[[np.ndarray], np.ndarray], lanes: np.ndarray, parts: int) -> np.ndarray:
-    if parts < 2:
-        return function(lanes)
-    return np.concatenate(list(_threads().map(function, np.array_split(lanes, parts))))
+def _counted(result: Result, ended: Callable[[], None]) -> Result:
+    ended()
+    return result
 
 
-def each_apart(
-    function: Callable[[Item], Result], items: Sequence[Item], parts: Callable[[int], Counting] = uncounted
-) -> list[Result]:
-    """`function` of each item, on all cores. It may itself work `side_by_side`, whose threads are others.
-
-    `parts` (`Effort.parts`) counts the items that have ended.
-    """
-    with parts(len(items)) as ended:
-
-        def counted(item: Item) -> Result:
-            result = function(item)
-            ended()
-            return result
-
-        if min(cores(), len(items)) < 2:
-            return [counted(item) for item in items]
-        with ThreadPoolExecutor(cores()) as pool:
-            return list(pool.map(counted, items))
+def _call(number: int, k: int) -> Any:
+    return _calls[number](k)
 
 
-@functools.cache
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor()
+def _begin() -> None:
+    """End by Ctrl-C without a word, and with the parent, even where it is killed."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    end_with_parent()

@@ -1,7 +1,7 @@
 """What an investigation has spent so far, and the lines that say how far it is."""
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Lock, Thread
 
@@ -55,6 +55,22 @@ class Effort:
             yield counted.end
         finally:
             self._parts.remove(counted)
+
+    @property
+    def counts(self) -> list[int]:
+        """Simulations of each part of the work."""
+        return [effort.simulations for effort in self._all]
+
+    def spent_since(self, counts: Sequence[int]) -> list[int]:
+        """Simulations of each of those parts since; those of parts that were begun since are this one's."""
+        spent = [now - before for now, before in zip(self.counts, counts, strict=False)]
+        spent[self._all.index(self)] += sum(self.counts[len(counts) :])
+        return spent
+
+    def add(self, spent: Sequence[int]) -> None:
+        """Count what another process has spent on each part."""
+        for effort, simulations in zip(self._all, spent, strict=True):
+            effort.spend(simulations)
 
     def spend(self, simulations: int) -> None:
         with self._lock:

@@ -11,6 +11,8 @@ import numpy as np
 # an exact descent errs by a fiftieth of what a parameter costs by Akaike's criterion, a rough one by a seventh.
 ROUGH_DESCENT = (12, 0.3)
 EXACT_DESCENT = (40, 0.02)
+# Descents that take their steps in the same calls: few enough for several cores to have some each.
+TOGETHER = 4
 # Iterations after which the worse half of a set's starts is given up.
 FIRST_ITERATIONS = 4
 

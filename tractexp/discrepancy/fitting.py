@@ -137,14 +137,14 @@ def wide_refits(
 
     What is far behind the best of `others` then is given up.
     """
-    begun = each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort.parts)
+    begun = each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort)
     begun.sort(key=lambda fits: fits[0].cost)
     if costs := [fit.cost for fit in others]:
         begun = [fits for fits in begun if fits[0].cost <= min(costs) + _far(costs)]
     begun = begun[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
     search = lambda starts: wide_refit(context, noise, starts)  # noqa: E731
-    return best_of(itertools.chain(*each_apart(search, again, context.effort.parts)))
+    return best_of(itertools.chain(*each_apart(search, again, context.effort)))
 
 
 def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
@@ -195,9 +195,11 @@ def no_worse_than_subsets(
 def _descended(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
 ) -> list[Refit]:
-    """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was."""
-    spent = 0
-    at = context.coordinates
+    """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was.
+
+    `TOGETHER` of them take their steps in the same calls, whatever the number of cores: a fit's last bits hang on it.
+    """
+    at, spent = context.coordinates, context.effort.total
     measured, prior = _with_prior(context, [names for names, _ in wanted], faults)
     always = [*at.base, *at.before, *measured]
     columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
@@ -206,23 +208,25 @@ def _descended(
         table[lane, : len(free)] = free
     starts = np.array([np.r_[start, 0.0] for _, start in wanted])  # the last column takes what no lane has
 
-    def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
-        nonlocal spent
-        spent += len(x)
-        whole = starts[lanes]
-        np.put_along_axis(whole, table[lanes], x, axis=1)
-        return context.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in lanes])
+    def descended(group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
+            whole = starts[group[lanes]]
+            np.put_along_axis(whole, table[group[lanes]], x, axis=1)
+            return context.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in group[lanes]])
 
-    def descended() -> tuple[np.ndarray, ...]:
-        begin = np.take_along_axis(starts, table, axis=1)
-        with context.effort.parts(len(wanted)) as ended:
-            done = descend(rows, begin, table == at.dimension, *effort, context.apart, ended=ended)
-        return done.unit, done.deviance, np.array(spent)
+        begin = np.take_along_axis(starts[group], table[group], axis=1)
+        done = descend(rows, begin, table[group] == at.dimension, *effort, context.apart)
+        return done.unit, done.deviance
+
+    def all_descended() -> tuple[np.ndarray, ...]:
+        groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.TOGETHER))
+        units, deviances = zip(*each_apart(descended, groups, context.effort), strict=True)
+        return np.concatenate(units), np.concatenate(deviances), np.array(context.effort.total - spent)
 
     wants = [(tuple(names), unit) for names, unit in wanted]
     key = context.digest and store.key(context.digest, noise, wants, prior, effort)
-    unit, deviance, simulations = store.DESCENTS.arrays(key, descended)
-    context.effort.spend(int(simulations) - spent)  # of what was made before, what it took then
+    unit, deviance, simulations = store.DESCENTS.arrays(key, all_descended)
+    context.effort.spend(int(simulations) + spent - context.effort.total)  # of what was made before, what it took then
     np.put_along_axis(starts, table, unit, axis=1)
     return [
         Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(deviance[lane]), len(at.parameters(names)))

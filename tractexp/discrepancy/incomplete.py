@@ -5,7 +5,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
 from tractexp.discrepancy.fitting import Refit, refit
@@ -101,7 +100,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
         lowered = weighed.bare.deviance - fit.deviance
         return Rival(fit, lowered, fit.cost - chosen[0].cost, rejected=False, tests=tests)
 
-    retained = each_apart(rival, chosen, explained.base.context.effort.parts)
+    retained = [rival(c) for c in chosen]
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
     return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.cores import side_by_side
 from tractexp.discrepancy.injection import PUSHES, Injection
 from tractexp.domain import domain_of
 from tractexp.identification.likelihood import Likelihood
@@ -124,13 +123,7 @@ class Kernels:
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
         """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
         problem, free = self.at(names, unit)
-        values = problem.full(free)
-
-        def simulated(part: np.ndarray) -> np.ndarray:
-            response = problem.model.simulate(drive, part, self.substeps)
-            return response.by_candidate
-
-        return side_by_side(simulated, values)
+        return problem.model.simulate(drive, problem.full(free), self.substeps).by_candidate
 
     def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
         """The likelihood by one kernel, and where its coordinates stand among all."""

@@ -208,7 +208,7 @@ def predictions(explained: Explanations, events: Sequence[Event]) -> ErrorPredic
     noise = residual_noise(explained.base.context, explained.chosen)
     there = context.on(Records.of(events, context.records.window))
     fits = {f.names: f for f in _fits(context, explained, noise)}
-    predicted = each_apart(lambda f: _predicted(there, f), list(fits.values()), context.effort.parts)
+    predicted = each_apart(lambda f: _predicted(there, f), list(fits.values()), context.effort)
     sets = dict(zip(fits, predicted, strict=True))
     result = ErrorPredictions(context.catalogue, sets, there, noise)
     best = result.ranked(max(map(len, fits)), context.criteria.ahead)[:1]

@@ -7,7 +7,6 @@ into some balance, or other parameters in each event, would still explain.
 
 from dataclasses import dataclass, replace
 
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Refit, refit
@@ -55,7 +54,7 @@ def survivors(explained: Explanations, seed: int) -> Survivors:
         tests = last if k == 0 else examined(explained.base.quiet, fit, last.noise, seed + 100 + k, plain=True)
         return replace(left[k], tests=tests)
 
-    retained = each_apart(tested, range(len(left)), explained.base.context.effort.parts)
+    retained = [tested(k) for k in range(len(left))]
     by_name = {r.fit.names: r for r in retained}
     return Survivors(explained, tuple(retained), tuple(by_name.get(r.fit.names, r) for r in everyone))
 

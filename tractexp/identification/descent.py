@@ -148,7 +148,6 @@ def descend(
     apart: SeparableColumns = NOT_SEPARABLE,
     *,
     central: bool = False,
-    ended: Callable[[], None] = lambda: None,
 ) -> Descent:
     """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
 
@@ -157,8 +156,7 @@ def descend(
     box rests for that step. Source: Marquardt 1963, with several dampings per step.
 
     Forward differences are enough for an estimate, whose standard errors are far wider than what they truncate. The
-    minimum itself, to more than four digits, takes `central` ones. `ended` is called at the end of each lane that comes
-    to one.
+    minimum itself, to more than four digits, takes `central` ones.
 
     Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
@@ -189,8 +187,6 @@ def descend(
         hopeless = ~better & (damping[lanes] >= MOST_DAMPING)
         done = (better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance))
         active[lanes] = ~done
-        for _ in lanes[done]:
-            ended()
     return Descent(unit, deviance, spent)
 
 

@@ -83,6 +83,11 @@ class Likelihood:
         """Values of P and Q that count."""
         return int(np.count_nonzero(self.valid))
 
+    @functools.cached_property
+    def gaps(self) -> bool:
+        """Whether a sample does not count."""
+        return not self.valid.all()
+
     @property
     def lower(self) -> np.ndarray:
         before = (self.problem.drive.before - self._reach()).ravel() if self.initial_power else []
@@ -120,9 +125,11 @@ class Likelihood:
         if self.initial_power:
             before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2).swapaxes(0, 1)
         response = problem.model.simulate(drive, problem.candidates(self.values(unit)), problem.step.substeps, before)
-        rows = response.by_candidate - drive.measured
-        with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
-            rows *= self.valid
+        rows = response.by_candidate
+        rows -= drive.measured
+        if self.gaps:
+            with np.errstate(invalid="ignore"):  # what diverged is no number in gaps either
+                rows *= self.valid
         for e, missed in enumerate(response.miss > 0):
             rows[missed, :, drive.part(e)] = np.nan
         return rows

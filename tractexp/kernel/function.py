@@ -77,6 +77,10 @@ class Function:
         """The integer there, of an array that does not change."""
         return self.value(f"load i64, ptr {self.value(f'getelementptr i64, ptr {address}, i64 {index}')}, align 8")
 
+    def address(self, addresses: str, index: int) -> str:
+        """The address there, of an array that does not change."""
+        return self.value(f"load ptr, ptr {self.value(f'getelementptr ptr, ptr {addresses}, i64 {index}')}, align 8")
+
     # Control
 
     @contextmanager

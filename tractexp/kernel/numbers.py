@@ -140,12 +140,28 @@ class Numbers:
     def lane(self, a: str, k: int) -> str:
         return a if self.width == 1 else self.f.value(f"extractelement {self.kind} {a}, i64 {k}")
 
-    def load(self, address: str) -> str:
-        """A vector from where whole vectors lie."""
-        return self.f.fresh(f"load {self.kind}, ptr {address}, align {8 * self.width}")
+    def load(self, address: str, alignment: int | None = None) -> str:
+        """A vector from where whole vectors lie, or at an `alignment` [B]."""
+        return self.f.fresh(f"load {self.kind}, ptr {address}, align {alignment or 8 * self.width}")
 
-    def store(self, a: str, address: str) -> None:
-        self.f.do(f"store {self.kind} {a}, ptr {address}, align {8 * self.width}")
+    def store(self, a: str, address: str, alignment: int | None = None) -> None:
+        self.f.do(f"store {self.kind} {a}, ptr {address}, align {alignment or 8 * self.width}")
+
+    def ramp(self, first: str) -> str:
+        """The doubles `first` (an integer), `first` + 1, ... in the lanes."""
+        return self.f.value(
+            f"sitofp {self.integers} {self.integer('add', self._splat(first), self._indices)} to {self.kind}"
+        )
+
+    def prefix_sums(self, a: str) -> str:
+        """The sum of each lane and all before it."""
+        k = 1
+        while k < self.width:
+            lanes = ", ".join(f"i32 {self.width + lane - k if lane >= k else lane}" for lane in range(self.width))
+            moved = f"shufflevector {self.kind} zeroinitializer, {self.kind} {a}, <{self.width} x i32> <{lanes}>"
+            a = self.add(a, self.f.value(moved), ORDERED)
+            k *= 2
+        return a
 
     def part(self, address: str, left: str) -> str:
         """The next samples of an array that does not change, wherever they lie: those that are `left`, at most all."""
@@ -166,8 +182,13 @@ class Numbers:
 
     def _counted(self, left: str) -> str:
         """The first `left` lanes."""
+        return self.f.value(f"icmp slt {self.integers} {self._indices}, {self._splat(left)}")
+
+    @property
+    def _indices(self) -> str:
+        return f"<{', '.join(f'i64 {k}' for k in range(self.width))}>"
+
+    def _splat(self, integer: str) -> str:
         kind = self.integers
-        first = self.f.value(f"insertelement {kind} poison, i64 {left}, i64 0")
-        wide = self.f.value(f"shufflevector {kind} {first}, {kind} poison, <{self.width} x i32> zeroinitializer")
-        lanes = ", ".join(f"i64 {k}" for k in range(self.width))
-        return self.f.value(f"icmp slt {kind} <{lanes}>, {wide}")
+        first = self.f.value(f"insertelement {kind} poison, i64 {integer}, i64 0")
+        return self.f.value(f"shufflevector {kind} {first}, {kind} poison, <{self.width} x i32> zeroinitializer")

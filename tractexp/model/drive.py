@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tractexp.kernel.layout import EVENT
+from tractexp.kernel.layout import EVENT, INPUTS
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
 OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
@@ -173,6 +173,11 @@ class Drive:
     def spoken(self) -> tuple[str, ...]:
         """The same as a page says it: P and Q, or which current."""
         return tuple(IN_WORDS.get(name, name) for name in self.names)
+
+    @property
+    def of_waves(self) -> bool:
+        """Whether it is of sampled waveforms."""
+        return len(self.inputs) == len(INPUTS)
 
     @property
     def channels(self) -> int:

@@ -225,4 +225,4 @@ class Measurement(Effect):
 
     @abstractmethod
     def observe(self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]) -> np.ndarray:
-        """P and Q (2, n, N) as the recorder would show them; `values` {parameter: (E, n)}."""
+        """P and Q (2, n, N) as the recorder would show them, in place or anew; `values` {parameter: (E, n)}."""

@@ -4,12 +4,15 @@ Recorded power is rarely white: a phasor window, a filter or the load itself cor
 them as independent makes standard errors too small. An autoregressive model of the residual repairs that.
 """
 
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from tractexp.errors import UserError
+from tractexp.kernel.stencil import Stencil
 from tractexp.record.change import runs
 
 HIGHEST_ORDER = 16
@@ -40,26 +43,42 @@ class Autoregression:
         """The same color, `factor` times as loud."""
         return Autoregression(self.coefficients, self.deviation * factor)
 
-    def whiten(self, rows: np.ndarray, valid: np.ndarray) -> np.ndarray:
-        """Rows (..., N) to prediction errors of unit variance (..., N); 0 where `valid` (N,) is False.
+    def whiten(self, rows: np.ndarray, valid: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+        """Rows (..., N) to prediction errors of unit variance (..., N), written to `out` where it is given; 0 where
+        `valid` (N,) is False.
 
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
         """
-        if self.white:
-            return (rows if valid.all() else np.where(valid, rows, 0.0)) / self.deviation[0]
-        history = np.minimum(_run_lengths(valid), self.order)
-        white = np.zeros_like(rows)
-        for k in range(self.order + 1):
-            at = np.flatnonzero(valid & (history == k))
-            if not len(at):
-                continue
-            whole = len(at) == at[-1] - at[0] + 1  # consecutive samples are read without a copy
-            pick = (lambda lag, at=at: slice(at[0] - lag, at[-1] + 1 - lag)) if whole else (lambda lag, at=at: at - lag)
-            error = rows[..., pick(0)].copy()
-            for lag in range(1, k + 1):
-                error -= self.coefficients[k, lag - 1] * rows[..., pick(lag)]
-            white[..., pick(0)] = error / self.deviation[k]
-        return white
+        out = np.empty_like(rows) if out is None else out
+        out[..., ~valid] = 0.0
+        if parts := runs(valid):
+            self._whiten(np.atleast_2d(rows), parts, np.atleast_2d(out))
+        return out
+
+    def _whiten(self, rows: np.ndarray, parts: Sequence[slice], out: np.ndarray) -> None:
+        """The same of parts of rows (n, N) without gaps, each sample from its predecessors there."""
+        weights, p = np.r_[1.0, -self.coefficients[-1]] / self.deviation[-1], self.order
+        if self.white or np.iscomplexobj(rows):
+            for part in parts:
+                y, white = rows[:, part], out[:, part]
+                np.multiply(y, weights[0], out=white)
+                for lag in range(1, p + 1):
+                    white[:, lag:] += weights[lag] * y[:, :-lag]
+        else:
+            taps = {f"c{lag}": weight for lag, weight in enumerate(weights)}
+            filtered(p)(out[None], parts, np.array(0), y=rows[None], **taps)
+        for part in parts if p else ():  # of the first few fewer are known
+            first = rows[:, part][:, :p]
+            known = self._beginning[: first.shape[1], : first.shape[1]]
+            out[:, part][:, :p] = np.einsum("nj,kj->nk", first, known)
+
+    @functools.cached_property
+    def _beginning(self) -> np.ndarray:
+        """What makes prediction errors (p,) of the first p samples."""
+        matrix = np.eye(self.order, dtype=self.coefficients.dtype)
+        for k in range(1, self.order):
+            matrix[k, :k] = -self.coefficients[k, k - 1 :: -1]
+        return matrix / self.deviation[: self.order, None]
 
     def recurring(self, shocks: np.ndarray) -> np.ndarray:
         """What the recurrence of full order makes of shocks (n, N) from rest: the banded system that whitens."""
@@ -67,6 +86,16 @@ class Autoregression:
 
         bands = np.repeat(np.r_[1.0, -self.coefficients[-1]][:, None], shocks.shape[1], axis=1)
         return solve_banded((self.order, 0), bands, shocks.T).T
+
+
+@functools.cache
+def filtered(order: int) -> Stencil:
+    """The sum of the samples 0, 1, ... `order` before each, times the numbers c0, c1, ... of their row."""
+
+    def expression(y: Callable[[int], Any], **c: Any) -> Any:
+        return sum(c[f"c{lag}"] * y(-lag) for lag in range(order + 1))
+
+    return Stencil(expression, rows=("y",), numbers=[f"c{lag}" for lag in range(order + 1)])
 
 
 def white_noise(deviation: float) -> Autoregression:
@@ -122,11 +151,3 @@ def of_orders(table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float
 def stretches(values: np.ndarray, valid: np.ndarray) -> list[np.ndarray]:
     """The unbroken parts of `values` (N,)."""
     return [values[part] for part in runs(valid)]
-
-
-def _run_lengths(valid: np.ndarray) -> np.ndarray:
-    """How many known samples directly precede each sample, (N,)."""
-    index = np.arange(len(valid))
-    last_gap = np.maximum.accumulate(np.where(valid, -1, index))
-    before = np.concatenate(([-1], last_gap[:-1]))
-    return index - 1 - before

@@ -82,14 +82,13 @@ class Noise:
     def whiten(self, residuals: np.ndarray, drive: Drive, valid: np.ndarray) -> np.ndarray:
         """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C, N) are 0."""
         valid = self._together(valid, drive)
-        events = []
+        rows = np.empty(residuals.shape)
         with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
             mixed = self._mixed(residuals)
             for e in range(drive.events):
                 part = drive.part(e)
-                white = self._fast(mixed[:, :, part], valid[:, part], e)
-                events.append(self._without_shapes(white, valid[:, part], part, e))
-        rows = events[0] if len(events) == 1 else np.concatenate(events, axis=2)
+                self._fast(mixed[:, :, part], valid[:, part], e, rows[:, :, part])
+                self._shrink(rows[:, :, part], valid[:, part], part, e)
         return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
 
     def prepare(self, drive: Drive, valid: np.ndarray) -> None:
@@ -174,33 +173,34 @@ class Noise:
         """Channels (n, C, N) mixed so that their noise is independent."""
         return rows if self.mix is None else self.mix @ rows
 
-    def _fast(self, mixed: np.ndarray, valid: np.ndarray, event: int) -> np.ndarray:
-        """Mixed channels (n, C, samples) of one event without the color of the fast noise."""
-        pair, rows, alone = self.pair(event), np.empty(mixed.shape), 0
+    def _fast(self, mixed: np.ndarray, valid: np.ndarray, event: int, out: np.ndarray) -> np.ndarray:
+        """Mixed channels (n, C, samples) of one event without the color of the fast noise, in `out`."""
+        pair, alone = self.pair(event), 0
         if self.vector:
             white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], valid[0])
-            rows[:, 0], rows[:, 1], alone = np.real(white), np.imag(white), 2
+            out[:, 0], out[:, 1], alone = np.real(white), np.imag(white), 2
         for c, channel in enumerate(pair[alone:], alone):
-            rows[:, c] = channel.whiten(mixed[:, c], valid[c])
-        return rows
+            channel.whiten(mixed[:, c], valid[c], out[:, c])
+        return out
 
-    def _without_shapes(self, white: np.ndarray, valid: np.ndarray, part: slice, event: int) -> np.ndarray:
-        """Whitened rows (n, C, samples) of an event without the excess variance of its shapes.
+    def _shrink(self, white: np.ndarray, valid: np.ndarray, part: slice, event: int) -> None:
+        """Take the excess variance of its shapes out of whitened rows (n, C, samples) of an event.
 
         With B the whitened shapes, (I + B'B)^(-1/2) by their singular vectors.
         """
         if (shrinkage := self._shrinkage(valid, part, event)) is None:
-            return white
+            return
         basis, share = shrinkage
         flat = white.reshape(len(white), math.prod(white.shape[1:]))
-        return (flat - ((flat @ basis.T) * share) @ basis).reshape(white.shape)
+        white -= (((flat @ basis.T) * share) @ basis).reshape(white.shape)
 
     def _shrinkage(self, valid: np.ndarray, part: slice, event: int) -> Shrunk | None:
         """The shapes of an event as whitening takes them out, decomposed once; None where there are none."""
         if self.random_walk is None and self.input_modes is None:
             return None
         if event not in self._shrunk:
-            self._shrunk[event] = _shrunk(self._fast(self._shapes(part, event), valid, event))
+            shapes = self._shapes(part, event)
+            self._shrunk[event] = _shrunk(self._fast(shapes, valid, event, np.empty_like(shapes)))
         return self._shrunk[event]
 
     def _shapes(self, part: slice, event: int) -> np.ndarray:

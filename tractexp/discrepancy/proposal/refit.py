@@ -147,7 +147,7 @@ def _searched_anew(
         return wide_refit(context, noise, [regridded(context, noise, fit), (fit.names, fit.unit)], again=again)
 
     shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
-    return best_of([*fits, *itertools.chain(*each_apart(anew, shaped, context.effort.parts))])
+    return best_of([*fits, *itertools.chain(*each_apart(anew, shaped, context.effort))])
 
 
 def siblings(of: Term) -> list[Term]:

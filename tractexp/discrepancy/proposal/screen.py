@@ -117,7 +117,7 @@ def _scores(
     """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
     ground.noise.prepare(ground.context.drive, ground.context.valid)
     scored = lambda batch: _batch(ground, batch, noise)  # noqa: E731
-    return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort.parts))
+    return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort))
 
 
 def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:

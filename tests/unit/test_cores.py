@@ -1,0 +1,62 @@
+"""Independent items on all cores: forked processes that know all of this one, and tell what they spent."""
+
+import os
+import signal
+from contextlib import contextmanager
+
+import pytest
+
+from tractexp.discrepancy import cores
+from tractexp.discrepancy.cores import each_apart
+from tractexp.discrepancy.effort import Effort
+from tractexp.errors import UserError
+
+forked = pytest.mark.skipif(not cores.FORKS, reason="processes are forked on Linux only")
+
+
+@pytest.mark.parametrize("number", [1, 3])
+def test_items_are_counted_as_they_end_and_what_they_spend_is_told_part_by_part(number, monkeypatch):
+    monkeypatch.setattr(cores, "cores", lambda: number)
+    effort, told = Effort(), []
+    part, parts = effort.anew(), effort.parts
+
+    @contextmanager
+    def counted(total):
+        with parts(total) as ended:
+            yield lambda: (told.append(total), ended())
+
+    def work(k):
+        effort.spend(k)
+        part.spend(10 * k)
+        part.anew().spend(100)  # a part that the caller does not know yet is the item's
+        return k, os.getpid()
+
+    monkeypatch.setattr(effort, "parts", counted)
+    results = each_apart(work, [1, 2, 3, 4], effort)
+    assert [k for k, _ in results] == [1, 2, 3, 4]
+    assert told == [4] * 4
+    assert effort.total == 10 + 100 + 400
+    assert part.simulations == 100
+    assert (os.getpid() in {pid for _, pid in results}) == (number == 1 or not cores.FORKS)
+
+
+@forked
+def test_an_item_that_has_items_does_them_one_after_the_other(monkeypatch):
+    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 1})
+    pids = each_apart(lambda k: each_apart(lambda _: os.getpid(), [1, 2], Effort()), [1, 2], Effort())
+    assert all(len({*inner}) == 1 for inner in pids)
+    assert cores.cores() == 2
+
+
+@forked
+def test_an_error_of_an_item_is_its_own_and_a_killed_process_is_a_sentence(monkeypatch):
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+
+    def refuse(k):
+        raise UserError(f"item {k} is not allowed; leave it out")
+
+    with pytest.raises(UserError, match="item 1 is not allowed; leave it out"):
+        each_apart(refuse, [1, 2], Effort())
+    with pytest.raises(UserError, match="killed, as systems do where memory is short; close other programs"):
+        each_apart(lambda k: os.kill(os.getpid(), signal.SIGKILL), [1, 2], Effort())
+    assert each_apart(lambda k: k + 1, [1, 2], Effort()) == [2, 3]
