@@ -1,5 +1,6 @@
 """What an investigation has spent so far, and the lines that say how far it is."""
 
+import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -62,15 +63,15 @@ class Effort:
         return [effort.simulations for effort in self._all]
 
     def spent_since(self, counts: Sequence[int]) -> list[int]:
-        """Simulations of each of those parts since; those of parts that were begun since are this one's."""
-        spent = [now - before for now, before in zip(self.counts, counts, strict=False)]
-        spent[self._all.index(self)] += sum(self.counts[len(counts) :])
-        return spent
+        """Simulations of each of those parts since, and of parts that were begun since."""
+        return [now - before for now, before in itertools.zip_longest(self.counts, counts, fillvalue=0)]
 
     def add(self, spent: Sequence[int]) -> None:
-        """Count what another process has spent on each part."""
-        for effort, simulations in zip(self._all, spent, strict=True):
+        """Count what another process has spent on each part; what this one does not know was begun for this part."""
+        known = tuple(self._all)
+        for effort, simulations in zip(known, spent, strict=False):
             effort.spend(simulations)
+        self.spend(sum(spent[len(known) :]))
 
     def spend(self, simulations: int) -> None:
         with self._lock:
