@@ -8,8 +8,10 @@ import signal
 import threading
 import time
 
+import matplotlib.figure  # noqa: F401  an import that a signal ends would leave half a package to the tests that follow
 import numpy as np
 import pytest
+import sympy  # noqa: F401
 from command_line import run_command
 
 from tractexp.__main__ import terminated

@@ -74,9 +74,11 @@ class AllEvents:
 
     def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
-        by_name = {fit.names: fit for fit in alone}
-        fits = best_of(better for fit in alone for better in self._refitted(fit, anew=anew))
-        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits, self.context.effort)
+        by_name, effort = {fit.names: fit for fit in alone}, self.context.effort
+        _ = self.plain  # once, before processes are forked
+        refitted = each_apart(lambda fit: self._refitted(fit, anew=anew), alone, effort)
+        fits = best_of(itertools.chain(*refitted))
+        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits, effort)
 
     def undoubted(self, fits: Sequence[Refit]) -> bool:
         """Whether there is one explanation only, a single effect by the textbook's law."""

@@ -4,7 +4,7 @@ import itertools
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from threading import Event, Lock, Thread
+from threading import Event, Thread
 
 from tractexp.progress import remaining
 
@@ -15,12 +15,10 @@ class Parts:
     """How many parts of a step have ended, and how long the others take."""
 
     def __init__(self, total: int):
-        self.total, self.ended = total, 0
-        self._begun, self._lock = time.perf_counter(), Lock()
+        self.total, self.ended, self._begun = total, 0, time.perf_counter()
 
     def end(self) -> None:
-        with self._lock:
-            self.ended += 1
+        self.ended += 1
 
     def __str__(self) -> str:
         rest = remaining(time.perf_counter() - self._begun, self.ended / self.total)
@@ -28,11 +26,10 @@ class Parts:
 
 
 class Effort:
-    """Counts simulations and passes on what each step says. Used by many threads at once."""
+    """Counts simulations and passes on what each step says."""
 
     def __init__(self, tell: Callable[[str], None] = lambda line: None):
-        self.simulations, self._lock = 0, Lock()
-        self._tell, self._all = tell, list[Effort]((self,))
+        self.simulations, self._tell, self._all = 0, tell, list[Effort]((self,))
         self._step, self._said, self._parts = "", time.perf_counter(), list[Parts]()
 
     def anew(self) -> "Effort":
@@ -74,8 +71,7 @@ class Effort:
         self.spend(sum(spent[len(known) :]))
 
     def spend(self, simulations: int) -> None:
-        with self._lock:
-            self.simulations += simulations
+        self.simulations += simulations
 
     @property
     def total(self) -> int:

@@ -6,7 +6,6 @@ effect that makes every other dear. All give the same response up to rounding.
 """
 
 import functools
-import threading
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -96,7 +95,6 @@ class Kernels:
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
         self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {}
-        self._one_at_a_time = threading.Lock()
 
     def _fewest(self) -> int:
         """Steps that the models need by which effects are tested, every effect at its null: some are stiff."""
@@ -127,14 +125,13 @@ class Kernels:
 
     def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
         """The likelihood by one kernel, and where its coordinates stand among all."""
-        with self._one_at_a_time:
-            if key not in self._likelihoods:
-                problem = self._problem(key, self.substeps)
-                unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
-                own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
-                columns = np.r_[own, len(self._column) + before].astype(int)
-                self._likelihoods[key] = Likelihood.of(problem, unweighted), columns
-            return self._likelihoods[key]
+        if key not in self._likelihoods:
+            problem = self._problem(key, self.substeps)
+            unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
+            own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
+            columns = np.r_[own, len(self._column) + before].astype(int)
+            self._likelihoods[key] = Likelihood.of(problem, unweighted), columns
+        return self._likelihoods[key]
 
     def _problem(self, key: Key, substeps: int) -> Problem:
         model = self.family.of(key)

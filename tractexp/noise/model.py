@@ -92,7 +92,7 @@ class Noise:
         return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
 
     def prepare(self, drive: Drive, valid: np.ndarray) -> None:
-        """Make ready what `whiten` keeps of the shapes, once, where many threads are about to call it."""
+        """Make ready what `whiten` keeps of the shapes, once, where several processes are about to be forked."""
         valid = self._together(valid, drive)
         for e in range(drive.events):
             self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
