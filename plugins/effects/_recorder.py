@@ -14,7 +14,7 @@ def earlier(power, drive, delay):
     slope, and stays there.
     """
     whole, part = _steps(delay / drive.event[:, [STEP]])
-    _change(CUBIC, power, drive, delay, {"shift": -whole}, {"r": part})
+    _change(CUBIC, power, drive, {"shift": -whole}, {"r": part})
 
 
 def _cubic(y, r):
@@ -38,7 +38,7 @@ def moved(power, drive, delay, quiet):
     follow = rise / (rise**2 + (quiet * drive.event[of_sample, EVENT.index("U0")]) ** 2)
     shared = {"U": U, "each": 1 / U, "slope": drive.inputs[INPUTS.index("U_rate")] * step, "follow": follow}
     shared["place"] = np.arange(len(U), dtype=float)
-    _change(CURRENT, power, drive, delay, {"shift": -whole}, {"r": 1 - part}, **shared)
+    _change(CURRENT, power, drive, {"shift": -whole}, {"r": 1 - part}, **shared)
 
 
 def _current(y, U, each, slope, follow, place, r):
@@ -62,7 +62,7 @@ def _current(y, U, each, slope, follow, place, r):
 def grown(power, drive, rate):
     """Make of power (C, n, N) what it is if it changes by `rate` (E, C, n) [1/s] from the first sample of an event."""
     at_once = np.zeros(rate.shape, dtype=int)
-    _change(GROWN, power, drive, rate, {"shift": at_once}, {"rate": rate}, t=drive.inputs[INPUTS.index("t")])
+    _change(GROWN, power, drive, {"shift": at_once}, {"rate": rate}, t=drive.inputs[INPUTS.index("t")])
 
 
 def _grown(y, t, rate):
@@ -76,16 +76,18 @@ def averaged(power, drive, window):
     """
     length = window / drive.event[:, [STEP]]
     whole, part = _steps(length / 2)
-    numbers = {"r": part, "each": 1 / np.where(length > 0, length, 1.0)}
-    _change(MEAN, power, drive, window, {"ahead": whole, "behind": -whole}, numbers)
+    each = np.divide(1, length, out=np.zeros_like(length), where=length > 0)
+    _change(MEAN, power, drive, {"ahead": whole, "behind": -whole}, {"r": part, "each": each})
 
 
 def _mean(y, total, r, each):
-    """Trapezia between whole samples, of sums up to each, and a part of one more at each end."""
+    """Trapezia between whole samples, of sums up to each, and a part of one more at each end; `each` is 0 for none."""
+    from sympy import Piecewise
+
     ahead, behind = y(0, "ahead"), y(0, "behind")
     whole = total(0, "ahead") - total(0, "behind") + (behind - ahead) / 2
     ends = r * (ahead + behind) + r * r / 2 * (y(1, "ahead") - ahead + y(-1, "behind") - behind)
-    return (whole + ends) * each
+    return Piecewise((ahead, each <= 0), ((whole + ends) * each, True))
 
 
 GROWN = Stencil(_grown, rows=("y",), shared=("t",), numbers=("rate",))
@@ -100,12 +102,8 @@ def _steps(lag):
     return whole, lag - whole
 
 
-def _change(stencil, power, drive, amount, shifts, numbers, **shared):
-    """Write a stencil in place of the power (C, n, N) of candidates with an amount (E, n) or (E, C, n)."""
-    some = amount.any(axis=tuple(range(amount.ndim - 1)))
-    part = power if some.all() else power[:, some]
-    pick = lambda each: each[..., some] if each.ndim == 3 else each[:, None, some]  # noqa: E731
-    shifts, numbers = ({name: pick(each) for name, each in given.items()} for given in (shifts, numbers))
-    stencil(part, [drive.part(e) for e in range(drive.events)], shifts, y=part, **numbers, **shared)
-    if part is not power:
-        power[:, some] = part
+def _change(stencil, power, drive, shifts, numbers, **shared):
+    """Write a stencil in place of power (C, n, N); shifts and numbers are (E, n), or (E, C, n)."""
+    channels = lambda given: {k: each if each.ndim == 3 else each[:, None] for k, each in given.items()}  # noqa: E731
+    parts = [drive.part(e) for e in range(drive.events)]
+    stencil(power, parts, channels(shifts), y=power, **channels(numbers), **shared)

@@ -638,6 +638,16 @@ def test_measurement_effects_see_each_event_by_itself():
         assert np.array_equal(together.P[:, -alone.P.shape[1] :], alone.P)
 
 
+def test_a_measurement_may_be_off_its_null_in_one_event_only():
+    drive = Drive.of([dip(0.3), dip(0.6)])
+    plain = model().simulate(drive, TRUTH).outputs[:, 0]
+    for name in ("time_skew", "measurement_window", "load_change"):
+        by_event = np.array([[values(name)], [values(name, halfway)]])
+        seen, first = model(name).simulate(drive, by_event).outputs[:, 0], drive.part(0)
+        assert np.abs(seen - plain)[:, first].max() < 1e-13, name
+        assert np.abs(seen - plain)[:, first.stop :].max() > 1e-4, name
+
+
 def test_a_measurement_is_asked_only_for_candidates_off_their_null():
     """Beside them those at their null are the base model's to the last bit, and each is as it is alone."""
     for name in ("time_skew", "measurement_window", "load_change"):
