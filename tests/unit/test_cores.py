@@ -2,14 +2,17 @@
 
 import os
 import signal
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
+import joblib
 import pytest
 
 from tractexp.discrepancy import cores
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.effort import Effort
 from tractexp.errors import UserError
+from tractexp.workers import Workers
 
 forked = pytest.mark.skipif(not cores.FORKS, reason="processes are forked on Linux only")
 
@@ -42,10 +45,24 @@ def test_items_are_counted_as_they_end_and_what_they_spend_is_told_part_by_part(
 
 @forked
 def test_an_item_that_has_items_does_them_one_after_the_other(monkeypatch):
-    monkeypatch.setattr(os, "sched_getaffinity", lambda pid: {0, 1})
+    monkeypatch.setattr(joblib, "cpu_count", lambda: 2)
     pids = each_apart(lambda k: each_apart(lambda _: os.getpid(), [1, 2], Effort()), [1, 2], Effort())
     assert all(len({*inner}) == 1 for inner in pids)
+    assert os.getpid() not in {pid for inner in pids for pid in inner}
+
+
+@forked
+def test_a_thread_and_a_worker_of_a_sweep_fork_nothing(monkeypatch):
+    monkeypatch.setattr(joblib, "cpu_count", lambda: 2)
     assert cores.cores() == 2
+    with ThreadPoolExecutor(1) as pool:
+        assert pool.submit(cores.cores).result() == 1
+    results = Workers(n_jobs=1, apart=True).completed(_cores, [0], 1)
+    assert [count for _, count in results] == [1]
+
+
+def _cores(_):
+    return cores.cores()
 
 
 @forked

@@ -6,9 +6,9 @@ took longer on two cores than one takes by itself.
 
 import itertools
 import multiprocessing
-import os
 import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -27,10 +27,16 @@ _numbers = itertools.count()
 
 
 def cores() -> int:
-    """How many this process may use: one where it was forked itself, or may have no children."""
-    if not FORKS or _calls or multiprocessing.current_process().daemon:
-        return 1
-    return len(os.sched_getaffinity(0))
+    """How many processes an investigation may fork: as many as there are cores for this one, a container's limit
+    considered.
+
+    One in a worker of a sweep, which has its share of the cores, in a process that was forked here, and in a thread:
+    others may hold locks beside it.
+    """
+    from joblib import cpu_count
+
+    beside = multiprocessing.parent_process() or threading.current_thread() is not threading.main_thread()
+    return 1 if beside or not FORKS else cpu_count()
 
 
 def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort: Effort) -> list[Result]:
