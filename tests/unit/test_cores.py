@@ -1,7 +1,10 @@
 """Independent items on all cores: forked processes that know all of this one, and tell what they spent."""
 
+import multiprocessing
 import os
 import signal
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -49,6 +52,17 @@ def test_an_item_that_has_items_does_them_one_after_the_other(monkeypatch):
     pids = each_apart(lambda k: each_apart(lambda _: os.getpid(), [1, 2], Effort()), [1, 2], Effort())
     assert all(len({*inner}) == 1 for inner in pids)
     assert os.getpid() not in {pid for inner in pids for pid in inner}
+
+
+@forked
+def test_an_interrupted_step_waits_for_nobody(monkeypatch):
+    monkeypatch.setattr(cores, "cores", lambda: 2)
+    begun = time.perf_counter()
+    threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        each_apart(lambda _: time.sleep(60), [1, 2, 3], Effort())
+    assert time.perf_counter() - begun < 30
+    assert not multiprocessing.active_children()
 
 
 @forked

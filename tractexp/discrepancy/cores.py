@@ -4,13 +4,14 @@ A search is thousands of short calls of machine code. Threads that hand the inte
 took longer on two cores than one takes by itself.
 """
 
+import contextlib
 import itertools
 import multiprocessing
 import signal
 import sys
 import threading
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
@@ -55,23 +56,37 @@ def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort
             result = function(items[k])
             return result, effort.spent_since(before)
 
-        number, results = next(_numbers), list[Result]()
-        _calls[number] = call
-        try:
-            with warnings.catch_warnings():
-                warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
-                with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin) as pool:
-                    for result, spent in pool.map(_call, itertools.repeat(number), range(len(items))):
-                        effort.add(spent)
-                        results.append(_counted(result, ended))
-        except BrokenProcessPool as error:
-            raise UserError(
-                "a process at work on a part of this step was killed, as systems do where memory is short; close other"
-                " programs, or allow this one fewer cores (taskset)"
-            ) from error
-        finally:
-            del _calls[number]
+        results = list[Result]()
+        with _forked(call, processes) as done:
+            for result, spent in done(range(len(items))):
+                effort.add(spent)
+                results.append(_counted(result, ended))
         return results
+
+
+@contextlib.contextmanager
+def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
+    """Processes that know this call, ended at once where an error or Ctrl-C leaves it."""
+    number, others = next(_numbers), multiprocessing.active_children()
+    _calls[number] = call
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
+            with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin) as pool:
+                try:
+                    yield lambda positions: pool.map(_call, itertools.repeat(number), positions)
+                except BaseException:
+                    for process in multiprocessing.active_children():
+                        if process not in others:
+                            process.kill()
+                    raise
+    except BrokenProcessPool as error:
+        raise UserError(
+            "a process at work on a part of this step was killed, as systems do where memory is short; close other"
+            " programs, or allow this one fewer cores (taskset)"
+        ) from error
+    finally:
+        del _calls[number]
 
 
 def _counted(result: Result, ended: Callable[[], None]) -> Result:
