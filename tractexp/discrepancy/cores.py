@@ -5,7 +5,6 @@ took longer on two cores than one takes by itself.
 """
 
 import contextlib
-import itertools
 import multiprocessing
 import signal
 import sys
@@ -23,8 +22,7 @@ from tractexp.workers import end_with_parent
 FORKS = sys.platform == "linux"  # elsewhere it is not safe, or not there
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-_calls: dict[int, Callable[[int], Any]] = {}  # what forked processes do with the position of an item, by number
-_numbers = itertools.count()
+_calls: list[Callable[[int], Any]] = []  # what this process was forked for: it takes the position of an item
 
 
 def cores() -> int:
@@ -67,14 +65,13 @@ def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort
 @contextlib.contextmanager
 def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
     """Processes that know this call, ended at once where an error or Ctrl-C leaves it."""
-    number, others = next(_numbers), multiprocessing.active_children()
-    _calls[number] = call
+    others = multiprocessing.active_children()
     try:
         with warnings.catch_warnings():
             warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
-            with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin) as pool:
+            with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin, (call,)) as pool:
                 try:
-                    yield lambda positions: pool.map(_call, itertools.repeat(number), positions)
+                    yield lambda positions: pool.map(_call, positions)
                 except BaseException:
                     for process in multiprocessing.active_children():
                         if process not in others:
@@ -85,8 +82,6 @@ def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[It
             "a process at work on a part of this step was killed, as systems do where memory is short; close other"
             " programs, or allow this one fewer cores (taskset)"
         ) from error
-    finally:
-        del _calls[number]
 
 
 def _counted(result: Result, ended: Callable[[], None]) -> Result:
@@ -94,11 +89,12 @@ def _counted(result: Result, ended: Callable[[], None]) -> Result:
     return result
 
 
-def _call(number: int, k: int) -> Any:
-    return _calls[number](k)
+def _call(k: int) -> Any:
+    return _calls[-1](k)
 
 
-def _begin() -> None:
-    """End by Ctrl-C without a word, and with the parent, even where it is killed."""
+def _begin(call: Callable[[int], Any]) -> None:
+    """Keep the call, which a fork need not send; end by Ctrl-C without a word, and with the parent, even killed."""
+    _calls.append(call)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     end_with_parent()
