@@ -80,8 +80,7 @@ def wandering(c, seed, rests=(), walk=0.0):
     """How a load wanders that shows noise and a random walk before its event; None where it is not said to."""
     rng = np.random.default_rng(seed)
     before = rng.normal(size=(2, 250)) + np.cumsum(rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1)
-    limits = {"seen": c.wandering_seen, "within": c.wandering_within, "less": c.wandering_likely}
-    return find([before], 0.002, steady(1000), rests, **limits)
+    return find([before], 0.002, steady(1000), rests, seen=c.wandering)
 
 
 def wandering_within(c):
@@ -152,9 +151,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "window_share": (0.4, lambda c: c.least_window(best=1000.0) < 450.0, False),
     "blurred": (0.7, lambda c: at_fit(c, 1.0, fault_p=1e-9, blur=0.6).faults, ()),
     "quiet_worth": (100.0, lambda c: c.knows_noise(120.0), False),
-    "wandering_seen": (1.5, lambda c: wandering(c, 73) is not None, False),
-    "wandering_within": (1.0, lambda c: wandering_within(c) is not None, False),
-    "wandering_likely": (0.5, lambda c: wandering(c, 0, walk=0.1).intensity[0] > 9, True),
+    "wandering": (1.5, lambda c: wandering(c, 73) is not None, False),
     "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
     "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
     "testable": (0.7, status, "not testable"),
@@ -165,6 +162,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
 FURTHER = [  # decisions by a criterion that has one above, too
     ("adequate_p", 0.002, lambda c: judged_by(c, p_left=0.0025).helps, False),
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
+    ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
     ("ahead", 1.45, lambda c: proposed(closed=0.54).stands(c), False),
 ]
 

@@ -80,9 +80,7 @@ def steady(samples):
 
 def find(before, step, load, rests=()):
     """Whether a load wanders, by the criteria of an investigation."""
-    c = Criteria()
-    limits = {"seen": c.wandering_seen, "within": c.wandering_within, "less": c.wandering_likely}
-    return wandering(before, step, load, rests, **limits)
+    return wandering(before, step, load, rests, seen=Criteria().wandering)
 
 
 @pytest.fixture(scope="module")
@@ -240,8 +238,7 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
 
 def test_an_identification_asks_for_more_before_it_says_that_a_load_wanders():
     rng = np.random.default_rng(9)
-    limits = {"seen": observed.SEEN, "within": observed.WITHIN, "less": observed.LESS}
-    seen = lambda before: wandering(before, 0.002, steady(250), **limits) is not None  # noqa: E731
+    seen = lambda before: wandering(before, 0.002, steady(250), seen=observed.SEEN) is not None  # noqa: E731
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
     walk = lambda: [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]  # noqa: E731
     assert sum(seen(calm()) for _ in range(150)) <= 3  # 0.3 %; of an investigation 6 %

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import TASK, UserError, among, check_range
-from tractexp.noise import random_walk
 
 DERIVED, CHOSEN = "derived", "chosen"
 
@@ -101,17 +100,10 @@ class Criteria:
         150.0, (0.0, 1e9), "independent quiet samples below which every draw estimates its noise anew", CHOSEN,
         "the error of the estimate then is a tenth of the noise, as large as what a level of 5 % allows",
     )  # fmt: skip
-    wandering_seen: float = _criterion(
-        random_walk.SEEN, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander", CHOSEN,
+    wandering: float = _criterion(
+        2.0, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander before its events, and twice that"
+        " where only what the events show adds up to it", CHOSEN,
         "half a chi-square of one degree is beyond it in 8 % of channels; a wandering that is not there costs little",
-    )  # fmt: skip
-    wandering_within: float = _criterion(
-        random_walk.WITHIN, (0.0, 1e6), "what the events must show beyond that where it is not seen before them",
-        CHOSEN, "what answers a dip does not wander",
-    )  # fmt: skip
-    wandering_likely: float = _criterion(
-        random_walk.LESS, (0.0, 1e6), "log-likelihood below the largest at which the intensity is taken", CHOSEN,
-        "to be safe: the larger end of an interval of 84 %",
     )  # fmt: skip
     measurement_prior: float = _criterion(
         5.0, (1e-3, 1e6), "standard deviation of a fault of the measurement before anything is seen, in its relevant"

@@ -49,10 +49,10 @@ class QuietNoise:
         What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
         Of waveforms the model there tells how noise of the voltage is passed on.
         """
-        context, problem, criteria = self.context, self.context.problem, self.context.criteria
+        context, problem = self.context, self.context.problem
         walk = functools.partial(
             walk_of_load, context.events, context.drive, problem.power, left, columns, context.valid,
-            seen=criteria.wandering_seen, within=criteria.wandering_within, less=criteria.wandering_likely,
+            seen=context.criteria.wandering,
         )  # fmt: skip
         errors = [shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None]
         shapes = np.concatenate(errors) if errors else None

@@ -16,7 +16,7 @@ from tractexp.identification.separable import Sensitivities
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import louder
-from tractexp.noise.random_walk import LESS, WITHIN, walk_of_load, without_slow
+from tractexp.noise.random_walk import walk_of_load, without_slow
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
@@ -60,9 +60,8 @@ class Observed:
         columns = J.columns.reshape(-1, *residuals.shape)
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, valid)
         walk = functools.partial(
-            walk_of_load, self.events, self.drive, self.problem.power, residuals, columns, valid,
-            seen=SEEN, within=WITHIN, less=LESS,
-        )  # fmt: skip
+            walk_of_load, self.events, self.drive, self.problem.power, residuals, columns, valid, seen=SEEN
+        )
         try:
             return self.problem.domain.noise(
                 residuals / np.sqrt(rest), valid, where, self.problem, values, walk, input_errors

@@ -19,7 +19,7 @@ MODES = 48
 LEAST = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
 SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
 DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
-SEEN, WITHIN, LESS = 2.0, 2.0, 1.0  # of `find`, where nobody says otherwise
+LESS = 1.0  # log-likelihood below the largest at which the intensity is taken: the larger end of an interval of 84 %
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
 
@@ -106,14 +106,13 @@ class Rest:
 
 
 def find(
-    before: Sequence[np.ndarray], step: float, load: Load, rests: Sequence[Rest] = (),
-    *, seen: float, within: float, less: float,
-) -> RandomWalk | None:  # fmt: skip
+    before: Sequence[np.ndarray], step: float, load: Load, rests: Sequence[Rest] = (), *, seen: float
+) -> RandomWalk | None:
     """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
 
-    To be safe the largest intensity whose log-likelihood is at most `less` below the likeliest's, given the fast
+    To be safe the largest intensity whose log-likelihood is at most `LESS` below the likeliest's, given the fast
     noise; in both channels where it is seen in one, for what wanders is the load. It is seen where twice the
-    log-likelihood gains `seen`. What is left of the events counts, too, where it shows `within` more, but no more than
+    log-likelihood gains `seen`. What is left of the events counts, too, where both show twice that, but no more than
     the stretches before them allow: what answers a dip does not wander.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
@@ -122,19 +121,19 @@ def find(
     fast = [fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)]
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
-    most = [_last(row, less) for row in total]
+    most = [_last(row) for row in total]
     walk = RandomWalk(GRID[most], step, load)
     if 2 * total.max() >= seen:
         return walk
     rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
-    return walk if gained - within >= seen else None
+    return walk if gained >= 2 * seen else None
 
 
 def walk_of_load(
     events: Sequence[Event], drive: Drive, load: Load, left: np.ndarray | None, columns: np.ndarray | None,
-    valid: np.ndarray, mix: np.ndarray, *, seen: float, within: float, less: float,
+    valid: np.ndarray, mix: np.ndarray, *, seen: float,
 ) -> RandomWalk | None:  # fmt: skip
     """How the load wanders before the events, and during them, in channels mixed by `mix`, as `find` tells it.
 
@@ -147,12 +146,12 @@ def walk_of_load(
         mixed = np.einsum("ij,kjt->kit", mix, columns)
         rests = [Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts]
     stretches = [mix @ b for b in before if np.isfinite(b).all()]
-    return find(stretches, events[0].record.step, load, rests, seen=seen, within=within, less=less)
+    return find(stretches, events[0].record.step, load, rests, seen=seen)
 
 
-def _last(likelihood: np.ndarray, less: float) -> int:
-    """Index of the last of the intensities that are less likely than the likeliest by no more than `less`."""
-    return int(np.flatnonzero(likelihood > likelihood.max() - less)[-1])
+def _last(likelihood: np.ndarray) -> int:
+    """Index of the last of the intensities that are less likely than the likeliest by no more than `LESS`."""
+    return int(np.flatnonzero(likelihood > likelihood.max() - LESS)[-1])
 
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
