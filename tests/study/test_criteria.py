@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events, steady
 
-from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import candidate, missing_channel
 from tractexp.discrepancy.chance import Chance
 from tractexp.discrepancy.coordinates import Coordinates
@@ -138,14 +137,12 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
-    "other_valley": (0.7, lambda c: c.promises(75.0, 100.0), False),
     "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
     "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
     "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
-    "quieter": (4.0, lambda c: JointFit(None, -3.5, 1.0).confirmed(c, doubted=True), False),
     "window_behind": (7.0, lambda c: c.least_window(best=30.0) < 24.0, False),
     "window_clear": (25.0, lambda c: c.least_window(best=50.0) < 28.0, False),
     "window_share": (0.4, lambda c: c.least_window(best=1000.0) < 450.0, False),

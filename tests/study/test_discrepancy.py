@@ -540,7 +540,7 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     both = lambda made: AllEvents(trained, made, held.noise, held.faults, held.bare)  # noqa: E731
     fit = lambda made: both(made).together([alone], seed=0)  # noqa: E731
     (confirmed,) = fit(events("stator_resistance", size=2.0, count=3)[2:])
-    assert confirmed.confirmed(criteria, doubted=False)
+    assert confirmed.confirmed(criteria)
     assert confirmed.fit.names == ("stator_resistance",)
     assert confirmed.fit.unit.shape == alone.unit.shape
     R_s = [trained.coordinates.value("R_s", unit) for unit in (confirmed.fit.unit, alone.unit)]
@@ -548,7 +548,7 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     (denied,) = fit(events(None, count=3)[2:])
     assert denied.louder < 0
     assert denied.p_left < criteria.adequate_p
-    assert not denied.confirmed(criteria, doubted=True)
+    assert not denied.confirmed(criteria)
 
 
 def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():
@@ -574,7 +574,7 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     def judged_on(made):
         held = planted.held_out
         both = AllEvents(planted.context, made, held.noise, held.faults, held.bare)
-        found, again = weighed(both, held.extended, seed=0, doubted=True)
+        found, again = weighed(both, held.extended, seed=0)
         assert again == []
         return found["stator_resistance",]
 

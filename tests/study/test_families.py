@@ -249,7 +249,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
 def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
     both, extended, judged = compared(costs, p_left, helps)
     monkeypatch.setattr(held_out, "judged_on", judged)
-    assessments, fits = weighed(both, extended, 0, doubted=True)
+    assessments, fits = weighed(both, extended, 0)
     assert [names[0] for names, one in assessments.items() if one.helps] == standing
     assert [f.names[0] for f in fits] == again
 

@@ -34,10 +34,9 @@ class JointFit:
     louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
     p_left: float  # how often chance leaves as much as it does
 
-    def confirmed(self, criteria: Criteria, doubted: bool) -> bool:
-        """Whether all events bear it out. Where the base model is `doubted` they need only bear with it."""
-        least = -criteria.quieter if doubted else criteria.shown
-        return self.louder > least and self.p_left >= criteria.adequate_p
+    def confirmed(self, criteria: Criteria) -> bool:
+        """Whether all events bear it out: they speak louder for it than the fitted ones, and it leaves nothing."""
+        return self.louder > 0 and self.p_left >= criteria.adequate_p
 
 
 @dataclass(frozen=True, eq=False)

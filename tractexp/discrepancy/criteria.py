@@ -44,11 +44,6 @@ class Criteria:
         " the catalogue's, its further parameters paid for; at 0 neither is tried", CHOSEN,
         "a second name spoils a right first one, or patches up a wrong one",
     )  # fmt: skip
-    other_valley: float = _criterion(
-        0.8, (0.0, 1.0), "part of what a name that suffices explains that another effect must promise where the base"
-        " model fits nearly as well", CHOSEN,
-        "one linear step promises a little less than a fit gains",
-    )  # fmt: skip
     beside_measurement: float = _criterion(
         0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,
         "what imitates a fault of the measurement badly leaves a little for an effect of the load",
@@ -76,10 +71,6 @@ class Criteria:
         " other set of its size or smaller, and that of the base model with a proposed term below its own", CHOSEN,
         "a right effect by a wrong formula is no farther from a wrong effect than that, and tied with it",
     )  # fmt: skip
-    quieter: float = _criterion(
-        3.0, (0.0, 1e6), "deviance by which all events may speak less for an explanation than the fitted ones", CHOSEN,
-        "what held-out events that do not show an effect cost by chance",
-    )  # fmt: skip
     window_behind: float = _criterion(
         5.0, (0.0, 1e6), "deviance by which the best effect may explain more than the window does", CHOSEN,
         "an effect has parameters to fit, a window has none",
@@ -101,8 +92,8 @@ class Criteria:
         "the error of the estimate then is a tenth of the noise, as large as what a level of 5 % allows",
     )  # fmt: skip
     wandering: float = _criterion(
-        2.0, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander before its events, and twice that"
-        " where only what the events show adds up to it", CHOSEN,
+        2.0, (0.0, 1e6), "twice the log-likelihood from which a load is said to wander before its events; twice that by"
+        " what the events show", CHOSEN,
         "half a chi-square of one degree is beyond it in 8 % of channels; a wandering that is not there costs little",
     )  # fmt: skip
     measurement_prior: float = _criterion(
@@ -157,10 +148,6 @@ class Criteria:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
         near = min(best - self.window_behind, self.window_clear)
         return max(self.shown, near, self.window_share * best)
-
-    def promises(self, drop: float, explained: float) -> bool:
-        """Whether an effect that would lower the deviance so far is looked for beside a name that explains so much."""
-        return drop >= self.other_valley * explained
 
     def stands_out(self, drop: float, explained: float) -> bool:
         """Whether a fault of the measurement does more for the deviance than mend an effect that explains so much."""

@@ -190,9 +190,9 @@ def from_other_valleys(
     """Single effects that explain more from another valley of the base model, and the base model there.
 
     Where an effect is missing, a wrong valley may fit better than the right one. Where the best so far leaves nothing,
-    only valleys in which a linear step promises nearly as much.
+    only effects that it would not reject by what one linear step promises.
     """
-    context, explained = base.context, first.fit.deviance - best.fit.deviance
+    context, rejects = base.context, base.context.criteria.rejects
     ground, singles = first, best_of(refits.values())
     for minimum in base.minima_but(first.fit.unit):
         fit = refit(context, first.noise, [((), minimum)])[0]
@@ -200,8 +200,7 @@ def from_other_valleys(
             continue
         there = first.at(context, fit, first.noise)
         if best.suffices:
-            nearer = first.fit.deviance - fit.deviance
-            promising = [(s.name,) for s in there.scores if context.criteria.promises(nearer + s.drop, explained)]
+            promising = [(s.name,) for s in there.scores if not rejects(fit.deviance - s.drop - best.fit.deviance)]
             begun = [start for names in promising for start in starts([there], {(): fit}, names)]
             fits = refit(context, first.noise, begun) if begun else []
         else:

@@ -107,12 +107,14 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     as_fitted = HeldOut(surviving, explained.steps[0], explained.last, noise, faults, bare, extended)
     if not events or not any(s.fit.names or faults for s in surviving.adequate):
         return as_fitted
-    count, doubted = len(surviving.adequate), not explained.steps[0].adequate
+    count = len(surviving.adequate)
     context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
     both = AllEvents(context, events, noise, faults, bare)
-    assessments, again = weighed(both, as_fitted.extended, seed, doubted=doubted)
+    assessments, again = weighed(both, as_fitted.extended, seed)
     result = replace(as_fitted, assessments=assessments).fitted_to_all(again)
-    return searched_again(result, both, seed) if doubted and not result.retained else result
+    if result.retained or explained.steps[0].adequate:
+        return result
+    return searched_again(result, both, seed)
 
 
 def telling(explained: Explanations, bare: Refit) -> Names:
@@ -138,16 +140,13 @@ def telling(explained: Explanations, bare: Refit) -> Names:
     return faults
 
 
-def weighed(
-    both: AllEvents, extended: Mapping[Names, Refit], seed: int, *, doubted: bool
-) -> tuple[dict[Names, Assessment], list[Refit]]:
+def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
     """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
     A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
     other must leave nothing in a fit to all events and not be rejected there by the best one. That fit may also bear
     out what does not help as it was fitted, or leaves more than chance does, since the fitted events may leave a part
-    of it open; it is returned as fitted to all. Where the base model is `doubted` all events need only bear with it:
-    the held-out ones may not show it at all.
+    of it open; it is returned as fitted to all.
     """
     context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
     assessments = judged_on(context, both.events, both.bare, fits)
@@ -162,7 +161,7 @@ def weighed(
         assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
     again = [
         fitted.fit for names, fitted in joint.items()
-        if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria, doubted)
+        if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria)
     ]  # fmt: skip
     return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
 
@@ -186,7 +185,7 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     plain = refit(both.context, search.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
     both = replace(both, faults=telling(search.explanations, plain))
     tried = both.carried_back([s.fit for s in of_all.values()], seed)
-    fits = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(context.criteria, doubted=True)]
+    fits = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(context.criteria)]
     if not fits:
         return result
     quiet = surviving.explanations.base.quiet

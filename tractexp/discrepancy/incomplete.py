@@ -53,8 +53,8 @@ class PredictedDeviance(Prediction):
 def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets that predict the held-out events, if any does; what else there is stays as it was.
 
-    None without held-out events: a larger set always fits better what it was fitted to. Where what is left is loud all
-    is told as least squares fit it, named or not.
+    None without held-out events: a larger set always fits better what it was fitted to. Where what is left is loud it
+    is judged by its size, and all is told as least squares fit it, named or not; else by the deviance.
     """
     if not events:
         return weighed
@@ -62,14 +62,10 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     context.effort.say("judging what leaves something on the held-out events")
     there, (unit,), noise = carried(context, events, [weighed.bare])
     loud = curves(there, unit, noise).chi2_per_sample > LOUD
-    named = None if loud else _by_deviance(weighed, events, seed)
-    if named is not None:
-        return named
-    by_size = _by_size(weighed, events, seed)
-    return by_size if loud or by_size.retained else weighed
+    return (_by_size if loud else _by_deviance)(weighed, events, seed)
 
 
-def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut | None:
+def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets of the search by likelihood; none beside faults of the measurement, which what is missing looks like."""
     surviving, noise = weighed.survivors, weighed.survivors.explanations.last.noise
     explained, context = surviving.explanations, surviving.explanations.base.context
@@ -77,7 +73,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     rejected = {r.fit.names: r.rejected for r in surviving.rivals}
     fits = {names: f for names, f in explained.refits.items() if names and (names in rejected or len(names) == 1)}
     if weighed.faults or not fits:
-        return None
+        return weighed
     wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
     unit = context.coordinates.without_faults
     fitted = refit(context, noise, [(f.names, unit(f.unit, ())) for f in wanted], faults=())
@@ -93,7 +89,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     predicted = Predictions(context.catalogue, sets)
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
     if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
-        return None
+        return weighed
 
     def rival(fit: Refit) -> Rival:
         tests = examined(explained.base.quiet, fit, noise, seed, plain=True)
