@@ -344,7 +344,8 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
         text=True,
         preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),  # a shell has what it runs behind ignore interrupts
     )
-    while process.poll() is None and "finished" not in str(statuses(tmp_path / "sweep")):
+    states = lambda: {status["status"] for status in statuses(tmp_path / "sweep").values()}  # noqa: E731
+    while process.poll() is None and states() != {"finished", "running"}:
         time.sleep(0.2)
     process.send_signal(way)
     _, err = process.communicate(timeout=60)
