@@ -122,11 +122,11 @@ def chosen_dip(c):
     return mildest(tried, c.decided).event.depth
 
 
-def proposed(closed=0.9, left=1.0, p=1e-6):
+def proposed(closed=0.9, p=1e-6):
     """A term that would be proposed."""
 
     def curve(deviance):
-        return SimpleNamespace(deviance=deviance, chi2_per_sample=left)
+        return SimpleNamespace(deviance=deviance, chi2_per_sample=1.0)
 
     before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * 1000.0), (1 - closed) * 1000.0)
     return Weighed(None, before, before, p, None)
@@ -137,14 +137,11 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
     "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
-    "beside_measurement": (0.2, lambda c: at_fit(c, 0.003, fault_p=1e-9).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
     "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
     "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
     "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
-    "window_behind": (7.0, lambda c: c.least_window(best=30.0) < 24.0, False),
-    "window_clear": (25.0, lambda c: c.least_window(best=50.0) < 28.0, False),
     "window_share": (0.4, lambda c: c.least_window(best=1000.0) < 450.0, False),
     "blurred": (0.7, lambda c: at_fit(c, 1.0, fault_p=1e-9, blur=0.6).faults, ()),
     "quiet_worth": (100.0, lambda c: c.knows_noise(120.0), False),
@@ -152,7 +149,6 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
     "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
     "testable": (0.7, status, "not testable"),
-    "proposal_left": (1.8, lambda c: proposed(left=1.75).stands(c), False),
     "proposal_p": (0.02, lambda c: proposed(p=0.011).stands(c), False),
     "decided": (0.9, chosen_dip, 0.6),
 }

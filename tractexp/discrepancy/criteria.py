@@ -44,10 +44,6 @@ class Criteria:
         " the catalogue's, its further parameters paid for; at 0 neither is tried", CHOSEN,
         "a second name spoils a right first one, or patches up a wrong one",
     )  # fmt: skip
-    beside_measurement: float = _criterion(
-        0.1, (0.0, 1.0), "factor on the p of an effect of the load beside one of the measurement", CHOSEN,
-        "what imitates a fault of the measurement badly leaves a little for an effect of the load",
-    )  # fmt: skip
     rejected: float = _criterion(
         0.05, (1e-9, 1.0), "relative likelihood, by Akaike's criterion, below which a rival is rejected", DERIVED,
         "one to twenty, the usual level of a test",
@@ -70,14 +66,6 @@ class Criteria:
         1.5, (1.0, 1e6), "factor by which the error of a set that leaves more than noise must be below that of every"
         " other set of its size or smaller, and that of the base model with a proposed term below its own", CHOSEN,
         "a right effect by a wrong formula is no farther from a wrong effect than that, and tied with it",
-    )  # fmt: skip
-    window_behind: float = _criterion(
-        5.0, (0.0, 1e6), "deviance by which the best effect may explain more than the window does", CHOSEN,
-        "an effect has parameters to fit, a window has none",
-    )  # fmt: skip
-    window_clear: float = _criterion(
-        30.0, (0.0, 1e6), "deviance explained by a window that is believed though an effect explains more", CHOSEN,
-        "there may be both, and a window that is not there costs much",
     )  # fmt: skip
     window_share: float = _criterion(
         0.5, (0.0, 1.0), "part of what the best effect explains that a window must explain", CHOSEN,
@@ -107,10 +95,6 @@ class Criteria:
     testable: float = _criterion(
         0.8, (0.0, 1.0), "power at the smallest relevant size below which an effect is called not testable", DERIVED,
         "the usual power of a planned test (Saris, Satorra and van der Veld 2009)",
-    )  # fmt: skip
-    proposal_left: float = _criterion(
-        1.7, (1.0, 1e6), "variance over the noise's that a proposed term may leave on any role's events", CHOSEN,
-        "right terms left 0.9 to 1.5, a wrong one that closed nine tenths left 3.3 (prototype)",
     )  # fmt: skip
     proposal_p: float = _criterion(
         0.01, (0.0, 1.0), "how often noise may give the best term of the whole library as much", CHOSEN,
@@ -146,8 +130,7 @@ class Criteria:
 
     def least_window(self, best: float) -> float:
         """The deviance that a recorder's window must explain where the best effect explains `best`."""
-        near = min(best - self.window_behind, self.window_clear)
-        return max(self.shown, near, self.window_share * best)
+        return max(self.shown, self.window_share * best)
 
     def stands_out(self, drop: float, explained: float) -> bool:
         """Whether a fault of the measurement does more for the deviance than mend an effect that explains so much."""

@@ -85,10 +85,7 @@ class Disagreement:
     @property
     def asks_for_more(self) -> bool:
         """Whether any further effect of the load helps more than chance does."""
-        level = self.level
-        if self.faults and not self.fit.names:
-            level *= self.criteria.beside_measurement  # small p are uniform where nothing is missing
-        return bool(self.scores) and self.scores[0].p < level
+        return bool(self.scores) and self.scores[0].p < self.level
 
     @property
     def level(self) -> float:

@@ -2,10 +2,9 @@
 
 It is looked for before any effect is, among whole cycles where the records do not say what it is. A window that the
 recorder does not have makes the voltage bend where the power does not: that costs much, with effects in the load or
-without. So one is believed that helps clearly, or at least as much as the best effect does; one that the records say,
-where it helps at all. A model that lacks something large may gain nothing by the right window. So where an explanation
-has faults of the measurement beside it, it is fitted behind each window, too: one that leaves no such fault takes
-their place.
+without. So one is believed that explains half as much as the best effect; one that the records say, where it helps at
+all. A model that lacks something large may gain nothing by the right window. So where an explanation has faults of the
+measurement beside it, it is fitted behind each window, too: one that leaves no such fault takes their place.
 """
 
 from collections.abc import Sequence

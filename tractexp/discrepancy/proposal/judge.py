@@ -63,12 +63,11 @@ class Weighed:
 
     def objections(self, criteria: Criteria) -> list[str]:
         """Why it is not proposed, each as the end of a sentence."""
-        left, closed = max(self.train.left, self.validate.left), self.validate.closed
+        closed = self.validate.closed
         least = 1 - 1 / criteria.ahead**2  # of squares
         little = f"it closes {closed:.0%} of the gap on the held-out events, less than {least:.0%}"
         rows = {
             (little if closed >= 0 else "it makes the held-out events worse"): closed < least,
-            f"it leaves {left:.2g} times the variance of the noise": left > criteria.proposal_left,
             "chance gives the best of the library as much": self.p > criteria.proposal_p,
         }
         return [why for why, true in rows.items() if true]
