@@ -336,17 +336,33 @@ def test_a_second_effect_that_the_fitted_dips_do_not_show_is_found_in_all_events
     assert told.validate.explained > 0.9
 
 
+def test_an_effect_that_no_fitted_dip_shows_is_named_by_all_events():
+    """The relay trips in the held-out dip alone. An effect that cannot be that leaves it unexplained: never "none"."""
+    made = events("trip_in_two_stages", 0.09768, 1865577783, count=4, noise=LOUD, recorder=FAST)
+    told, without = (
+        investigate(base(), made[:3], made[3:], {}, {}, only=only) for only in (TRIPS[:1], ("load_change",))
+    )
+    assert told.first.adequate
+    assert told.names == ("undervoltage_trip",)
+    assert told.fitted_to_both
+    assert told.validate.explained > 0.9
+    assert without.verdict.word == "unexplained"
+    assert "the fitted events alone show no disagreement, but all events together do" in without.verdict.reason
+
+
 @pytest.mark.parametrize(("names", "deviance"), [(None, 0.0), ((), 0.0), (("denied",), 0.0), (("new",), np.inf)])
 def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, deviance):
     """No explanation that leaves nothing, the base model itself, what was fitted to all events before; and none is
     made where the base model cannot run before the held-out events."""
     bases = SimpleNamespace(base=SimpleNamespace(local_minima=()))
-    before = SimpleNamespace(survivors=SimpleNamespace(explanations=bases), assessments={("denied",): None})
+    surviving, nothing = SimpleNamespace(explanations=bases), (None,) * 5
+    before = HeldOut(surviving, *nothing, extended={}, assessments={("denied",): None})
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     plain = SimpleNamespace(deviance=deviance)
     both = SimpleNamespace(fitted=SimpleNamespace(domain=PHASORS), plain=plain, searched=lambda valleys, seed: found)
-    assert searched_again(before, both, 0) is before
+    after = searched_again(before, both, 0)
+    assert replace(after, all_agree=True).__dict__ == before.__dict__
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():

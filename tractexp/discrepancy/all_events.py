@@ -92,13 +92,19 @@ class AllEvents:
         better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
-    def searched(self, local_minima: Sequence[np.ndarray], seed: int) -> Survivors:
-        """What explains all events, searched for as in the fitted ones; `local_minima` (D,) of the base model there."""
+    def searched(self, local_minima: Sequence[np.ndarray], seed: int) -> Survivors | None:
+        """What explains all events, searched for as in the fitted ones; None where the base model leaves nothing there.
+
+        `local_minima` (D,) are its own on the fitted events.
+        """
         context = self.context
-        context.effort.say("searching again, fitted to all events")
         wide = [context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
         base = fitted_from(context, wide, wide[1:])
-        return survivors(explanations(base, disagreement(base, seed), seed), seed)
+        first = disagreement(base, seed)
+        if first.adequate:
+            return None
+        context.effort.say("searching again, fitted to all events")
+        return survivors(explanations(base, first, seed), seed)
 
     def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, JointFit]]:
         """Explanations (D of all events) as fitted to the fitted events alone, and to all."""

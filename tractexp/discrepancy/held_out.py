@@ -11,7 +11,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Names, Refit, refit, settled
-from tractexp.discrepancy.gap import GapTest, gap
+from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.prediction import Predictions
 from tractexp.discrepancy.records import Records
@@ -65,6 +65,7 @@ class HeldOut:
     assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
     predictions: Predictions | None = None
+    all_agree: bool = True  # with the base model, as far as was asked
 
     @property
     def leaves_more(self) -> bool:
@@ -105,11 +106,14 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     exact = {f.names: f for f in refit(context, noise, wanted, faults=faults)}
     extended = {names: exact[names] for names, _ in wanted}
     as_fitted = HeldOut(surviving, explained.steps[0], explained.last, noise, faults, bare, extended)
-    if not events or not any(s.fit.names or faults for s in surviving.adequate):
+    if not events:
         return as_fitted
+    both = AllEvents(context, events, noise, faults, bare)
+    if not any(s.fit.names or faults for s in surviving.adequate):
+        silent = explained.empty and explained.steps[0].adequate
+        return searched_again(as_fitted, both, seed) if silent and shows_more(both) else as_fitted
     count = len(surviving.adequate)
     context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    both = AllEvents(context, events, noise, faults, bare)
     assessments, again = weighed(both, as_fitted.extended, seed)
     result = replace(as_fitted, assessments=assessments).fitted_to_all(again)
     if result.retained or explained.steps[0].adequate:
@@ -166,19 +170,28 @@ def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tupl
     return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
 
 
+def shows_more(both: AllEvents) -> bool:
+    """Whether perturbations of the base model would gain more on the held-out events than noise leaves there."""
+    there, (unit,), noise = carried(both.fitted, both.events, [both.bare])
+    left = beyond_chance(there, unit, (), noise, there.coordinates.before, pushed(there, unit, (), noise))
+    return left > both.fitted.criteria.shown
+
+
 def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
-    """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown.
+    """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown, or show
+    what those do not.
 
     The fitted events may show only a part of what is there, such as the first of two stages of a relay, or one of two
     effects. What all events confirm is taken, unless it comes to what was denied, which was fitted to all events, too.
     Of waveforms nothing is, for no criterion was calibrated with it.
     """
     context, surviving = both.fitted, result.survivors
-    if not context.domain.calibrated or not np.isfinite(
-        both.plain.deviance
-    ):  # there the base model has no steady state
+    if not context.domain.calibrated or not np.isfinite(both.plain.deviance):  # there it has no steady state
         return result
     search = both.searched(surviving.explanations.base.local_minima, seed)
+    if search is None:
+        return result
+    result = replace(result, all_agree=False)
     of_all = {s.fit.names: s for s in search.adequate if s.fit.names}
     if not of_all or search.explanations.chosen.names in result.assessments:
         return result

@@ -93,13 +93,12 @@ def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
 
 
 def word_of(weighed: HeldOut) -> str:
-    explained, left = weighed.survivors.explanations, weighed.survivors
-    first = explained.steps[0]
-    if explained.empty and first.adequate:
-        return NONE
-    if not weighed.retained:
-        return NONE if first.adequate and left.adequate else UNEXPLAINED
-    return NAMED if len(weighed.retained) == 1 else TIED
+    left = weighed.survivors
+    explaining = [rival for rival in weighed.retained if weighed.names_of(rival)]
+    if not explaining:
+        agree = left.explanations.steps[0].adequate and left.adequate and weighed.all_agree
+        return NONE if agree else UNEXPLAINED
+    return NAMED if len(explaining) == 1 else TIED
 
 
 def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
@@ -127,6 +126,9 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
             f"what seemed to help on the fitted events, {seemed}, does not help on the held-out ones, and what the base"
             " model leaves is no more than chance leaves"
         )
+    if word == UNEXPLAINED:
+        alone = "the fitted events alone show no disagreement, but all events together do"
+        return f"{alone}, and none of the {len(first.context.catalogue.candidates)} effects tested explains it"
     return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
 
 
