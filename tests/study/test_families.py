@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
-from tractexp.discrepancy import families, fit_effort, fitting, held_out, survivors
+from tractexp.discrepancy import families, fit_effort, fitting, held_out, recommended, survivors
 from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
@@ -348,6 +348,7 @@ def test_an_effect_that_no_fitted_dip_shows_is_named_by_all_events():
     assert told.validate.explained > 0.9
     assert without.verdict.word == "unexplained"
     assert "the fitted events alone show no disagreement, but all events together do" in without.verdict.reason
+    assert recommended.adequacy(without).grade == "effect_missing"
 
 
 @pytest.mark.parametrize(("names", "deviance"), [(None, 0.0), ((), 0.0), (("denied",), 0.0), (("new",), np.inf)])
@@ -360,9 +361,14 @@ def test_a_search_in_all_events_that_finds_nothing_new_changes_nothing(names, de
     adequate = [] if names is None else [SimpleNamespace(fit=Refit(names, np.zeros(1), 0.0, 0))]
     found = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(chosen=SimpleNamespace(names=names)))
     plain = SimpleNamespace(deviance=deviance)
-    both = SimpleNamespace(fitted=SimpleNamespace(domain=PHASORS), plain=plain, searched=lambda valleys, seed: found)
-    after = searched_again(before, both, 0)
-    assert replace(after, all_agree=True).__dict__ == before.__dict__
+    first = SimpleNamespace(adequate=False, p_left=0.0)
+    both = SimpleNamespace(
+        fitted=SimpleNamespace(domain=PHASORS), plain=plain, disagreement=lambda minima, seed: (None, first),
+        searched=lambda base, first, seed: found,
+    )  # fmt: skip
+    assert replace(searched_again(before, both, 0), p_of_all=1.0).__dict__ == before.__dict__
+    first.adequate = True
+    assert searched_again(before, both, 0) is before
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():

@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import fitted_from
+from tractexp.discrepancy.base_fit import BaseFit, fitted_from
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.discrepancy.explanations import explanations
 from tractexp.discrepancy.fitting import Names, Refit, best_of, refit, wide_refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
@@ -92,18 +92,15 @@ class AllEvents:
         better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
-    def searched(self, local_minima: Sequence[np.ndarray], seed: int) -> Survivors | None:
-        """What explains all events, searched for as in the fitted ones; None where the base model leaves nothing there.
+    def disagreement(self, local_minima: Sequence[np.ndarray], seed: int) -> tuple[BaseFit, Disagreement]:
+        """The base model's fit to all events and its tests; `local_minima` (D,) are its own on the fitted ones."""
+        wide = [self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
+        base = fitted_from(self.context, wide, wide[1:])
+        return base, disagreement(base, seed)
 
-        `local_minima` (D,) are its own on the fitted events.
-        """
-        context = self.context
-        wide = [context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
-        base = fitted_from(context, wide, wide[1:])
-        first = disagreement(base, seed)
-        if first.adequate:
-            return None
-        context.effort.say("searching again, fitted to all events")
+    def searched(self, base: BaseFit, first: Disagreement, seed: int) -> Survivors:
+        """What explains all events, searched for as in the fitted ones."""
+        self.context.effort.say("searching again, fitted to all events")
         return survivors(explanations(base, first, seed), seed)
 
     def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, JointFit]]:

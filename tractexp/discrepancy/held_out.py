@@ -65,7 +65,7 @@ class HeldOut:
     assessments: Mapping[Names, Assessment] = field(default_factory=dict)
     together: tuple[Refit, ...] = ()
     predictions: Predictions | None = None
-    all_agree: bool = True  # with the base model, as far as was asked
+    p_of_all: float = 1.0  # how often chance leaves as much as the base model does of all events, where that was asked
 
     @property
     def leaves_more(self) -> bool:
@@ -188,10 +188,10 @@ def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
     context, surviving = both.fitted, result.survivors
     if not context.domain.calibrated or not np.isfinite(both.plain.deviance):  # there it has no steady state
         return result
-    search = both.searched(surviving.explanations.base.local_minima, seed)
-    if search is None:
+    base, first = both.disagreement(surviving.explanations.base.local_minima, seed)
+    if first.adequate:
         return result
-    result = replace(result, all_agree=False)
+    search, result = both.searched(base, first, seed), replace(result, p_of_all=first.p_left)
     of_all = {s.fit.names: s for s in search.adequate if s.fit.names}
     if not of_all or search.explanations.chosen.names in result.assessments:
         return result

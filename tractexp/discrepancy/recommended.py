@@ -16,7 +16,8 @@ def adequacy(findings: Findings) -> Adequacy:
     """The grade of the extended model, or of the base model where nothing is named, on all events."""
     tests = findings.tests
     ratio, where = loudest_stretch(tests.projection.channels(findings.context.problem)[0], findings.context.problem)
-    p = 1.0 if findings.verdict.word == NONE else tests.p_left  # no disagreement: by the same false-alarm rate
+    p = tests.p_left if findings.names else min(tests.p_left, findings.held_out.p_of_all)
+    p = 1.0 if findings.verdict.word == NONE else p  # no disagreement: by the same false-alarm rate
     surprise = Surprise(p, tests.loudest, ratio, where)
     held_out = findings.validate and findings.validate.after.error
     grade = graded(surprise, findings.train.after.error, held_out, least_p=findings.context.criteria.adequate_p)

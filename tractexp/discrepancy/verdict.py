@@ -96,7 +96,8 @@ def word_of(weighed: HeldOut) -> str:
     left = weighed.survivors
     explaining = [rival for rival in weighed.retained if weighed.names_of(rival)]
     if not explaining:
-        agree = left.explanations.steps[0].adequate and left.adequate and weighed.all_agree
+        first = left.explanations.steps[0]
+        agree = first.adequate and left.adequate and weighed.p_of_all >= first.criteria.adequate_p
         return NONE if agree else UNEXPLAINED
     return NAMED if len(explaining) == 1 else TIED
 
