@@ -35,8 +35,8 @@ class JointFit:
     p_left: float  # how often chance leaves as much as it does
 
     def confirmed(self, criteria: Criteria) -> bool:
-        """Whether all events bear it out: those that were held out do not reject it, and it leaves nothing."""
-        return not criteria.rejects(-self.louder) and self.p_left >= criteria.adequate_p
+        """Whether all events bear it out: they speak louder for it than the fitted ones, and it leaves nothing."""
+        return self.louder > 0 and self.p_left >= criteria.adequate_p
 
 
 @dataclass(frozen=True, eq=False)
