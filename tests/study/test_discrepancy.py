@@ -549,6 +549,7 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
     assert denied.louder < 0
     assert denied.p_left < criteria.adequate_p
     assert not denied.confirmed(criteria)
+    assert not replace(denied, p_left=1.0).confirmed(criteria)
 
 
 def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():

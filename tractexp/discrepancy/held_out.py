@@ -110,7 +110,7 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
         return as_fitted
     both = AllEvents(context, events, noise, faults, bare)
     if not any(s.fit.names or faults for s in surviving.adequate):
-        silent = explained.empty and explained.steps[0].adequate
+        silent = context.domain.calibrated and explained.empty and explained.steps[0].adequate
         return searched_again(as_fitted, both, seed) if silent and shows_more(both) else as_fitted
     count = len(surviving.adequate)
     context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
