@@ -79,7 +79,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        drawn = own.of(t.context.whiten(noise, _noise(t, noise, np.random.default_rng((seed, k)))))
+        drawn = own.of(_white(t, noise, np.random.default_rng((seed, k))))
         by_test = surprises.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
@@ -91,9 +91,10 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 def _drawn(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:  # fmt: skip
-    drawn = _noise(t, noise, np.random.default_rng(seed))
+    rng = np.random.default_rng(seed)
     if plain:
-        return _chance(t, own.of(t.context.whiten(noise, drawn)), noise)
+        return _chance(t, own.of(_white(t, noise, rng)), noise)
+    drawn = noise.draw(rng, DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
     rest = rich_residuals(t, drawn)
 
     def anew(b: int) -> Chance:
@@ -105,9 +106,9 @@ def _drawn(
     return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
-def _noise(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
-    """Noise (b, C, N) [pu] where the events have samples that count."""
-    return noise.draw(rng, DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
+def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
+    """Whitened noise (b, C N) of the events."""
+    return noise.draw_white(rng, DRAWS, t.context.drive, t.context.valid)
 
 
 def is_noise_exact(context: Context, noise: Noise) -> bool:

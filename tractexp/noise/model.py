@@ -118,6 +118,12 @@ class Noise:
             drawn[:, :, a:b] = own if self.mix is None else np.linalg.solve(self.mix, own)
         return drawn
 
+    def draw_white(self, rng: np.random.Generator, count: int, drive: Drive, valid: np.ndarray) -> np.ndarray:
+        """Rows (count, C N) as `whiten` makes them of what `draw` draws: shocks, each of them the same in law."""
+        size = count, drive.samples
+        shocks = [rng.standard_normal(size) if seen is None else rng.choice(seen, size) for seen in self._shocks]
+        return (np.stack(shocks, axis=1) * self._together(valid, drive)).reshape(count, -1)
+
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
         channels = [channel for pair in self.pairs for channel in pair]
@@ -155,6 +161,12 @@ class Noise:
             shapes = np.einsum("ij,kjt->kit", self._unmixing, self._shapes(part, e))
             variance[:, part] = self._fast_variance(e)[:, None] + (shapes**2).sum(axis=0)
         return np.sqrt(variance)
+
+    @property
+    def _shocks(self) -> Sequence[np.ndarray | None]:
+        """The shocks of each channel as they were seen; None where they are normal, as those of a space vector are."""
+        seen = self.shocks or [None] * self.channels
+        return [None, None, *seen[2:]] if self.vector else seen
 
     @property
     def _unmixing(self) -> np.ndarray:
@@ -221,7 +233,8 @@ class Noise:
             turning = pair[0].recurring(shocks[0] + 1j * shocks[1])[:, BURN_IN:]
             colored = [np.real(turning), np.imag(turning)]
         for c, channel in list(enumerate(pair))[len(colored) :]:
-            shocks = rng.standard_normal(size) if self.shocks is None else rng.choice(self.shocks[c], size)
+            seen = self._shocks[c]
+            shocks = rng.standard_normal(size) if seen is None else rng.choice(seen, size)
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part, event)

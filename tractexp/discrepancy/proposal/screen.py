@@ -60,8 +60,7 @@ class Ground:
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
         context = self.context
-        noise = self.noise.draw(np.random.default_rng(seed), draws, np.diff(context.drive.first).tolist())
-        white = context.whiten(self.noise, noise * context.valid)
+        white = self.noise.draw_white(np.random.default_rng(seed), draws, context.drive, context.valid)
         return self.off(np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1))
 
 
