@@ -18,6 +18,7 @@ from written_out import dense_normal
 
 from hidden_effects import Case, Noise, Recorder, make, write
 from tractexp import store
+from tractexp.discrepancy import kernels
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.catalogue import catalogue
@@ -41,6 +42,7 @@ from tractexp.discrepancy.score_test import ScoreTest, signed_drop
 from tractexp.errors import UserError
 from tractexp.identification import local_minima, observed, surprises
 from tractexp.identification.descent import normal
+from tractexp.identification.problem import Problem
 from tractexp.identification.separable import SeparableColumns
 from tractexp.identification.surprises import Scale, tail
 from tractexp.model.model import compose
@@ -281,6 +283,53 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
     assert np.var(drawn[:, 0] @ slow) > 50
     assert np.var(rows[:, 0] @ slow) == pytest.approx(1.0, abs=0.2)
     assert rows.var() == pytest.approx(1.0, abs=0.02)
+
+
+def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
+    """Colored, mixed, wandering noise with heavy tails and a gap: variance in all directions, tails and gap alike."""
+    n, rng = 600, np.random.default_rng(9)
+    color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
+    wander = RandomWalk(np.array([2.0, 0.0]), 0.002, Load(np.tile([[1.0], [0.0]], n), np.array([[1.0, 0.0]])))
+    heavy = rng.standard_t(5, (2, 4000))
+    shocks = tuple(heavy / heavy.std(axis=1, keepdims=True))
+    noise = PowerNoise(((color, white_noise(1.0)),), np.array([[1.0, 0.0], [-0.5, 1.0]]), shocks, wander)
+    drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
+    valid = np.ones((2, n), dtype=bool)
+    valid[1, 250:300] = False
+    whitened = noise.whiten(noise.draw(rng, 1000, [n]), drive, valid).reshape(1000, 2, n)
+    white = noise.draw_white(rng, 1000, drive, valid).reshape(1000, 2, n)
+    directions = np.cos(np.pi * np.outer(np.arange(40), np.arange(n) + 0.5) / n) * np.sqrt(2 / n)
+    for rows in (whitened, white):
+        assert not rows[:, :, 250:300].any()
+        assert rows[:, :, 400:].var(axis=(0, 2)) == pytest.approx(1.0, abs=0.03)
+        assert (rows @ directions.T).var(axis=0)[:, 1:] == pytest.approx((n - 50) / n, abs=0.25)
+    kurtosis = [(rows[:, :, 400:] ** 4).mean(axis=(0, 2)) for rows in (whitened, white)]
+    assert kurtosis[0] == pytest.approx(kurtosis[1], rel=0.2)
+    assert kurtosis[1].min() > 4
+
+
+def test_a_fit_in_the_stiff_part_of_the_box_asks_for_the_steps_of_the_whole_box(monkeypatch):
+    monkeypatch.setattr(kernels, "LONGEST", 1.0)
+    made = bench(base(), events(recorder=FAST))
+    own, at = made.kernels, made.coordinates
+    usual = own.bare.space.from_unit(at.null[at.base])[None]
+    fast = usual.copy()
+    fast[0, own.bare.space.names.index("T_prime")] = 0.006
+    fast[0, own.bare.space.names.index("M")] = 0.001
+    assert own.substeps < own.box_substeps
+    assert own.substeps < own.bare.steps_at(fast)
+    assert own.too_coarse(np.concatenate([usual, fast]))
+    assert not own.too_coarse(usual)
+
+
+def test_an_investigation_starts_anew_with_shorter_steps_where_its_fits_ask_for_them(monkeypatch):
+    monkeypatch.setattr(kernels, "LONGEST", 1.0)
+    monkeypatch.setattr(Problem, "steps_at", lambda own, values: 256)
+    said: list[str] = []
+    found = investigate(base(), events(recorder=FAST), only=FEW, tell=said.append)
+    own = found.context.kernels
+    assert sum("again with shorter steps" in line for line in said) == 1
+    assert own.substeps == own.box_substeps > own.bare.stepped(kernels.STEPPED).step.substeps.max()
 
 
 def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_active_power():

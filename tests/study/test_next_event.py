@@ -56,7 +56,7 @@ class LeakageLoss(Effect):
         eq.edit(sites.stator_impedance, lambda Z: Z - I * loss * Z)
 
 
-def hidden(*dips, effect="speed_dependent_torque", size=0.8):
+def hidden(*dips, effect="speed_dependent_torque", size=0.9):
     return scene(Case(effect, size, events=dips, noise=NOISE), SEED)
 
 

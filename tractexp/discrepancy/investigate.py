@@ -4,6 +4,8 @@ import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from tractexp.discrepancy.base_fit import BaseFit, base_fit
 from tractexp.discrepancy.catalogue import Catalogue, catalogue
 from tractexp.discrepancy.context import Context
@@ -176,6 +178,12 @@ class Findings:
         return left(fitted, noise, level) or left(beyond, replace(noise, input_modes=None), level)
 
     @property
+    def base_values(self) -> np.ndarray:
+        """The free parameters of the base model (n, d), alone and as the model that the investigation ends with."""
+        fits = np.stack([self.bare.unit, self.extended.unit])
+        return self.context.kernels.bare.space.from_unit(fits[:, self.context.coordinates.base])
+
+    @property
     def fitted_to_both(self) -> bool:
         """Whether the extended model was fitted to the held-out events, too."""
         return bool(self.held_out.together and self.held_out.retained)
@@ -209,29 +217,40 @@ def investigate(
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
         records = Records.of(train)
-        base = base_fit(Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps))
-        base, first = behind_recorder(base, disagreement(base, seed), seed)
-        explained = explanations(base, first, seed)
-        base, first = explained.base, explained.steps[0]
-        weighed = by_likelihood = held_out(survivors(explained, seed), validate, seed)
-        if word_of(weighed) == UNEXPLAINED:
-            weighed = incomplete(weighed, validate, seed)
-        said = verdict(weighed, validate)
-        proposed = Proposed()
-        if said.word == UNEXPLAINED:
-            proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
-        return Findings(
-            base=base,
-            places=() if said.word == NONE else tuple(places(weighed.first)),
-            explanations=explained,
-            survivors=weighed.survivors,
-            by_likelihood=by_likelihood,
-            held_out=weighed,
-            verdict=said,
-            train=_gap(weighed.first.context, weighed, said),
-            withheld=tuple(validate),
-            proposed=proposed,
-        )
+        context = Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps)
+        findings = _findings(base_fit(context), validate, seed)
+        if context.kernels.too_coarse(findings.base_values):
+            effort.say("the fits lie where the motor is fast: again with shorter steps")
+            finer = context.kernels.box_substeps
+            context = Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, finer)
+            findings = _findings(base_fit(context), validate, seed)
+        return findings
+
+
+def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
+    """All that is found from the base model's fit on."""
+    base, first = behind_recorder(base, disagreement(base, seed), seed)
+    explained = explanations(base, first, seed)
+    base, first = explained.base, explained.steps[0]
+    weighed = by_likelihood = held_out(survivors(explained, seed), validate, seed)
+    if word_of(weighed) == UNEXPLAINED:
+        weighed = incomplete(weighed, validate, seed)
+    said = verdict(weighed, validate)
+    proposed = Proposed()
+    if said.word == UNEXPLAINED:
+        proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
+    return Findings(
+        base=base,
+        places=() if said.word == NONE else tuple(places(weighed.first)),
+        explanations=explained,
+        survivors=weighed.survivors,
+        by_likelihood=by_likelihood,
+        held_out=weighed,
+        verdict=said,
+        train=_gap(weighed.first.context, weighed, said),
+        withheld=tuple(validate),
+        proposed=proposed,
+    )
 
 
 def _share_of(shapes: Sequence[Remainder]) -> float:

@@ -6,6 +6,7 @@ effect that makes every other dear. All give the same response up to rounding.
 """
 
 import functools
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -23,6 +24,9 @@ from tractexp.model.parts import Effect
 from tractexp.noise import Noise
 from tractexp.record import Event
 
+# Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and often no machine;
+# and none longer than effects answer in [s].
+STEPPED, LONGEST = 0.95, 1e-3
 Key = tuple[frozenset[str], frozenset[str]]  # load effects, and what is tested beside them
 
 
@@ -90,11 +94,20 @@ class Kernels:
     ):
         self.family, self.events, self.bounds, self.fixed = family, tuple(events), bounds, fixed
         self.bare = Problem(family.model, events, bounds, fixed, substeps)
-        self.substeps = max(int(self.bare.step.substeps.max()), self._fewest() if substeps is None else 1)
+        self.substeps = self.box_substeps = int(self.bare.step.substeps.max())
+        if substeps is None:
+            self.bare = self.bare.stepped(STEPPED)
+            within = math.ceil(max(event.record.step for event in events) / LONGEST - 1e-9)
+            own = max(int(self.bare.step.substeps.max()), min(within, self.box_substeps))
+            self.substeps = max(own, self._fewest())
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)  # of all coordinates
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
         self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {}
+
+    def too_coarse(self, values: np.ndarray) -> bool:
+        """Whether fits of the base model's free values (n, d) lie where the steps are longer than in the whole box."""
+        return self.substeps < min(self.box_substeps, self.bare.steps_at(values))
 
     def _fewest(self) -> int:
         """Steps that the models need by which effects are tested, every effect at its null: some are stiff."""

@@ -160,6 +160,23 @@ class Problem:
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
+    def stepped(self, share: float) -> "Problem":
+        """The same with as many Runge-Kutta steps as this share of the box needs; see `steps_at`."""
+        other = copy.copy(self)
+        other.step = self._automatic(min(share, self.domain.probed))
+        return other
+
+    def steps_at(self, values: np.ndarray) -> int:
+        """Runge-Kutta steps per sample that free values (n, free) need."""
+        candidates = self.candidates(values)
+        return int(self.model.substeps(self.drive, candidates, self.domain.finest, until=self._until)[0].max())
+
+    @property
+    def _until(self) -> list[float]:
+        """Seconds of each event, from its first sample on, in which the step is judged."""
+        ends = [e.record.t[min(e.end, e.record.samples - 1)] - e.record.t[0] for e in self.events]
+        return [end + self.domain.aftermath for end in ends]
+
     def digest(self) -> str:
         """SHA-256 of the equations, the records and what is known of the parameters: of equal problems the same."""
         drive, free = self.drive, (self.space.names, sorted(self.fixed.items()), self.per_event, self.priors)
@@ -271,14 +288,15 @@ class Problem:
                 raise UserError(f"{MODEL.substeps}={substeps} is out of range: it must be 1 to {MOST_SUBSTEPS}")
             given = np.full(len(self.events), substeps)
             return Step(given, np.full(len(self.events), np.nan))
-        probes = self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
-        fine, share = self.domain.finest, self.domain.probed
-        ends = [e.record.t[min(e.end, e.record.samples - 1)] - e.record.t[0] for e in self.events]
-        until = [end + self.domain.aftermath for end in ends]
-        chosen, error = self.model.substeps(self.drive, probes, fine, share, until)
-        # Stiff circuits of the box may diverge, and are refused; the step of a fit is checked by itself.
+        return self._automatic(self.domain.probed)
+
+    def _automatic(self, share: float) -> Step:
+        """As many steps as that share of candidates all over the box needs."""
+        fine, probes = self.domain.finest, self.candidates(self.space.from_unit(even(PROBES, self.space.dimension)))
+        chosen, error = self.model.substeps(self.drive, probes, fine, share, self._until)
+        # Stiff circuits of the box may diverge, and are refused.
         if self.domain.stiff and np.isinf(error).any() and (lasting := self._lasting(probes)).any():
-            chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share, until)
+            chosen, error = self.model.substeps(self.drive, probes[lasting], fine, share, self._until)
         if self.model.integration == CLASSICAL and not (error <= fine).all():
             worst = int(np.argmax(error))
             raise UserError(
