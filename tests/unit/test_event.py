@@ -308,6 +308,11 @@ class TestFuse:
         with pytest.raises(UserError, match="while the current stays as it was: a fuse of the voltage transformers"):
             detect(self.record(left, U2))
 
+    def test_a_fault_of_one_phase_that_moves_the_current_by_a_tenth_is_none(self):
+        made = self.record(np.where(np.arange(3000) < 1270, 0.46, 1.0), np.where(np.arange(3000) < 1270, 0.26, 1e-3))
+        swings = 1 - 0.03 - 0.06 * np.cos(2 * np.pi * (made.t - 1.0) / 0.27) * (made.t >= 1.0)
+        assert detect(replace(made, P=made.P * swings, Q=made.Q * swings)).end == pytest.approx(1270, abs=10)
+
     def test_a_fault_that_lasts_to_the_end_is_none(self):
         made = self.record(0.79, 0.21)
         with pytest.raises(UserError, match="the record is shorter than the dip"):

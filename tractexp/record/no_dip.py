@@ -9,7 +9,9 @@ from tractexp.record.record import DEAD, Record
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
 PHASE_GONE = 0.42  # the same where next to nothing of a phase is left
 UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
-SAME_CURRENT = 0.1  # of a current that stays: how far it moves, and for how much of the time it may move farther
+# Of a current that stays: how far it moves, and for how much of the time it may move farther. Motors answer a fault of
+# one phase by a tenth.
+SAME_CURRENT = 0.05
 STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
 COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
