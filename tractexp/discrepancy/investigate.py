@@ -228,7 +228,7 @@ def investigate(
 
 
 def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
-    """All that is found from the base model's fit on."""
+    """The investigation from the base model's fit to the verdict."""
     base, first = behind_recorder(base, disagreement(base, seed), seed)
     explained = explanations(base, first, seed)
     base, first = explained.base, explained.steps[0]

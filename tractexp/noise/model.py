@@ -119,7 +119,7 @@ class Noise:
         return drawn
 
     def draw_white(self, rng: np.random.Generator, count: int, drive: Drive, valid: np.ndarray) -> np.ndarray:
-        """Rows (count, C N) as `whiten` makes them of what `draw` draws: shocks, each of them the same in law."""
+        """Rows (count, C N) of the law that `whiten` gives to what `draw` draws: the shocks alone, 0 in gaps."""
         size = count, drive.samples
         shocks = [rng.standard_normal(size) if seen is None else rng.choice(seen, size) for seen in self._shocks]
         return (np.stack(shocks, axis=1) * self._together(valid, drive)).reshape(count, -1)
