@@ -298,6 +298,7 @@ def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
     valid[1, 250:300] = False
     whitened = noise.whiten(noise.draw(rng, 1000, [n]), drive, valid).reshape(1000, 2, n)
     white = noise.draw_white(rng, 1000, drive, valid).reshape(1000, 2, n)
+    assert noise.draw_white(rng, 0, drive, valid).shape == (0, 2 * n)
     directions = np.cos(np.pi * np.outer(np.arange(40), np.arange(n) + 0.5) / n) * np.sqrt(2 / n)
     for rows in (whitened, white):
         assert not rows[:, :, 250:300].any()

@@ -122,7 +122,8 @@ class Noise:
         """Rows (count, C N) of the law that `whiten` gives to what `draw` draws: the shocks alone, 0 in gaps."""
         size = count, drive.samples
         shocks = [rng.standard_normal(size) if seen is None else rng.choice(seen, size) for seen in self._shocks]
-        return (np.stack(shocks, axis=1) * self._together(valid, drive)).reshape(count, -1)
+        rows = np.stack(shocks, axis=1) * self._together(valid, drive)
+        return rows.reshape(count, math.prod(rows.shape[1:]))  # of no rows, too
 
     def worth(self, samples: int) -> float:
         """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
