@@ -216,14 +216,12 @@ def investigate(
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
-        records = Records.of(train)
-        context = Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, substeps)
+        given = model, missing, Records.of(train), bounds or {}, fixed or {}, criteria, effort
+        context = Context.of(*given, substeps)
         findings = _findings(base_fit(context), validate, seed)
         if context.kernels.too_coarse(findings.base_values):
             effort.say("the fits lie where the motor is fast: again with shorter steps")
-            finer = context.kernels.box_substeps
-            context = Context.of(model, missing, records, bounds or {}, fixed or {}, criteria, effort, finer)
-            findings = _findings(base_fit(context), validate, seed)
+            findings = _findings(base_fit(Context.of(*given, context.kernels.box_substeps)), validate, seed)
         return findings
 
 

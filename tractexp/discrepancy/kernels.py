@@ -26,7 +26,7 @@ from tractexp.record import Event
 
 # Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and often no machine;
 # and none longer than effects answer in [s].
-STEPPED, LONGEST = 0.95, 1e-3
+STEP_SHARE, LONGEST_STEP = 0.95, 1e-3
 Key = tuple[frozenset[str], frozenset[str]]  # load effects, and what is tested beside them
 
 
@@ -96,8 +96,8 @@ class Kernels:
         self.bare = Problem(family.model, events, bounds, fixed, substeps)
         self.substeps = self.box_substeps = int(self.bare.step.substeps.max())
         if substeps is None:
-            self.bare = self.bare.stepped(STEPPED)
-            within = math.ceil(max(event.record.step for event in events) / LONGEST - 1e-9)
+            self.bare = self.bare.with_steps_of(STEP_SHARE)
+            within = math.ceil(max(event.record.step for event in events) / LONGEST_STEP - 1e-9)
             own = max(int(self.bare.step.substeps.max()), min(within, self.box_substeps))
             self.substeps = max(own, self._fewest())
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)  # of all coordinates
@@ -107,7 +107,7 @@ class Kernels:
 
     def too_coarse(self, values: np.ndarray) -> bool:
         """Whether fits of the base model's free values (n, d) lie where the steps are longer than in the whole box."""
-        return self.substeps < min(self.box_substeps, self.bare.steps_at(values))
+        return self.substeps < self.box_substeps and self.substeps < self.bare.steps_at(values)
 
     def _fewest(self) -> int:
         """Steps that the models need by which effects are tested, every effect at its null: some are stiff."""

@@ -160,10 +160,12 @@ class Problem:
         self._scale = self.loss.scales(self.events, self.drive)
         self.step = self._step(substeps)
 
-    def stepped(self, share: float) -> "Problem":
+    def with_steps_of(self, share: float) -> "Problem":
         """The same with as many Runge-Kutta steps as this share of the box needs; see `steps_at`."""
+        if share >= self.domain.probed:
+            return self
         other = copy.copy(self)
-        other.step = self._automatic(min(share, self.domain.probed))
+        other.step = self._automatic(share)
         return other
 
     def steps_at(self, values: np.ndarray) -> int:
