@@ -9,7 +9,7 @@ from ._trip import _Trip, relay
 class UndervoltageTrip(_Trip):
     """A share F of the load drops out when the voltage stays below U_trip, and returns after it has recovered.
 
-    Two timers run on the samples: the first while the voltage is below u_t, the second while it is above u_t + h;
+    Two timers run, from where a line through the samples crosses: one below u_t, the other above u_t + h;
     each is empty again as soon as its condition ends. When the first reaches T_t the share is gone, when the second
     reaches T_r it comes back along a ramp of T_b:
 

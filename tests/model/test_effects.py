@@ -459,6 +459,22 @@ def test_what_tripped_comes_back_along_a_ramp_once_the_voltage_is_well_above_the
     assert pytest.approx(1.0, abs=1e-3) == ratio[780:]
 
 
+def test_the_timers_of_a_relay_start_between_samples():
+    """Whatever the moment of the dip between two samples of 4 ms: it trips and returns when an exact one does."""
+    chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.05, reconnect_delay=0.1,
+                    reconnect_margin=0.1, reconnect_ramp=0.0)  # fmt: skip
+    step, fall = 0.004, 0.02
+    for start in 0.1 + step * np.linspace(0, 1, 9):
+        excitation = dip(0.5, step, start=start, sag=0.0)  # a line from 1 at `start` to 0.5 at the end of its fall
+        ratio = run("undervoltage_trip", excitation, chosen)[0] / base(excitation)[0]
+        t = step * np.arange(len(ratio))
+        trips, returns = start + fall * (0.3 / 0.5) + 0.05, start + 0.15 + fall * (0.3 / 0.5) + 0.1
+        clear = step  # on either side, since the relay is softened over one
+        away = (t < trips - clear) | ((t > trips + clear) & (t < returns - clear)) | (t > returns + 2 * clear)
+        exact = np.where((t > trips) & (t < returns), 0.7, 1.0)
+        assert np.abs(ratio - exact)[away].max() < 0.01
+
+
 def test_a_short_dip_does_not_trip():
     excitation = dip(0.5, duration=0.04)
     chosen = values("undervoltage_trip", tripped_share=0.3, trip_level=0.7, trip_delay=0.1)
