@@ -31,6 +31,7 @@ from tractexp.discrepancy.score_test import Score
 from tractexp.discrepancy.window_search import behind_window
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
+from tractexp.parameter import best_distinct, even
 
 MOST_EFFECTS = 2  # of some 3,000 data sets that were judged, three named four times, and never the right ones
 MOST_STEPS = 6  # of adding and leaving out
@@ -41,6 +42,7 @@ WIDELY = 3  # single effects with thresholds or times that are searched to the e
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
+BOX_POINTS, BOX_STARTS, BOX_APART = 1024, 8, 0.5  # points of the base model's box, and the best of them, so far apart
 
 Refits = Mapping[Names, Refit]
 
@@ -87,13 +89,12 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
         if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
             return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
-        for further in (searched_widely, from_other_valleys) if size == 1 else ():
-            ground, better = further(base, ground, refits, tests)
-            if better:
-                refits |= {f.names: f for f in better}
-                fits = best_of(f for f in refits.values() if f.names)
-                tests = sufficient(base, fits, first.noise, seed + size)
+        if size == 1 and (wider := searched_widely(base, first, refits, tests)):
+            refits |= {f.names: f for f in wider}
+            fits = best_of(f for f in refits.values() if f.names)
+            tests = sufficient(base, fits, first.noise, seed + size)
         if size == 1:
+            ground = beneath(first, tests.fit)
             tests = with_families(base, tests, refits, seed)
         else:
             tests = without_needless(base, tests, refits, seed + size)
@@ -147,26 +148,39 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
         return []
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
-    fits = rough_refit(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
-    near = [f for f in fits if f.cost < fits[0].cost + NEAR_BEST]
-    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in near])}
-    fits = [exact.get(f.names, f) for f in fits]
+    fits = refitted(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
+    if size == 1:
+        fits = best_of([*fits, *refitted(context, noise, [s for f in fits for s in in_the_box(context, f)])])
     return best_of(no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
-def searched_widely(
-    base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
-) -> tuple[Disagreement, list[Refit]]:  # fmt: skip
-    """Single effects that have thresholds or times, searched from all their settings, and `first`.
+def refitted(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
+    """The sets of these starts refitted, those near the best exactly; the best first."""
+    fits = rough_refit(context, noise, begin)
+    near = [f for f in fits if f.cost < fits[0].cost + NEAR_BEST]
+    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in near])}
+    return [exact.get(f.names, f) for f in fits]
+
+
+def beneath(first: Disagreement, fit: Refit) -> Disagreement:
+    """The base model's tests in the valley of a fit with an effect: the best one without may lie in another."""
+    context = first.context
+    bare = refit(context, first.noise, [((), context.coordinates.without(fit.unit, fit.names))])[0]
+    away = np.linalg.norm((bare.unit - first.fit.unit)[context.coordinates.base])
+    return first.at(context, bare, first.noise) if away > DISTINCT else first
+
+
+def searched_widely(base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement) -> list[Refit]:
+    """Single effects that have thresholds or times, searched from all their settings.
 
     None where the best so far leaves nothing.
     """
     if best.suffices:
-        return first, []
+        return []
     context = base.context
     singles: Refits = {f.names: f for f in best_of(refits.values()) if len(f.names) == 1}
     fits = wide_refits(context, first.noise, wide_starts(context, refits[()].unit, singles), WIDELY)
-    return first, [f for f in fits if f.deviance < singles[f.names].deviance - NESTED_TOLERANCE]
+    return [f for f in fits if f.deviance < singles[f.names].deviance - NESTED_TOLERANCE]
 
 
 def wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list[Start]]:
@@ -182,34 +196,6 @@ def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start
     at, sized = context.coordinates, unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
     return [(fit.names, at.placed(sized, setting)) for setting in context.catalogue[fit.names[0]].settings]
-
-
-def from_other_valleys(
-    base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
-) -> tuple[Disagreement, list[Refit]]:  # fmt: skip
-    """Single effects that explain more from another valley of the base model, and the base model there.
-
-    Where an effect is missing, a wrong valley may fit better than the right one. Where the best so far leaves nothing,
-    only effects that it would not reject by what one linear step promises.
-    """
-    context, rejects = base.context, base.context.criteria.rejects
-    ground, singles = first, best_of(refits.values())
-    for minimum in base.minima_but(first.fit.unit):
-        fit = refit(context, first.noise, [((), minimum)])[0]
-        if np.linalg.norm((fit.unit - first.fit.unit)[context.coordinates.base]) < DISTINCT:
-            continue
-        there = first.at(context, fit, first.noise)
-        if best.suffices:
-            promising = [(s.name,) for s in there.scores if not rejects(fit.deviance - s.drop - best.fit.deviance)]
-            begun = [start for names in promising for start in starts([there], {(): fit}, names)]
-            fits = refit(context, first.noise, begun) if begun else []
-        else:
-            say = lambda line: context.effort.say(f"{line} from another valley of the base model")  # noqa: E731
-            fits = searched([there], {(): fit}, 1, say)
-        if fits and fits[0].cost < singles[0].cost:
-            ground = there
-        singles = best_of([*singles, *fits])
-    return ground, [f for f in singles if refits.get(f.names) is not f]
 
 
 def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
@@ -264,6 +250,24 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
                 point = _placed(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
             begin.append((names, point))
     return begin
+
+
+def in_the_box(context: Context, fit: Refit) -> list[Start]:
+    """Starts of one effect from all over the base model's box, by one simulation each, of its sizes small and large.
+
+    Where an effect is missing, a wrong valley of the base model may fit better than the right one.
+    """
+    at, candidate = context.coordinates, context.catalogue[fit.names[0]]
+    points = even(BOX_POINTS, len(at.base))
+    units = np.repeat(fit.unit[None], BOX_POINTS, axis=0)
+    units[:, at.base] = points
+    for p, column in zip(candidate.sizes, at.sizes(fit.names), strict=True):
+        size = at.value(p.name, fit.unit) - p.absent
+        sign = candidate.sign(p) or np.sign(size) or 1.0
+        sized = p.absent + sign * max(abs(size), candidate.relevant(p))
+        units[:, column] = at.to_unit(p.name, float(np.clip(sized, *p.bounds)))
+    misfit = np.nan_to_num(np.square(context.residuals(units, fit.names)).sum(axis=(1, 2)), nan=np.inf)
+    return [(fit.names, units[k]) for k in best_distinct(points, misfit, BOX_APART, BOX_STARTS, norm=2)]
 
 
 def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
