@@ -1,9 +1,9 @@
 """Members of families: the kind of a textbook effect at another place, or its place with another law.
 
 All are tried beside the best single textbook effect, whether or not that leaves nothing: a wrong formula may suffice
-where the right one is that of a member. A member takes its place where it explains more beyond what its further
-parameters cost, and leaves nothing. Beside an effect that suffices those that were searched are rivals, whether or not
-they explain more.
+where the right one is that of a member. A member that leaves nothing takes its place where it explains more beyond what
+its further parameters cost, or where it fits nearly as well and the textbook effect leaves something. Beside an effect
+that suffices those that were searched are rivals, whether or not they explain more.
 """
 
 import itertools
@@ -16,6 +16,7 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.fit_effort import NEAR_BEST
 from tractexp.discrepancy.fitting import Names, Refit, Start, off_bounds, wide_refits
 from tractexp.noise import Noise
 
@@ -29,15 +30,16 @@ def against_members(
 ) -> tuple[Disagreement, list[Refit]]:
     """The tests at the best member that leaves nothing and explains more than the best textbook effect, or `tests`.
 
-    With the fits of the members that are held against it: none where neither leaves nothing, nor where nothing is
-    missing.
+    With the fits of the members that are held against it: none where neither leaves nothing, since what no effect has
+    a member imitates best, nor where nothing is missing.
     """
     if tests.suffices and not tests.fit.names:
         return tests, []
     context, noise = base.context, tests.noise
     fits = member_fits(context, noise, refits, {m.effect.family for m in context.catalogue.members})
     for k, fit in enumerate(fits[:EXAMINED]):
-        if not worth(fit, tests.fit, context.criteria.further_name_p):
+        near = not tests.suffices and fit.cost < tests.fit.cost + NEAR_BEST
+        if not near and not worth(fit, tests.fit, context.criteria.further_name_p):
             continue
         there = examined(base.quiet, fit, noise, seed + k)
         if there.suffices:
