@@ -15,6 +15,7 @@ from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
+ROUNDS, QUIETER = 3, 0.5  # of noise and fit in turn, as long as a fit leaves less than this share of its noise
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 MISSED = 20.0  # factor by which scales that are not exact may miss p
 
@@ -126,9 +127,12 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     """
     context = quiet.context
     t = tangent(context, fit, noise)
-    noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
-    fit = refit(context, noise, [(fit.names, fit.unit)])[0]
-    t = tangent(context, fit, noise)
+    for _ in range(ROUNDS):
+        noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
+        fit = refit(context, noise, [(fit.names, fit.unit)])[0]
+        t = tangent(context, fit, noise)
+        if fit.deviance > QUIETER * context.samples:
+            break  # else this is the noise of a worse fit
     projection = t.whitened(noise)
     scores = projection.scores()
     chance = chance_at(t, projection, noise, quiet, seed, plain=True)

@@ -66,12 +66,15 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
 
 
 def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
-    """The sets of the search by likelihood; none beside faults of the measurement, which what is missing looks like."""
+    """The single effects of the search by likelihood, and the larger sets that the fitted events do not reject.
+
+    None beside faults of the measurement, which what is missing looks like.
+    """
     surviving, noise = weighed.survivors, weighed.survivors.explanations.last.noise
     explained, context = surviving.explanations, surviving.explanations.base.context
     least = context.criteria.shown
     rejected = {r.fit.names: r.rejected for r in surviving.rivals}
-    fits = {names: f for names, f in explained.refits.items() if names and (names in rejected or len(names) == 1)}
+    fits = {n: f for n, f in explained.refits.items() if n and (len(n) == 1 or not rejected.get(n, True))}
     if weighed.faults or not fits:
         return weighed
     wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
