@@ -266,8 +266,10 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
         sign = candidate.sign(p) or np.sign(size) or 1.0
         sized = p.absent + sign * max(abs(size), candidate.relevant(p))
         units[:, column] = at.to_unit(p.name, float(np.clip(sized, *p.bounds)))
-    misfit = np.nan_to_num(np.square(context.residuals(units, fit.names)).sum(axis=(1, 2)), nan=np.inf)
-    return [(fit.names, units[k]) for k in best_distinct(points, misfit, BOX_APART, BOX_STARTS, norm=2)]
+    problem, values = context.kernels.at(fit.names, units)
+    context.effort.spend(BOX_POINTS)
+    chosen = best_distinct(points, problem.objective(values), BOX_APART, BOX_STARTS, norm=2)
+    return [(fit.names, units[k]) for k in chosen]
 
 
 def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
