@@ -9,9 +9,9 @@ from ._trip import _Trip, relay
 class UndervoltageTrip(_Trip):
     """A share F of the load drops out when the voltage stays below U_trip, and returns after it has recovered.
 
-    Two timers run, from where a line through the samples crosses: one below u_t, the other above u_t + h;
-    each is empty again as soon as its condition ends. When the first reaches T_t the share is gone, when the second
-    reaches T_r it comes back along a ramp of T_b:
+    Two timers run: the first while the voltage is below u_t, the second while it is above u_t + h; each is empty again
+    as soon as its condition ends. When the first reaches T_t the share is gone, when the second reaches T_r it comes
+    back along a ramp of T_b:
 
         P -> (1 - F g) P,   Q -> (1 - F g) Q,   g = 1 while tripped, down to 0 within T_b, else 0
 
@@ -19,8 +19,9 @@ class UndervoltageTrip(_Trip):
     positive sequence of the last half cycle.
 
     Source: NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (one stage).
-    Departures: levels count from the voltage before the event; thresholds are softened over 1 % of voltage and one
-    sample so that derivatives exist; the tripped motors come back as if they had run on.
+    Departures: levels count from the voltage before the event; the timers take the voltage between samples for a line;
+    thresholds are softened over 1 % of voltage and one sample so that derivatives exist; the tripped motors come back
+    as if they had run on.
     """
 
     tripped_share, trip_level, trip_delay, reconnect_delay, reconnect_margin, reconnect_ramp = relay(

@@ -163,7 +163,7 @@ def refitted(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Ref
 
 
 def beneath(first: Disagreement, fit: Refit) -> Disagreement:
-    """The base model's tests in the valley of a fit with an effect: the best one without may lie in another."""
+    """The tests of the base model in the valley of a fit with an effect, where its best fit lies in another."""
     context = first.context
     bare = refit(context, first.noise, [((), context.coordinates.without(fit.unit, fit.names))])[0]
     away = np.linalg.norm((bare.unit - first.fit.unit)[context.coordinates.base])
@@ -253,9 +253,11 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
 
 
 def in_the_box(context: Context, fit: Refit) -> list[Start]:
-    """Starts of one effect from all over the base model's box, by one simulation each, of its sizes small and large.
+    """Starts of one effect from all over the base model's box, by one simulation each: the effect as it was fitted, but
+    of relevant size.
 
-    Where an effect is missing, a wrong valley of the base model may fit better than the right one.
+    Where an effect is missing, a wrong valley of the base model may fit better than the right one. There a right effect
+    may have no size at all.
     """
     at, candidate = context.coordinates, context.catalogue[fit.names[0]]
     points = even(BOX_POINTS, len(at.base))

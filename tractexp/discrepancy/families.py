@@ -28,7 +28,7 @@ BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value 
 def against_members(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
 ) -> tuple[Disagreement, list[Refit]]:
-    """The tests at the best member that leaves nothing and explains more than the best textbook effect, or `tests`.
+    """The tests at the best member that leaves nothing and takes the place of the best textbook effect, or `tests`.
 
     With the fits of the members that are held against it: none where neither leaves nothing, since what no effect has
     a member imitates best, nor where nothing is missing.
