@@ -4,6 +4,7 @@ import itertools
 import os
 import subprocess
 import sys
+import warnings
 from types import ModuleType
 
 import numpy as np
@@ -16,7 +17,7 @@ from tractexp.errors import UserError
 from tractexp.kernel.layout import LANES
 from tractexp.model import operations
 from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation
-from tractexp.model.model import compose
+from tractexp.model.model import ModelResponse, compose
 from tractexp.model.parts import Static
 from tractexp.model.sites import SITES
 from tractexp.model.states import State
@@ -235,7 +236,7 @@ def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_pat
     program = """if True:
         import numpy as np
         from tractexp.model.drive import Drive, Excitation
-        from tractexp.model.model import compose
+        from tractexp.model.model import ModelResponse, compose
         from tractexp.plugin import get
         model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
         values = np.array([p.default for p in model.parameters]) * np.linspace(0.95, 1.05, 20)[:, None]
@@ -262,6 +263,17 @@ def test_sums_are_those_of_the_responses(model):
     response, errors = model.simulate(drive, values), model.errors(drive, values)
     assert errors.sums[0, 0] == pytest.approx(((response.P - P) ** 2).sum(axis=1), rel=1e-12)
     assert errors.sums[0, 1] == pytest.approx(((response.Q - Q) ** 2).sum(axis=1), rel=1e-12)
+
+
+def test_errors_of_what_diverges_behind_a_measurement_are_infinite_without_a_warning(monkeypatch):
+    behind = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(),
+                     [get("effect", "time_skew")()])  # fmt: skip
+    drive = Drive.of([dip()])
+    outputs = np.full((2, 1, drive.samples), 1e200)
+    monkeypatch.setattr(type(behind), "simulate", lambda *_: ModelResponse(outputs, np.zeros((1, 1))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isinf(behind.errors(drive, np.r_[TRUTH, 0.0]).sums).all()
 
 
 def test_events_in_one_pass_are_the_events_one_by_one(model):

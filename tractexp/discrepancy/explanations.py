@@ -5,6 +5,7 @@ look alike; the shortlist is refitted nonlinearly from several starts, side by s
 """
 
 import itertools
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -29,6 +30,7 @@ from tractexp.discrepancy.fitting import (
 )  # fmt: skip
 from tractexp.discrepancy.score_test import Score
 from tractexp.discrepancy.window_search import behind_window
+from tractexp.identification.descent import MOST_NUMBERS
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even
@@ -270,7 +272,9 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
         units[:, column] = at.to_unit(p.name, float(np.clip(sized, *p.bounds)))
     problem, values = context.kernels.at(fit.names, units)
     context.effort.spend(BOX_POINTS)
-    chosen = best_distinct(points, problem.objective(values), BOX_APART, BOX_STARTS, norm=2)
+    groups = np.array_split(values, math.ceil(BOX_POINTS * context.drive.measured.size / MOST_NUMBERS))
+    misfit = np.concatenate([problem.objective(group) for group in groups])
+    chosen = best_distinct(points, misfit, BOX_APART, BOX_STARTS, norm=2)
     return [(fit.names, units[k]) for k in chosen]
 
 

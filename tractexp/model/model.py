@@ -198,7 +198,8 @@ class Model:
         """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
         if self.measurements or drive.windows:
             response = self.simulate(drive, values, substeps)  # the measurement stands between kernel and sums
-            square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+            with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
+                square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
             stored = np.add.reduceat(square, drive.first[:-1], axis=2)
             return Errors(np.moveaxis(stored, 2, 0), response.miss.sum(axis=0))
         sums, miss = self._run(drive, self._candidates(drive, values), substeps)
