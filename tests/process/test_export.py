@@ -220,7 +220,7 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
         (
             "modelica",
             ("electromechanical", "zip", ("undervoltage_trip",)),
-            "cannot represent 'time_below', which acts on",
+            "cannot represent 'voltage_last', which acts on",
         ),
         (
             "modelica",

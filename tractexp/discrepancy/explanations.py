@@ -91,11 +91,11 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
         if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
             return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
-        if size == 1 and (wider := searched_widely(base, first, refits, tests)):
-            refits |= {f.names: f for f in wider}
-            fits = best_of(f for f in refits.values() if f.names)
-            tests = sufficient(base, fits, first.noise, seed + size)
         if size == 1:
+            if wider := searched_widely(base, first, refits, tests):
+                refits |= {f.names: f for f in wider}
+                fits = best_of(f for f in refits.values() if f.names)
+                tests = sufficient(base, fits, first.noise, seed + size)
             ground = beneath(first, tests.fit)
             tests = with_families(base, tests, refits, seed)
         else:
@@ -144,7 +144,9 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
 
 
 def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
-    """The most promising sets of one size refitted, the best first. `steps` begin with one without effects."""
+    """The most promising sets of one size refitted, single effects from all over the base model's box, too; the best
+    first. `steps` begin with one without effects.
+    """
     context, noise = steps[0].context, steps[-1].noise
     if not (wanted := shortlist(steps, size)):
         return []
