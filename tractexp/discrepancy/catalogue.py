@@ -41,6 +41,15 @@ class Candidate:
         low, high = parameter.bounds
         return float(self.effect.relevant.get(parameter.name, 0.1 * (high - low)))
 
+    def sized(self, parameter: Parameter, size: float, least: float) -> float:
+        """The value of one of `sizes` that is `size` off its null, or `least` relevant sizes where that is more.
+
+        A null on a bound is left into the box, whatever sign the size has.
+        """
+        sign = self.sign(parameter) or np.sign(size) or 1.0
+        moved = sign * max(sign * size, least * self.relevant(parameter))
+        return float(np.clip(parameter.absent + moved, *parameter.bounds))
+
 
 @dataclass(frozen=True, eq=False)
 class Catalogue:

@@ -9,13 +9,13 @@ from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.chance import Chance, chance_at, is_noise_exact, scales
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.fit_effort import NOISE_ROUNDS, QUIETER
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.linearization import Linearization, rich_residuals, tangent
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
-ROUNDS, QUIETER = 3, 0.5  # of noise and fit in turn, as long as a fit leaves less than this share of its noise
 PLAIN = 1e-10  # a score of this p needs no exact threshold
 MISSED = 20.0  # factor by which scales that are not exact may miss p
 
@@ -127,7 +127,7 @@ def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool
     """
     context = quiet.context
     t = tangent(context, fit, noise)
-    for _ in range(ROUNDS):
+    for _ in range(NOISE_ROUNDS):
         noise = quiet.of(fit.unit, rich_residuals(t, t.residual[None])[0], t.residual, t.explaining)
         fit = refit(context, noise, [(fit.names, fit.unit)])[0]
         t = tangent(context, fit, noise)

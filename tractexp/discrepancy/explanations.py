@@ -5,7 +5,6 @@ look alike; the shortlist is refitted nonlinearly from several starts, side by s
 """
 
 import itertools
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,9 +13,10 @@ from scipy.special import chdtrc
 
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.context import Context
+from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.discrepancy.families import against_members
-from tractexp.discrepancy.fit_effort import NEAR_BEST, NESTED_TOLERANCE
+from tractexp.discrepancy.fit_effort import BOX_APART, BOX_POINTS, BOX_STARTS, NEAR_BEST, NESTED_TOLERANCE
 from tractexp.discrepancy.fitting import (
     Names,
     Refit,
@@ -30,7 +30,6 @@ from tractexp.discrepancy.fitting import (
 )  # fmt: skip
 from tractexp.discrepancy.score_test import Score
 from tractexp.discrepancy.window_search import behind_window
-from tractexp.identification.descent import MOST_NUMBERS
 from tractexp.identification.local_minima import DISTINCT
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even
@@ -44,7 +43,6 @@ WIDELY = 3  # single effects with thresholds or times that are searched to the e
 RANKS = 2  # settings of a candidate to start from
 FAMILIES = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
-BOX_POINTS, BOX_STARTS, BOX_APART = 1024, 8, 0.5  # points of the base model's box, and the best of them, so far apart
 
 Refits = Mapping[Names, Refit]
 
@@ -82,10 +80,11 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
 
     Begun anew behind the recorder's window, where one takes the place of faults of the measurement.
     """
-    steps, ground = [first], first
+    steps = [first]
     refits: dict[Names, Refit] = {(): first.fit}
     while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
+        ground = beneath(first, steps[-1].fit) if size > 1 else first
         fits = searched([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= {f.names: f for f in fits}
         if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
@@ -96,7 +95,6 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
                 refits |= {f.names: f for f in wider}
                 fits = best_of(f for f in refits.values() if f.names)
                 tests = sufficient(base, fits, first.noise, seed + size)
-            ground = beneath(first, tests.fit)
             tests = with_families(base, tests, refits, seed)
         else:
             tests = without_needless(base, tests, refits, seed + size)
@@ -154,7 +152,8 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
     fits = refitted(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
     if size == 1:
-        fits = best_of([*fits, *refitted(context, noise, [s for f in fits for s in in_the_box(context, f)])])
+        boxes = each_apart(lambda fit: in_the_box(context, fit), fits, context.effort)
+        fits = best_of([*fits, *refitted(context, noise, list(itertools.chain(*boxes)))])
     return best_of(no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
@@ -269,14 +268,10 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     units[:, at.base] = points
     for p, column in zip(candidate.sizes, at.sizes(fit.names), strict=True):
         size = at.value(p.name, fit.unit) - p.absent
-        sign = candidate.sign(p) or np.sign(size) or 1.0
-        sized = p.absent + sign * max(abs(size), candidate.relevant(p))
-        units[:, column] = at.to_unit(p.name, float(np.clip(sized, *p.bounds)))
+        units[:, column] = at.to_unit(p.name, candidate.sized(p, size, least=1.0))
     problem, values = context.kernels.at(fit.names, units)
     context.effort.spend(BOX_POINTS)
-    groups = np.array_split(values, math.ceil(BOX_POINTS * context.drive.measured.size / MOST_NUMBERS))
-    misfit = np.concatenate([problem.objective(group) for group in groups])
-    chosen = best_distinct(points, misfit, BOX_APART, BOX_STARTS, norm=2)
+    chosen = best_distinct(points, problem.objective(values), BOX_APART, BOX_STARTS, norm=2)
     return [(fit.names, units[k]) for k in chosen]
 
 
@@ -286,7 +281,5 @@ def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndar
     score = ranked[min(rank, len(ranked) - 1)]
     values = dict(score.setting)
     for p in candidate.sizes:
-        size, sign = score.size[p.name], candidate.sign(p)
-        moved = max(size * sign, candidate.relevant(p) * LEAST_START) * sign if sign else size
-        values[p.name] = float(np.clip(p.absent + moved, *p.bounds))
+        values[p.name] = candidate.sized(p, score.size[p.name], LEAST_START)
     return at.context.coordinates.placed(unit, values)

@@ -86,8 +86,7 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
     for ground, textbook_values in begun:
         start = dict(textbook_values)
         for size in member.sizes:
-            low, high = size.bounds
-            start.setdefault(size.name, float(np.clip(size.absent + BEGUN * member.relevant(size), low, high)))
+            start.setdefault(size.name, member.sized(size, 0.0, BEGUN))
         for setting in open_settings(member, tuple(start)):
             values = {p.name: (setting | start).get(p.name, p.default) for p in effect.parameters}
             wanted.append(((member.name,), at.placed(ground, values)))

@@ -38,5 +38,14 @@ MOST_STARTS = 8
 # stages may each be at their best beside the other with the other's times (6115 where 5843 was to be had).
 SCATTER_POINTS, SCATTER_REACH, SCATTER_ROUNDS = 24, 0.5, 3
 
+# Points of the base model's box at each of which a single effect is simulated as it was fitted, and the best of them,
+# so far apart in ranges, that it is descended from: where it is missing, the base model's best fit may lie in a wrong
+# valley.
+BOX_POINTS, BOX_STARTS, BOX_APART = 1024, 8, 0.5
+
+# Noise and fit in turn at one set, as long as the fit leaves less than this share of its noise, which then is that of a
+# worse fit: a relay whose return had been missed was louder by twenty.
+NOISE_ROUNDS, QUIETER = 3, 0.5
+
 # How near a bound, in ranges, a parameter rests on it: descents clip to the bound, rounding stays far below this.
 BOUND_MARGIN = 1e-3

@@ -22,6 +22,7 @@ from tractexp.texts import text_of
 
 TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
+MOST_STORED = 8_000_000  # numbers of responses that are held at once
 LONGEST = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
 CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
 
@@ -195,15 +196,27 @@ class Model:
         return ModelResponse(outputs, miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
-        """Weighted squared errors of every candidate over every event, in one pass and without storing responses."""
-        if self.measurements or drive.windows:
-            response = self.simulate(drive, values, substeps)  # the measurement stands between kernel and sums
-            with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
-                square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
-            stored = np.add.reduceat(square, drive.first[:-1], axis=2)
-            return Errors(np.moveaxis(stored, 2, 0), response.miss.sum(axis=0))
-        sums, miss = self._run(drive, self._candidates(drive, values), substeps)
-        return Errors(sums, miss.sum(axis=0))
+        """Weighted squared errors of every candidate over every event, in one pass and without storing responses.
+
+        Those of a few candidates are stored at a time where the measurement stands between kernel and sums.
+        """
+        if not (self.measurements or drive.windows):
+            sums, miss = self._run(drive, self._candidates(drive, values), substeps)
+            return Errors(sums, miss.sum(axis=0))
+        values = np.atleast_2d(values)
+        together = max(1, MOST_STORED // drive.measured.size)
+        groups = np.split(values, range(together, values.shape[-2], together), axis=-2)
+        parts = [self._errors_of_responses(drive, group, substeps) for group in groups]
+        return Errors(np.concatenate([p.sums for p in parts], axis=2), np.concatenate([p.miss for p in parts]))
+
+    def _errors_of_responses(
+        self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int
+    ) -> Errors:  # fmt: skip
+        response = self.simulate(drive, values, substeps)
+        with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
+            square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
+        sums = np.add.reduceat(square, drive.first[:-1], axis=2)
+        return Errors(np.moveaxis(sums, 2, 0), response.miss.sum(axis=0))
 
     def substeps(
         self,
