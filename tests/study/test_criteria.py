@@ -51,10 +51,10 @@ def refitted(deviance, parameters):
     return Refit(("one",), np.zeros(0), deviance, parameters)
 
 
-def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
+def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0, explained=0.0):
     """What held-out events say of an explanation."""
     gap = GapTest(None, None, gain, abs(gain) * (1 / closed - 1), expected, c.shown, None)
-    return Assessment(gap, SimpleNamespace(criteria=c), (), p_left)
+    return Assessment(gap, SimpleNamespace(criteria=c), (), explained, p_left)
 
 
 def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
@@ -139,7 +139,8 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
-    "shown": (12.0, lambda c: judged_by(c, gain=-1.0, expected=11.0).helps, False),
+    "shown": (9.0, lambda c: judged_by(c, gain=10.0).helps, False),
+    "evident": (90.0, lambda c: judged_by(c, gain=5.0, expected=6.0, explained=95.0).helps, False),
     "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
     "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
     "window_share": (0.4, lambda c: c.least_window(best=1000.0) < 450.0, False),

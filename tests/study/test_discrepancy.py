@@ -573,14 +573,29 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
     assert calls == [2, 6, 2, 4]
 
 
-def test_a_held_out_event_speaks_only_where_it_can_show_the_effect(planted):
-    """A true explanation gains about what both curves are apart; one of no distance is neither helped nor hurt."""
+def test_a_name_takes_held_out_events_that_show_it(planted):
+    """A true explanation gains about what both curves are apart; of little distance it is neither shown nor denied."""
     shown = planted.validate
-    assert shown.telling
     assert abs(shown.gain - shown.expected) < 6 * np.sqrt(shown.expected)
     assert shown.helps
-    assert not replace(shown, gain=-1.0).helps
-    assert replace(shown, gain=-1.0, expected=1.0).helps
+    for gain, expected, open_ in ((-1.0, 100.0, False), (5.0, 100.0, True), (-1.0, 6.0, True)):
+        there = replace(shown, gain=gain, expected=expected)
+        assert not there.helps
+        assert there.open == open_
+
+
+def test_a_small_effect_that_the_held_out_dip_is_too_mild_to_show_is_named_where_the_fitted_ones_leave_no_doubt():
+    made = events("stator_resistance", size=0.1, count=3)
+    seen, held = [made[0], made[2]], [made[1]]
+    told = investigate(base(), seen, held, {}, {}, only=FEW)
+    assert told.verdict.word == "unexplained"
+    assert (
+        "stator_resistance, is not borne out by the held-out ones: they are too mild to show it" in told.verdict.reason
+    )
+    surer = investigate(base(), seen, held, {}, {}, only=FEW, criteria=Criteria(evident=20.0))
+    assert surer.names == ("stator_resistance",)
+    assert "the held-out events are too mild to show it" in surer.verdict.reason
+    assert investigate(base(), seen, (), {}, {}, only=FEW).names == ("stator_resistance",)  # nobody asks there
 
 
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):

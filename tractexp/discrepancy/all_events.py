@@ -1,8 +1,7 @@
 """Fitted and held-out events together, and explanations fitted to all of them.
 
 What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
-held-out ones though the effect is there; and what none of them shows, such as a second stage or a second effect, is
-found only where all are searched.
+held-out ones though the effect is there.
 """
 
 import functools
@@ -12,16 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import BaseFit, fitted_from
+from tractexp.discrepancy.base_fit import fitted_from
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
-from tractexp.discrepancy.explanations import explanations
+from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.fitting import Names, Refit, best_of, refit, wide_refit
 from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.records import Records
-from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.noise import Noise
 from tractexp.record import Event
 
@@ -92,24 +89,15 @@ class AllEvents:
         better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
-    def disagreement(self, local_minima: Sequence[np.ndarray], seed: int) -> tuple[BaseFit, Disagreement]:
-        """The base model's fit to all events and its tests; `local_minima` (D,) are its own on the fitted ones."""
+    def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
+        """How often chance leaves as much as the base model does of all events; 1 where it has no steady state there.
+
+        `local_minima` (D,) are its own on the fitted events.
+        """
+        if not np.isfinite(self.plain.deviance):
+            return 1.0
         wide = [self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
-        base = fitted_from(self.context, wide, wide[1:])
-        return base, disagreement(base, seed)
-
-    def searched(self, base: BaseFit, first: Disagreement, seed: int) -> Survivors:
-        """What explains all events, searched for as in the fitted ones."""
-        self.context.effort.say("searching again, fitted to all events")
-        return survivors(explanations(base, first, seed), seed)
-
-    def carried_back(self, fits: Sequence[Refit], seed: int) -> list[tuple[Refit, JointFit]]:
-        """Explanations (D of all events) as fitted to the fitted events alone, and to all."""
-        there = {f.names: self._narrowed(f) for f in fits}
-        alone = {names: refit(self.fitted, self.noise, [(names, u)], self.faults)[0] for names, u in there.items()}
-        again = refit(self.context, self.level, [(f.names, f.unit) for f in fits], self.faults)
-        both = lambda f: (alone[f.names], self._joint_fit(f, alone[f.names], seed))  # noqa: E731
-        return each_apart(both, again, self.context.effort)
+        return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
 
     def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])

@@ -63,14 +63,14 @@ class GapTest:
         return self.gain / whole if whole > 0 else np.nan
 
     @property
-    def telling(self) -> bool:
-        """Whether these events could show a true explanation."""
-        return self.expected >= self.shown
+    def helps(self) -> bool:
+        """Whether these events show that the extension helps."""
+        return self.gain >= self.shown
 
     @property
-    def helps(self) -> bool:
-        """Whether the extension helps on these events, or they are too mild to tell."""
-        return self.gain > 0 or not self.telling
+    def open(self) -> bool:
+        """Whether these events are too mild to show that, and to deny it."""
+        return not self.helps and (self.gain > 0 or self.expected < self.shown)
 
 
 def closed(before: Curves, after: Curves) -> float:

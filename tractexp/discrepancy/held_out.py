@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Names, Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed
@@ -24,20 +24,26 @@ from tractexp.record import Event
 class Assessment:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
-    Where it was fitted to all events, `p_left` tells how often chance leaves as much, and `behind` whether the best
-    explanation there rejects it.
+    `explained` is the deviance that it explains of the fitted events. Where it was fitted to all events, `p_left` tells
+    how often chance leaves as much, and `behind` whether the best explanation there rejects it.
     """
 
     gap: GapTest
     context: Context
     units: tuple[np.ndarray, np.ndarray]
+    explained: float = 0.0
     p_left: float = 1.0
     behind: bool = False
 
     @property
+    def borne_out(self) -> bool:
+        """Whether the held-out events show it, or are too mild to and the fitted ones leave no doubt."""
+        return self.gap.helps or (self.gap.open and self.explained >= self.context.criteria.evident)
+
+    @property
     def helps(self) -> bool:
         """Whether the explanation is worth having beyond the events it was fitted to."""
-        return self.gap.helps and self.p_left >= self.context.criteria.adequate_p and not self.behind
+        return self.borne_out and self.p_left >= self.context.criteria.adequate_p and not self.behind
 
     @property
     def convincing(self) -> bool:
@@ -88,10 +94,6 @@ class HeldOut:
         """The effects of an explanation, with the faults of the measurement beside it."""
         return tuple(sorted((*rival.fit.names, *self.faults)))
 
-    def fitted_to_all(self, fits: Sequence[Refit]) -> "HeldOut":
-        """With explanations that were fitted to all events."""
-        return replace(self, together=tuple(fits), extended={**self.extended, **{f.names: f for f in fits}})
-
 
 def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
     """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
@@ -111,14 +113,14 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     both = AllEvents(context, events, noise, faults, bare)
     if not any(s.fit.names or faults for s in surviving.adequate):
         silent = context.domain.calibrated and explained.empty and explained.steps[0].adequate
-        return searched_again(as_fitted, both, seed) if silent and shows_more(both) else as_fitted
+        if silent and shows_more(both):
+            return replace(as_fitted, p_of_all=both.p_left(explained.base.local_minima, seed))
+        return as_fitted
     count = len(surviving.adequate)
     context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    assessments, again = weighed(both, as_fitted.extended, seed)
-    result = replace(as_fitted, assessments=assessments).fitted_to_all(again)
-    if result.retained or explained.steps[0].adequate:
-        return result
-    return searched_again(result, both, seed)
+    assessments, again = weighed(both, extended, seed)
+    joint = {fit.names: fit for fit in again}
+    return replace(as_fitted, assessments=assessments, together=tuple(again), extended={**extended, **joint})
 
 
 def telling(explained: Explanations, bare: Refit) -> Names:
@@ -153,12 +155,17 @@ def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tupl
     of it open; it is returned as fitted to all.
     """
     context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
-    assessments = judged_on(context, both.events, both.bare, fits)
+
+    def judged(some: Sequence[Refit]) -> dict[Names, Assessment]:
+        there = judged_on(context, both.events, both.bare, some)
+        return {n: replace(one, explained=both.bare.deviance - extended[n].deviance) for n, one in there.items()}
+
+    assessments = judged(fits)
     if both.undoubted(fits) and assessments[fits[0].names].convincing and assessments[fits[0].names].helps:
         return assessments, []
     joint = {t.fit.names: t for t in both.compared(fits, seed)}
     best = min(t.fit.cost for t in joint.values())
-    helping = {names for names, one in assessments.items() if one.gap.helps}
+    helping = {names for names, one in assessments.items() if one.borne_out}
     sufficing = {names for names in helping if assessments[names].gap.left <= criteria.shown}
     for names, fitted in joint.items():
         behind = criteria.rejects(fitted.fit.cost - best)
@@ -167,7 +174,7 @@ def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tupl
         fitted.fit for names, fitted in joint.items()
         if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria)
     ]  # fmt: skip
-    return assessments | (judged_on(context, both.events, both.bare, again) if again else {}), again
+    return assessments | (judged(again) if again else {}), again
 
 
 def shows_more(both: AllEvents) -> bool:
@@ -175,43 +182,6 @@ def shows_more(both: AllEvents) -> bool:
     there, (unit,), noise = carried(both.fitted, both.events, [both.bare])
     left = beyond_chance(there, unit, (), noise, there.coordinates.before, pushed(there, unit, (), noise))
     return left > both.fitted.criteria.shown
-
-
-def searched_again(result: HeldOut, both: AllEvents, seed: int) -> HeldOut:
-    """With what a search in all events finds, where the held-out ones deny all that the fitted ones had shown, or show
-    what those do not.
-
-    The fitted events may show only a part of what is there, such as the first of two stages of a relay, or one of two
-    effects. What all events confirm is taken, unless it comes to what was denied, which was fitted to all events, too.
-    Of waveforms nothing is, for no criterion was calibrated with it.
-    """
-    context, surviving = both.fitted, result.survivors
-    if not context.domain.calibrated or not np.isfinite(both.plain.deviance):  # there it has no steady state
-        return result
-    base, first = both.disagreement(surviving.explanations.base.local_minima, seed)
-    if first.adequate:
-        return result
-    search, result = both.searched(base, first, seed), replace(result, p_of_all=first.p_left)
-    of_all = {s.fit.names: s for s in search.adequate if s.fit.names}
-    if not of_all or search.explanations.chosen.names in result.assessments:
-        return result
-    plain = refit(both.context, search.explanations.last.noise, [((), both.plain.unit)], faults=())[0]
-    both = replace(both, faults=telling(search.explanations, plain))
-    tried = both.carried_back([s.fit for s in of_all.values()], seed)
-    fits = [(alone, fitted.fit) for alone, fitted in tried if fitted.confirmed(context.criteria)]
-    if not fits:
-        return result
-    quiet = surviving.explanations.base.quiet
-
-    def on_fitted_events(alone: Refit) -> Rival:  # as the others are told
-        tests = examined(quiet, alone, result.noise, seed, plain=True)
-        return replace(of_all[alone.names], fit=alone, lowered=result.bare.deviance - alone.deviance, tests=tests)
-
-    rivals = tuple(on_fitted_events(alone) for alone, _ in fits)
-    surviving = replace(surviving, retained=rivals, rivals=(*rivals, *surviving.rivals))
-    assessments = {**result.assessments, **judged_on(context, both.events, both.bare, [fit for _, fit in fits])}
-    result = replace(result, survivors=surviving, assessments=assessments, faults=both.faults)
-    return result.fitted_to_all([fit for _, fit in fits])
 
 
 def judged_on(

@@ -91,7 +91,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
         sets[fit.names] = PredictedDeviance(fit, one.left, one.after, bool(rejected.get(fit.names, False)), least)
     predicted = Predictions(context.catalogue, sets)
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
-    if not chosen or not all(gaps[f.names].telling and gaps[f.names].helps for f in chosen):
+    if not chosen or not all(gaps[f.names].helps for f in chosen):
         return weighed
 
     def rival(fit: Refit) -> Rival:

@@ -11,6 +11,7 @@ from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.survivors import Rival
+from tractexp.errors import DATA
 from tractexp.identification.model_error import in_percent
 from tractexp.record import Event
 from tractexp.wording import alternatives, joined, listed, percent
@@ -64,6 +65,9 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
     nearest = _nearest(weighed, validate) if word == UNEXPLAINED else None
     sets = tuple(map(weighed.names_of, weighed.retained)) if word in (NAMED, TIED) else ()
     reason = _reason(word, weighed, sets, nearest)
+    judged = [weighed.assessments[r.fit.names].gap for r in weighed.retained if r.fit.names in weighed.assessments]
+    if sets and judged and all(there.open for there in judged):
+        reason += "; the held-out events are too mild to show it"
     if weighed.together and weighed.retained:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if (window := context.records.window) is not None:
@@ -122,14 +126,16 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     if not weighed.retained and left.adequate and not left.explanations.empty:
         seemed = " or ".join(joined(_spoken(weighed.names_of(s), weighed)) for s in left.adequate)
         if word == UNEXPLAINED:
-            return f"what explains the fitted events, {seemed}, does not hold on the held-out ones: {_denied(weighed)}"
+            return (
+                f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {_denied(weighed)}"
+            )
         return (
             f"what seemed to help on the fitted events, {seemed}, does not help on the held-out ones, and what the base"
             " model leaves is no more than chance leaves"
         )
     if word == UNEXPLAINED:
         alone = "the fitted events alone show no disagreement, but all events together do"
-        return f"{alone}, and none of the {len(first.context.catalogue.candidates)} effects tested explains it"
+        return f"{alone}; fit the held-out ones, too ({DATA.train})"
     return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
 
 
@@ -245,7 +251,10 @@ def _none(weighed: HeldOut, most: int = 1) -> str:
 def _denied(weighed: HeldOut) -> str:
     """What the held-out events have against the best explanation of the fitted ones."""
     assessment = weighed.assessments[weighed.survivors.adequate[0].fit.names]
-    if not assessment.gap.helps:
+    there = assessment.gap
+    if not assessment.borne_out:
+        if there.open:
+            return "they are too mild to show it, and the fitted ones leave a doubt; hold out a deeper dip"
         return "there it fits no better than the base model"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
