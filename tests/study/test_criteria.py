@@ -135,7 +135,7 @@ def proposed(closed=0.9, p=1e-6):
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
-    "adequate_p": (0.002, lambda c: at_fit(c, 1.0, left=0.0025).adequate, False),
+    "adequate_p": (0.0006, lambda c: at_fit(c, 1.0, left=0.0008).adequate, False),
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
     "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
@@ -154,7 +154,7 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "decided": (0.9, chosen_dip, 0.6),
 }
 FURTHER = [  # decisions by a criterion that has one above, too
-    ("adequate_p", 0.002, lambda c: judged_by(c, p_left=0.0025).helps, False),
+    ("adequate_p", 0.0006, lambda c: judged_by(c, p_left=0.0008).helps, False),
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
     ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
     ("ahead", 1.45, lambda c: proposed(closed=0.54).stands(c), False),

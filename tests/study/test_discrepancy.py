@@ -585,7 +585,7 @@ def test_a_name_takes_held_out_events_that_show_it(planted):
 
 
 def test_a_small_effect_that_the_held_out_dip_is_too_mild_to_show_is_named_where_the_fitted_ones_leave_no_doubt():
-    made = events("stator_resistance", size=0.1, count=3)
+    made = events("stator_resistance", size=0.12, count=3)
     seen, held = [made[0], made[2]], [made[1]]
     told = investigate(base(), seen, held, {}, {}, only=FEW)
     assert told.verdict.word == "unexplained"

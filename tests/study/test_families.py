@@ -254,7 +254,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
         ((100.0, 105.0), (1.0, 1.0), (True, True), ["one", "other"], []),
         ((100.0, 107.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
         ((107.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
-        ((100.0, 105.0), (1.0, 0.002), (True, False), ["one"], []),  # it leaves something of all events
+        ((100.0, 105.0), (1.0, 0.0008), (True, False), ["one"], []),  # it leaves something of all events
         ((100.0, 105.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
     ],
 )
@@ -270,9 +270,9 @@ def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, hel
     ("chosen", "rival", "kept"),
     [
         (1.0, 0.03, ["chosen", "rival"]),
-        (1.0, 0.001, ["chosen"]),  # it leaves something of all events
-        (0.001, 0.03, ["rival"]),
-        (0.001, 0.001, []),
+        (1.0, 0.0008, ["chosen"]),  # it leaves something of all events
+        (0.0008, 0.03, ["rival"]),
+        (0.0008, 0.0008, []),
     ],
 )
 def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, kept):

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import TASK, UserError, among, check_range
+from tractexp.identification.adequacy import ADEQUATE_P
 
 DERIVED, CHOSEN = "derived", "chosen"
 
@@ -36,8 +37,8 @@ class Criteria:
         "a level of 0.02 takes 0.045 of data sets: the draws lack the tail of small p (benchmarks/false_alarms.py)",
     )  # fmt: skip
     adequate_p: float = _criterion(
-        0.003, (0.0, 1.0), "p of what a fit leaves, below which it leaves something", CHOSEN,
-        "what naming leaves of 5 % is 0.005: six tests share it, and 199 draws give their tails by extrapolation",
+        ADEQUATE_P, (0.0, 1.0), "p of what a fit leaves, below which it leaves something", CHOSEN,
+        "the same as in an identification",
     )  # fmt: skip
     further_name_p: float = _criterion(
         1e-5, (0.0, 1.0), "p that a second name must undercut, and by which another law or place must explain more than"

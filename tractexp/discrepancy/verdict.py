@@ -130,8 +130,8 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
                 f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {_denied(weighed)}"
             )
         return (
-            f"what seemed to help on the fitted events, {seemed}, does not help on the held-out ones, and what the base"
-            " model leaves is no more than chance leaves"
+            f"what seemed to help on the fitted events, {seemed}, is not borne out by the held-out ones, and what the"
+            " base model leaves is no more than chance leaves"
         )
     if word == UNEXPLAINED:
         alone = "the fitted events alone show no disagreement, but all events together do"

@@ -50,7 +50,7 @@ class Domain(ABC):
     # records
     windowed: ClassVar[bool]  # whether samples are averages over a recorder's window, which may have to be searched
     # investigation
-    calibrated: ClassVar[bool]  # whether families and a search in all events have calibrated criteria
+    calibrated: ClassVar[bool]  # whether criteria were calibrated with members of families
     recordable: ClassVar[bool]  # whether a dip that nobody recorded can be made a record and fitted beside others
     # planning
     edge: ClassVar[float]  # s, fall and rise of a planned dip
