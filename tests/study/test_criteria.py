@@ -122,13 +122,13 @@ def chosen_dip(c):
     return mildest(tried, c.decided).event.depth
 
 
-def proposed(closed=0.9, p=1e-6):
-    """A term that would be proposed."""
+def proposed(closed=0.9, p=1e-6, whole=1000.0):
+    """A term that would be proposed; with the pushes it explains the `whole`."""
 
     def curve(deviance):
         return SimpleNamespace(deviance=deviance, chi2_per_sample=1.0)
 
-    before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * 1000.0), (1 - closed) * 1000.0)
+    before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * whole), (1 - closed) * whole)
     return Weighed(None, before, before, p, None)
 
 
@@ -158,6 +158,7 @@ FURTHER = [  # decisions by a criterion that has one above, too
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
     ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
     ("ahead", 1.45, lambda c: proposed(closed=0.54).stands(c), False),
+    ("shown", 9.0, lambda c: proposed(whole=11.0).stands(c), False),
 ]
 
 

@@ -79,6 +79,11 @@ class HeldOut:
         return self.predictions is not None
 
     @property
+    def open(self) -> bool:
+        """Whether the held-out events are too mild for all that explains the fitted ones."""
+        return bool(self.assessments) and all(one.gap.open for one in self.assessments.values())
+
+    @property
     def retained(self) -> tuple[Rival, ...]:
         """The adequate explanations that the held-out events do not deny, or those that predict them best."""
         if self.leaves_more:

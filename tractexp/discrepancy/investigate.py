@@ -231,11 +231,11 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     explained = explanations(base, first, seed)
     base, first = explained.base, explained.steps[0]
     weighed = by_likelihood = held_out(survivors(explained, seed), validate, seed)
-    if word_of(weighed) == UNEXPLAINED:
+    if word_of(weighed) == UNEXPLAINED and not weighed.open:
         weighed = incomplete(weighed, validate, seed)
     said = verdict(weighed, validate)
-    proposed = Proposed()
-    if said.word == UNEXPLAINED:
+    proposed = Proposed(why="the held-out events are too mild to show a term" * by_likelihood.open)
+    if said.word == UNEXPLAINED and not by_likelihood.open:
         proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
     return Findings(
         base=base,

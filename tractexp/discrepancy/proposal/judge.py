@@ -32,11 +32,15 @@ class Before:
     explainable: float  # beside the term, of the deviance
 
     @property
+    def gain(self) -> float:
+        """By how much the term lowers the deviance."""
+        return self.without.deviance - self.with_it.deviance
+
+    @property
     def closed(self) -> float:
         """The share of the explainable gap that the term takes away; 0 where there is none."""
-        gained = self.without.deviance - self.with_it.deviance
-        whole = gained + max(self.explainable, 0.0)
-        return gained / whole if whole > 0 else 0.0
+        whole = self.gain + max(self.explainable, 0.0)
+        return self.gain / whole if whole > 0 else 0.0
 
     @property
     def left(self) -> float:
@@ -68,6 +72,7 @@ class Weighed:
         little = f"it closes {closed:.0%} of the gap on the held-out events, less than {least:.0%}"
         rows = {
             (little if closed >= 0 else "it makes the held-out events worse"): closed < least,
+            "the held-out events are too mild to show it": closed >= least and self.validate.gain < criteria.shown,
             "chance gives the best of the library as much": self.p > criteria.proposal_p,
         }
         return [why for why, true in rows.items() if true]
