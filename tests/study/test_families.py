@@ -12,6 +12,7 @@ from tractexp.discrepancy import families, fit_effort, fitting, held_out, recomm
 from tractexp.discrepancy.all_events import JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
@@ -326,7 +327,8 @@ def test_what_only_the_held_out_dip_shows_is_left_to_a_fit_of_it():
     told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
     assert told.first.adequate
     assert told.verdict.word == "unexplained"
-    assert "all events together do; fit the held-out ones, too" in told.verdict.reason
+    assert "the fitted events alone show no disagreement, but all events together do" in told.verdict.reason
+    assert recommendation(told) == "fit the held-out events, too (data.train)"
     assert recommended.adequacy(told).grade == "effect_missing"
     swapped = investigate(base(), made[1:], made[:1], {}, {}, only=TRIPS[:1])
     assert swapped.names == ("undervoltage_trip",)

@@ -16,6 +16,7 @@ from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
 from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
+from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.model_error import ModelError, in_percent
 from tractexp.provenance import again
@@ -73,6 +74,10 @@ def recommendation(investigation: Findings) -> str:
         )
         return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
+        if investigation.by_likelihood.open:
+            return "hold out a deeper dip, one of those fitted or a new one"
+        if investigation.by_likelihood.shows_more:
+            return f"fit the held-out events, too ({DATA.train})"
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
         grade = recommended.adequacy(investigation).grade

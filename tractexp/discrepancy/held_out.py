@@ -79,6 +79,11 @@ class HeldOut:
         return self.predictions is not None
 
     @property
+    def shows_more(self) -> bool:
+        """Whether all events show something where the fitted ones show nothing."""
+        return self.p_of_all < self.first.criteria.adequate_p
+
+    @property
     def open(self) -> bool:
         """Whether the held-out events are too mild for all that explains the fitted ones."""
         return bool(self.assessments) and all(one.gap.open for one in self.assessments.values())
@@ -118,7 +123,7 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     both = AllEvents(context, events, noise, faults, bare)
     if not any(s.fit.names or faults for s in surviving.adequate):
         silent = context.domain.calibrated and explained.empty and explained.steps[0].adequate
-        if silent and shows_more(both):
+        if silent and exceeds_noise(both):
             return replace(as_fitted, p_of_all=both.p_left(explained.base.local_minima, seed))
         return as_fitted
     count = len(surviving.adequate)
@@ -182,7 +187,7 @@ def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tupl
     return assessments | (judged(again) if again else {}), again
 
 
-def shows_more(both: AllEvents) -> bool:
+def exceeds_noise(both: AllEvents) -> bool:
     """Whether perturbations of the base model would gain more on the held-out events than noise leaves there."""
     there, (unit,), noise = carried(both.fitted, both.events, [both.bare])
     left = beyond_chance(there, unit, (), noise, there.coordinates.before, pushed(there, unit, (), noise))

@@ -11,7 +11,6 @@ from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.survivors import Rival
-from tractexp.errors import DATA
 from tractexp.identification.model_error import in_percent
 from tractexp.record import Event
 from tractexp.wording import alternatives, joined, listed, percent
@@ -101,7 +100,7 @@ def word_of(weighed: HeldOut) -> str:
     explaining = [rival for rival in weighed.retained if weighed.names_of(rival)]
     if not explaining:
         first = left.explanations.steps[0]
-        agree = first.adequate and left.adequate and weighed.p_of_all >= first.criteria.adequate_p
+        agree = first.adequate and left.adequate and not weighed.shows_more
         return NONE if agree else UNEXPLAINED
     return NAMED if len(explaining) == 1 else TIED
 
@@ -134,8 +133,7 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
             " base model leaves is no more than chance leaves"
         )
     if word == UNEXPLAINED:
-        alone = "the fitted events alone show no disagreement, but all events together do"
-        return f"{alone}; fit the held-out ones, too ({DATA.train})"
+        return "the fitted events alone show no disagreement, but all events together do"
     return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
 
 
@@ -254,7 +252,7 @@ def _denied(weighed: HeldOut) -> str:
     there = assessment.gap
     if not assessment.borne_out:
         if there.open:
-            return "they are too mild to show it, and the fitted ones leave a doubt; hold out a deeper dip"
+            return "they are too mild to show it, and the fitted ones leave a doubt"
         return "there it fits no better than the base model"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
