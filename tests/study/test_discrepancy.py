@@ -595,6 +595,7 @@ def test_a_small_effect_that_the_held_out_dip_is_too_mild_to_show_is_named_where
     surer = investigate(base(), seen, held, {}, {}, only=FEW, criteria=Criteria(evident=20.0))
     assert surer.names == ("stator_resistance",)
     assert "the held-out events are too mild to show it" in surer.verdict.reason
+    assert not surer.proposed.why
     assert investigate(base(), seen, (), {}, {}, only=FEW).names == ("stator_resistance",)  # nobody asks there
 
 

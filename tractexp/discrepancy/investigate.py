@@ -234,8 +234,10 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     if word_of(weighed) == UNEXPLAINED and not weighed.open:
         weighed = incomplete(weighed, validate, seed)
     said = verdict(weighed, validate)
-    proposed = Proposed(why="the held-out events are too mild to show a term" * by_likelihood.open)
-    if said.word == UNEXPLAINED and not by_likelihood.open:
+    proposed = Proposed()
+    if said.word == UNEXPLAINED and by_likelihood.open:
+        proposed = Proposed(why="the held-out events are too mild to show a term")
+    elif said.word == UNEXPLAINED:
         proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
     return Findings(
         base=base,
