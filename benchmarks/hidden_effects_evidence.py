@@ -16,7 +16,7 @@ VERDICTS = ("none", "named", "tied", "unexplained")
 OTHERS = ("rotor_skin_effect", "stator_transients")  # orders of the model, which have no law of their own
 CHAIN = {"time_skew", "measurement_window", "load_change"}  # nuisances may be named where they are there
 MULTIPLES = (2.0, 4.0, 8.0)  # of the detection limit
-FAR = {"outside": 80.0, "left out": 0.0}  # non-centrality left by the best single effect: no effect comes near
+FAR = 80.0  # non-centrality left by the best single effect: no effect comes near
 MARK = "benchmarks/hidden_effects_study.py --docs"  # what makes the tables
 PAGE = "judgement.md"
 _POWER, _STATIC = {"power", "power_P", "power_Q", "whole"}, {"static", "static_P", "static_Q"}
@@ -168,19 +168,21 @@ def _answers(rows: Rows) -> tuple[list[str], list[list]]:
 
 def _strangers(rows: Rows) -> tuple[list[str], list[list]]:
     """What the catalogue does not hold: the verdicts, and the terms proposed."""
+    outside, left_out = (
+        [r for r in rows if r["group"].startswith(start) and "lambda_left" in r] for start in ("outside", "left out")
+    )
+    cells = {
+        f"outside the catalogue, above {FAR:g}": [r for r in outside if r["lambda_left"] >= FAR],
+        f"outside the catalogue, below {FAR:g}": [r for r in outside if r["lambda_left"] < FAR],
+        "left out of it": left_out,
+    }
     lines = []
-    for start, far in FAR.items():
-        members = [r for r in rows if r["group"].startswith(start) and "lambda_left" in r]
-        for what, own in (
-            (f"above {far:g}", [r for r in members if r["lambda_left"] >= far]),
-            (f"below {far:g}", [r for r in members if r["lambda_left"] < far]),
-        ):
-            if own:
-                made = [r for r in own if r["proposal"]]
-                true = sum(_is_right(r) for r in made) if start == "outside" else "-"
-                sort = "outside the catalogue" if start == "outside" else "left out of it"
-                lines.append([f"{sort}, {what}" if far else sort, len(own), share(_count(own, "unexplained"), len(own)),
-                              *(_count(own, v) for v in ("tied", "named", "none")), len(made), true])  # fmt: skip
+    for what, own in cells.items():
+        if own:
+            made = [r for r in own if r["proposal"]]
+            true = "-" if own is left_out else sum(map(_is_right, made))
+            lines.append([what, len(own), share(_count(own, "unexplained"), len(own)),
+                          *(_count(own, v) for v in ("tied", "named", "none")), len(made), true])  # fmt: skip
     head = ["hidden, non-centrality left by the best effect", "data sets", "unexplained", "tied", "one name", "none",
             "a term proposed", "the right term"]  # fmt: skip
     return head, lines

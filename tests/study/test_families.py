@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
 from tractexp.discrepancy import families, fit_effort, fitting, held_out, recommended, survivors
-from tractexp.discrepancy.all_events import JointFit
+from tractexp.discrepancy.all_events import AllEvents, JointFit
 from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.discrepancy_json import recommendation
@@ -332,6 +332,11 @@ def test_what_only_the_held_out_dip_shows_is_left_to_a_fit_of_it():
     assert recommended.adequacy(told).grade == "effect_missing"
     swapped = investigate(base(), made[1:], made[:1], {}, {}, only=TRIPS[:1])
     assert swapped.names == ("undervoltage_trip",)
+
+
+def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():
+    stalled = SimpleNamespace(plain=SimpleNamespace(deviance=np.inf))
+    assert AllEvents.p_left(stalled, (), 0) == 1.0
 
 
 def test_members_belong_to_the_effects_that_are_asked_for():

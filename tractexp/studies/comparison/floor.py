@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identification.descent import descend
+from tractexp.identification.descent import MOST_NUMBERS, descend
 from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED
 from tractexp.parameter import best_distinct, even
@@ -18,7 +18,7 @@ AT_FLOOR = 0.01  # what ends within this share of the floor has reached it
 SCATTER, STARTS, APART = 400, 60, 0.3  # starts: the best of a scatter that differ by so much of a range somewhere
 BRIEF, ROUGH = 60, 1e-3  # iterations of a descent, and the share of the objective that a step must gain
 WHOLE, FINE = 200, 1e-9  # of the last descent, from the lowest
-TOGETHER, MOST_NUMBERS = 64, 8_000_000  # descents at once, and the most residuals they may hold
+TOGETHER = 64  # descents at once, where their residuals are no more than MOST_NUMBERS
 TINY = 1e-300  # pu²: a fit without any error is scaled by it
 SAME = 1e-2  # relative: objectives this close are those of the same problem
 
