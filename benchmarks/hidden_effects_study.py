@@ -188,7 +188,7 @@ def _proposed(proposed) -> dict | None:
     content = to_dict(proposed, "")
     if content is None:
         return None
-    return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {"closed": content["closed"]}
+    return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {"explained": content["explained"]}
 
 
 def _compared(found, trial: cases.Trial) -> dict:

@@ -22,7 +22,7 @@ from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
-from tractexp.discrepancy.proposal.judge import Before, Weighed
+from tractexp.discrepancy.proposal.judge import Weighed
 from tractexp.discrepancy.score_test import Score
 from tractexp.errors import UserError
 from tractexp.noise.random_walk import Rest, find
@@ -54,7 +54,7 @@ def refitted(deviance, parameters):
 def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0, explained=0.0):
     """What held-out events say of an explanation."""
     gap = GapTest(None, None, gain, abs(gain) * (1 / closed - 1), expected, c.shown, None)
-    return Assessment(gap, SimpleNamespace(criteria=c), (), explained, p_left)
+    return Assessment(gap, SimpleNamespace(criteria=c), (), explained, p_left=p_left)
 
 
 def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
@@ -122,14 +122,15 @@ def chosen_dip(c):
     return mildest(tried, c.decided).event.depth
 
 
-def proposed(closed=0.9, p=1e-6, whole=1000.0):
+def with_a_member(c, **assessment):
+    """An explanation of several effects that is shown, and what held-out events say of one of them."""
+    return dataclasses.replace(judged_by(c), of_member={"one": judged_by(c, **assessment)})
+
+
+def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
     """A term that would be proposed; with the pushes it explains the `whole`."""
-
-    def curve(deviance):
-        return SimpleNamespace(deviance=deviance, chi2_per_sample=1.0)
-
-    before = Before(SimpleNamespace(), curve(2000.0), curve(2000.0 - closed * whole), (1 - closed) * whole)
-    return Weighed(None, before, before, p, None)
+    judged = judged_by(c, closed=explained, gain=explained * whole, expected=whole)
+    return Weighed(None, judged, judged, p)
 
 
 CASES = {  # criterion: a looser value, the decision, what it is by default
@@ -150,15 +151,17 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
     "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
     "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
     "testable": (0.7, status, "not testable"),
-    "proposal_p": (0.02, lambda c: proposed(p=0.011).stands(c), False),
+    "proposal_p": (0.02, lambda c: proposed(c, p=0.011).stands(c), False),
     "decided": (0.9, chosen_dip, 0.6),
 }
 FURTHER = [  # decisions by a criterion that has one above, too
     ("adequate_p", 0.0006, lambda c: judged_by(c, p_left=0.0008).helps, False),
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
+    ("shown", 9.0, lambda c: with_a_member(c, gain=10.0).helps, False),
+    ("evident", 90.0, lambda c: with_a_member(c, gain=5.0, expected=6.0, explained=95.0).helps, False),
     ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
-    ("ahead", 1.45, lambda c: proposed(closed=0.54).stands(c), False),
-    ("shown", 9.0, lambda c: proposed(whole=11.0).stands(c), False),
+    ("ahead", 1.45, lambda c: proposed(c, explained=0.54).stands(c), False),
+    ("shown", 9.0, lambda c: proposed(c, whole=11.0).stands(c), False),
 ]
 
 

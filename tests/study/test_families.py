@@ -240,7 +240,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
     joint = [JointFit(replace(f, deviance=cost - 2), 10.0, p) for f, cost, p in zip(fits, costs, p_left, strict=True)]
     both = SimpleNamespace(
         fitted=at, events=(), bare=fit(500.0, 0), plain=SimpleNamespace(cost=500.0), compared=lambda *_: joint,
-        undoubted=lambda fits: False,
+        undoubted=lambda fits: False, without_each=lambda fit: {}, fitted_to_all=lambda fits: fits,
     )  # fmt: skip
     gains = {f.names: 100.0 if good else -100.0 for f, good in zip(fits, helps, strict=True)}
     judged = lambda context, events, bare, fits: {  # noqa: E731
@@ -265,6 +265,34 @@ def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, hel
     assessments, fits = weighed(both, extended, 0)
     assert [names[0] for names, one in assessments.items() if one.helps] == standing
     assert [f.names[0] for f in fits] == again
+
+
+@pytest.mark.parametrize(
+    ("gain", "expected", "alone", "needless"),
+    [
+        (20.0, 100.0, 30.0, []),
+        (5.0, 100.0, 30.0, ["other"]),
+        (5.0, 6.0, 30.0, ["other"]),  # the held-out events are too mild, and the fitted ones leave a doubt
+        (5.0, 6.0, 130.0, []),
+        (-5.0, 100.0, 130.0, ["other"]),
+    ],
+)
+def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, expected, alone, needless):
+    """The pair gains 200 over the base model, and as much over the other one of them."""
+    both, _, _ = compared((100.0, 100.0))
+    pair, fewer = fit(0.0, 2, "one", "other"), {"one": fit(200.0, 1, "other"), "other": fit(alone, 1, "one")}
+    joint = SimpleNamespace(fit=pair, p_left=1.0, confirmed=lambda criteria: False)
+    both = SimpleNamespace(**{**vars(both), "without_each": lambda fit: fewer, "compared": lambda *_: [joint]})
+
+    def judged(context, events, bare, fits):
+        gap = (gain, 0.0, expected) if bare.names == ("one",) else (200.0, 0.0, 200.0)
+        return {f.names: Assessment(GapTest(None, None, *gap, 10.8, None), both.fitted, ()) for f in fits}
+
+    monkeypatch.setattr(held_out, "judged_on", judged)
+    (assessment,) = weighed(both, {pair.names: pair}, 0)[0].values()
+    assert assessment.evident
+    assert assessment.needless == needless
+    assert assessment.helps == (not needless)
 
 
 @pytest.mark.parametrize(

@@ -98,6 +98,17 @@ def test_what_one_block_decides_is_chance():
     assert one.clear_of(off("c", error=0.2, uneven=0.5))
 
 
+def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
+    """A lead that is clear in twenty blocks; three alike have the quantile of two degrees of freedom."""
+
+    def first(one, blocks):
+        rows = (getattr(one, name)[:blocks] for name in ("squares", "noise", "response"))
+        return PredictionError(one.fit, one.unit, *rows)
+
+    one, other = off("a", error=0.1), off("b", error=0.2, uneven=0.8)
+    assert [first(one, blocks).clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [False, False, True]
+
+
 def test_a_model_that_diverges_is_behind_any_that_does_not():
     lost = off("b", error=0.1)
     lost.squares[2] = np.inf

@@ -139,8 +139,8 @@ def test_a_step_by_itself_is_found_with_its_time(stepped):
     (proposed,) = found.proposal["terms"]
     assert (proposed["balance"], proposed["signal"], proposed["clock"]) == ("power", "step", "of_return")
     assert proposed["function_of_voltage"] is False
-    assert found.proposal["closed"]["train"] > 0.9
-    assert found.proposal["closed"]["validate"] > 0.9
+    assert found.proposal["explained"]["train"] > 0.9
+    assert found.proposal["explained"]["validate"] > 0.9
     truth = EFFECTS["load_step"].details(np.random.default_rng([800001, zlib.crc32(b"load_step")]), ())
     assert proposed["parameters"]["instant"]["value"] == pytest.approx(truth["delay"], abs=0.02)
     assert made[0].record.P[0] * 0.06 == pytest.approx(proposed["parameters"]["size_P"]["value"], rel=0.1)
@@ -149,9 +149,9 @@ def test_a_step_by_itself_is_found_with_its_time(stepped):
 def test_what_machines_read(stepped):
     _, found = stepped
     told = json.loads(json.dumps(found.content))
-    assert {"terms", "closed", "p", "plugin"} <= told["proposal"].keys()
+    assert {"terms", "explained", "p", "plugin"} <= told["proposal"].keys()
     assert {"balance", "signal", "parameters", "latex"} <= told["proposal"]["terms"][0].keys()
-    assert told["proposal"]["closed"].keys() == {"train", "validate"}
+    assert told["proposal"]["explained"].keys() == {"train", "validate"}
     assert told["no_proposal"] is None
     for known in told["proposal"]["terms"][0]["parameters"].values():
         low, high = known["interval"]
@@ -181,7 +181,7 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     width = 0.2 * np.maximum(np.linalg.norm(bench.drive.before, axis=1, keepdims=True), 0.1)
     before = bench.drive.before + width * (2 * chosen.unit[at.before].reshape(-1, 2) - 1)
     made = model.simulate(bench.drive, np.array(values)[None], bench.problem.step.substeps, before[:, None])
-    assert np.abs(made.outputs[:, 0] - proposal.train.with_it.calculated).max() < 1e-8
+    assert np.abs(made.outputs[:, 0] - proposal.train.gap.after.calculated).max() < 1e-8
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
@@ -196,15 +196,15 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
 
 
 @pytest.mark.parametrize(("seed", "measured"), [(800001, 0.6), (800002, 4.0)])
-def test_what_a_right_term_closes_does_not_hang_on_the_level_of_the_noise(seed, measured):
-    """Of the deviance in excess of the noise, `measured` on the held-out event, the same step closes too little once,
+def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed, measured):
+    """Of the deviance in excess of the noise, `measured` on the held-out event, the same step gains too little once,
     and once four times what there is."""
     made = events("load_step", 0.2, seed=seed, recorder=FAST)
     found = searched(made[:2], made[2:])
     held = found.proposal.validate
-    gained = held.without.deviance - held.with_it.deviance
-    assert gained / (held.without.deviance - held.context.samples) == pytest.approx(measured, abs=0.1)
-    assert 0.8 < held.closed <= 1.0
+    excess = held.gap.before.deviance - held.context.samples
+    assert held.gap.gain / excess == pytest.approx(measured, abs=0.1)
+    assert 0.8 < held.gap.explained <= 1.0
     assert found.proposal.term.name == STEP
 
 
@@ -228,7 +228,7 @@ def test_what_a_proposal_ties_with_and_looks_like_is_said():
         "function_of_voltage": False,
         "parameters": {"k": {"value": 0.2, "standard_error": 0.01}},
     }
-    told = {"terms": [term], "closed": {"train": 0.9, "validate": 0.8}, "ties": [], "alike": {}}
+    told = {"terms": [term], "explained": {"train": 0.9, "validate": 0.8}, "ties": [], "alike": {}}
     alone = proposed_in_words(told, None)
     assert alone[0].startswith("proposed: a step of P, which closes 90%")
     assert alone[1:] == ["it is not a function of the voltage: something happened by itself"]

@@ -116,7 +116,7 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     proposal = proposed.proposal
     assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
     assert proposal.values["size"] < 0
-    assert proposal.validate.closed > 0.9
+    assert proposal.validate.gap.explained > 0.9
     (tmp_path / "proposed_effect.py").write_text(proposal.source, encoding="utf-8")
     effect = runpy.run_path(str(tmp_path / "proposed_effect.py"))["ProposedEffect"]()
     context, fit = proposal.train.context, proposed.tried[0][1].fit
@@ -126,7 +126,7 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     at = lambda name: own[name] if name in own else context.coordinates.value(name, fit.unit)  # noqa: E731
     values = np.array([[at(name) for name in model.names]])
     drawn = model.simulate(context.drive, values, context.problem.step.substeps).outputs[:, 0]
-    with_it, without = proposal.train.with_it.calculated, proposal.train.without.calculated
+    with_it, without = proposal.train.gap.after.calculated, proposal.train.gap.before.calculated
     # all but the power before the dip, which the fit leaves free
     assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 

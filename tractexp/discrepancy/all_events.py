@@ -7,7 +7,7 @@ held-out ones though the effect is there.
 import functools
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -40,7 +40,7 @@ class JointFit:
 class AllEvents:
     """The context of all events beside that of the fitted ones, with the `noise` and the base model `bare` there.
 
-    `faults` are those of the measurement in every explanation.
+    `faults` are those of the measurement in every explanation, `refits` all sets that were fitted to the fitted events.
     """
 
     fitted: Context
@@ -48,6 +48,7 @@ class AllEvents:
     noise: Noise
     faults: Names
     bare: Refit
+    refits: Mapping[Names, Refit] = field(default_factory=dict)
 
     @functools.cached_property
     def context(self) -> Context:
@@ -88,6 +89,22 @@ class AllEvents:
         doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.false_alarms]
         better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
+
+    def without_each(self, fit: Refit) -> dict[str, Refit]:
+        """A set of several effects as it fits the fitted events without each of them, by the one left out; from where
+        the set fits, and from where it was found."""
+        rest = {name: tuple(n for n in fit.names if n != name) for name in fit.names if len(fit.names) > 1}
+        at = self.fitted.coordinates
+        wanted = [(names, at.without(fit.unit, [left])) for left, names in rest.items()]
+        there = [self.refits[names] for names, _ in wanted if names in self.refits]
+        wanted += [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
+        fits = {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)} if wanted else {}
+        return {left: fits[names] for left, names in rest.items()}
+
+    def fitted_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
+        """These, fitted to all events."""
+        joint = {key: best_of(self._refitted(fit, anew=False))[0] for key, fit in fits.items()}
+        return {key: replace(fit, unit=self._narrowed(fit)) for key, fit in joint.items()}
 
     def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
         """How often chance leaves as much as the base model does of all events; 1 where it has no steady state there.

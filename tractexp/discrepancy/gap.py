@@ -101,15 +101,18 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
 
 def gap(
     context: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
-    fitted: Sequence[int] | np.ndarray,
+    fitted: Sequence[int] | np.ndarray, without: Sequence[str] = (), changes: np.ndarray | None = None,
 ) -> GapTest:  # fmt: skip
-    """Compare the base model's fit and that with the named effects on the events of `context`.
+    """Compare a fit of the base model, or of one with the effects `without`, and that with the named effects on the
+    events of `context`.
 
-    Coordinates `fitted` were fitted to these events in the extended model.
+    Coordinates `fitted` were fitted to these events in the extended model. What is left is what `changes` (c, C N)
+    would still gain, by default pushes into the balances.
     """
-    before, after = curves(context, base, noise, ()), curves(context, extended, noise, names)
-    gained, pushes = before.deviance - after.deviance, pushed(context, extended, names, noise)
-    left = beyond_chance(context, extended, names, noise, fitted, pushes)
+    before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
+    gained = before.deviance - after.deviance
+    changes = pushed(context, extended, names, noise) if changes is None else changes
+    left = beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = context.whiten(noise, apart)[0]
     expected = float(np.nan_to_num(rows @ rows, nan=np.inf))

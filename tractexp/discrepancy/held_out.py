@@ -24,21 +24,33 @@ from tractexp.record import Event
 class Assessment:
     """The gap of one explanation on the held-out events, and the coordinates of both models there.
 
-    `explained` is the deviance that it explains of the fitted events. Where it was fitted to all events, `p_left` tells
-    how often chance leaves as much, and `behind` whether the best explanation there rejects it.
+    `explained` is the deviance that it explains of the fitted events. `of_member` is the same against the explanation
+    without each of several effects. Where it was fitted to all events, `p_left` tells how often chance leaves as much,
+    and `behind` whether the best explanation there rejects it.
     """
 
     gap: GapTest
     context: Context
     units: tuple[np.ndarray, np.ndarray]
     explained: float = 0.0
+    of_member: Mapping[str, "Assessment"] = field(default_factory=dict)
     p_left: float = 1.0
     behind: bool = False
 
     @property
-    def borne_out(self) -> bool:
+    def evident(self) -> bool:
         """Whether the held-out events show it, or are too mild to and the fitted ones leave no doubt."""
         return self.gap.helps or (self.gap.open and self.explained >= self.context.criteria.evident)
+
+    @property
+    def needless(self) -> list[str]:
+        """Those of several effects without which it explains as much."""
+        return [name for name, one in self.of_member.items() if not one.evident]
+
+    @property
+    def borne_out(self) -> bool:
+        """Whether it and each of its effects are evident."""
+        return self.evident and not self.needless
 
     @property
     def helps(self) -> bool:
@@ -120,7 +132,7 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
     as_fitted = HeldOut(surviving, explained.steps[0], explained.last, noise, faults, bare, extended)
     if not events:
         return as_fitted
-    both = AllEvents(context, events, noise, faults, bare)
+    both = AllEvents(context, events, noise, faults, bare, explained.refits)
     if not any(s.fit.names or faults for s in surviving.adequate):
         silent = context.domain.calibrated and explained.empty and explained.steps[0].adequate
         if silent and exceeds_noise(both):
@@ -159,18 +171,28 @@ def telling(explained: Explanations, bare: Refit) -> Names:
 def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
     """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
+    Of several effects each is judged against the others alone as the whole is against the base model.
     A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
     other must leave nothing in a fit to all events and not be rejected there by the best one. That fit may also bear
     out what does not help as it was fitted, or leaves more than chance does, since the fitted events may leave a part
     of it open; it is returned as fitted to all.
     """
     context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
+    without = {fit.names: both.without_each(fit) for fit in fits}
 
-    def judged(some: Sequence[Refit]) -> dict[Names, Assessment]:
-        there = judged_on(context, both.events, both.bare, some)
-        return {n: replace(one, explained=both.bare.deviance - extended[n].deviance) for n, one in there.items()}
+    def against(bare: Refit, alone: Refit, some: Sequence[Refit]) -> dict[Names, Assessment]:
+        there = judged_on(context, both.events, bare, some)
+        return {n: replace(one, explained=alone.deviance - extended[n].deviance) for n, one in there.items()}
 
-    assessments = judged(fits)
+    def judged(some: Sequence[Refit], fewer: Mapping[Names, Mapping[str, Refit]]) -> dict[Names, Assessment]:
+        there = against(both.bare, both.bare, some)
+        for fit in some:
+            alone, rest = without[fit.names], fewer[fit.names]
+            of_member = {name: against(rest[name], alone[name], [fit])[fit.names] for name in rest}
+            there[fit.names] = replace(there[fit.names], of_member=of_member)
+        return there
+
+    assessments = judged(fits, without)
     if both.undoubted(fits) and assessments[fits[0].names].convincing and assessments[fits[0].names].helps:
         return assessments, []
     joint = {t.fit.names: t for t in both.compared(fits, seed)}
@@ -184,7 +206,8 @@ def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tupl
         fitted.fit for names, fitted in joint.items()
         if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria)
     ]  # fmt: skip
-    return assessments | (judged(again) if again else {}), again
+    joint_without = {fit.names: both.fitted_to_all(without[fit.names]) for fit in again}
+    return assessments | (judged(again, joint_without) if again else {}), again
 
 
 def exceeds_noise(both: AllEvents) -> bool:
@@ -197,10 +220,11 @@ def exceeds_noise(both: AllEvents) -> bool:
 def judged_on(
     context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[Names, Assessment]:
-    """Compare the base model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
+    """Compare a model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
     other, units, noise = carried(context, events, [bare, *extended])
+    before = other.coordinates.before
     return {
-        fit.names: Assessment(gap(other, units[0], u, fit.names, noise, other.coordinates.before), other, (units[0], u))
+        fit.names: Assessment(gap(other, units[0], u, fit.names, noise, before, bare.names), other, (units[0], u))
         for fit, u in zip(extended, units[1:], strict=True)
     }
 

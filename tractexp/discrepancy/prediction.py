@@ -35,6 +35,7 @@ from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.records import Records
+from tractexp.identification.blocks import reach
 from tractexp.identification.likelihood import Likelihood
 from tractexp.identification.model_error import block_sums, noise_variance
 from tractexp.noise import Noise
@@ -43,7 +44,6 @@ from tractexp.record import Event
 FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 LEAST = 0.1  # of the noise: a model's squared error is told no finer
-CLEAR = 2.0  # standard errors of a jackknife
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,9 +100,8 @@ class PredictionError(Prediction):
         if not np.isfinite(total := self.squares.sum()) or not np.isfinite(others := other.squares.sum()):
             return bool(np.isfinite(total))
         mine, theirs = total - self.squares, others - other.squares
-        without, count = np.log(np.maximum(theirs, 1e-300) / np.maximum(mine, 1e-300)), len(mine)
-        error = np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2))
-        return float(np.log(others / total)) > CLEAR * error
+        without, lead = np.log(np.maximum(theirs, 1e-300) / np.maximum(mine, 1e-300)), float(np.log(others / total))
+        return lead > reach(without, lead)
 
 
 @dataclass(frozen=True, eq=False)

@@ -250,10 +250,12 @@ def _denied(weighed: HeldOut) -> str:
     """What the held-out events have against the best explanation of the fitted ones."""
     assessment = weighed.assessments[weighed.survivors.adequate[0].fit.names]
     there = assessment.gap
-    if not assessment.borne_out:
+    if not assessment.evident:
         if there.open:
             return "they are too mild to show it, and the fitted ones leave a doubt"
         return "there it fits no better than the base model"
+    if assessment.needless:
+        return f"there it fits no better than without {joined(_spoken(assessment.needless, weighed), 'or')}"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
         f" {by_draws(assessment.p_left)}"

@@ -46,6 +46,17 @@ def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) ->
     return total > 2 * scatter and total > ALIKE * sum(float(others[b].sum()) for b in blocks)
 
 
+def reach(without: np.ndarray, whole: float) -> float:
+    """Half the 95 % interval of a figure that is `whole`, by its values without each block (b,): a jackknife's.
+
+    One block tells nothing of chance: infinite.
+    """
+    count = len(without)
+    if count < 2:
+        return np.inf
+    return quantile(count) * float(np.sqrt((count - 1) / count * np.sum((without - whole) ** 2)))
+
+
 def quantile(blocks: int) -> float:
     """Student's t at 97.5 % of a jackknife over so many blocks."""
     from scipy.special import stdtrit

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.domain import Playback
-from tractexp.identification.blocks import LENGTH, quantile
+from tractexp.identification.blocks import LENGTH, reach
 from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
@@ -62,11 +62,9 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     if not np.isfinite(left):
         return ModelError(np.inf, (np.inf, np.inf), np.inf, np.inf)
     without = (left - sums[:, 0]) / np.maximum(response - sums[:, 1], 1e-30)
-    count = len(sums)
-    error = float(np.sqrt((count - 1) / count * np.sum((without - ratio) ** 2))) if count > 1 else np.inf
-    reach = quantile(count) * error
+    half = reach(without, ratio)
     root = lambda square: float(np.sqrt(max(square, 0.0)))  # noqa: E731
-    return ModelError(root(ratio), (root(ratio - reach), root(ratio + reach)), root(left / max(power, 1e-30)), ratio)
+    return ModelError(root(ratio), (root(ratio - half), root(ratio + half)), root(left / max(power, 1e-30)), ratio)
 
 
 def block_sums(played: Playback) -> np.ndarray:

@@ -7,11 +7,13 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import PLUGIN
+from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.proposal.judge import Before, Weighed
+from tractexp.discrepancy.proposal.judge import Weighed
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
+from tractexp.identification.model_error import in_percent
 from tractexp.report.extended import interval
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 
@@ -25,7 +27,7 @@ def headlines(findings: Findings) -> list[str]:
 
 
 def proposed(page: Report, findings: Findings) -> None:
-    """The term, its size, where and when it acts, what it closes, and what looks like it."""
+    """The term, its size, where and when it acts, what it explains, and what looks like it."""
     page.heading("Proposal")
     proposal = findings.proposed.proposal
     if proposal is None:
@@ -37,7 +39,7 @@ def proposed(page: Report, findings: Findings) -> None:
     if proposal.term.exogenous:
         page.text("It is not a function of the voltage: something happened by itself, and need not happen again.")
     _numbers(page, proposal)
-    _closed(page, proposal)
+    _explained(page, proposal)
     _drawn(page, proposal)
     _rivals(page, proposal)
     page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
@@ -73,31 +75,31 @@ def _numbers(page: Report, proposal: Proposal) -> None:
     )  # fmt: skip
 
 
-def _closed(page: Report, proposal: Proposal) -> None:
+def _explained(page: Report, proposal: Proposal) -> None:
     rows = [
-        [role, f"{b.without.chi2_per_sample:.3f}", f"{b.left:.3f}", percent(b.closed)]
-        for role, b in (("fitted", proposal.train), ("held out", proposal.validate))
+        [role, *map(in_percent, (g.before.error.value, g.after.error.value)), percent(g.explained)]
+        for role, g in (("fitted", proposal.train.gap), ("held out", proposal.validate.gap))
     ]
     page.table(
-        ["events", "chi2 per sample without it", "with it", "share of the gap closed"], rows,
-        "Of what the term gains and what pushes into the balances or the other terms tried would gain beside it, beyond"
-        f" chance; {chance(proposal.p)}.",
+        ["events", "model's error without it", "with it", "explained"], rows,
+        "Errors are of the response; explained is the term's part of what it gains and what pushes into the balances or"
+        f" the other terms tried would gain beside it, beyond chance; {chance(proposal.p)}.",
     )  # fmt: skip
 
 
 def _drawn(page: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
-    for role, before in (("fitted", proposal.train), ("held out", proposal.validate)):
+    for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
         page.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        page.charts([_missed(before, e) for e in range(min(len(before.context.events), EVENTS))])
+        page.charts([_missed(judged, e) for e in range(min(len(judged.context.events), EVENTS))])
 
 
-def _missed(before: Before, e: int) -> Chart:
-    bench, event = before.context, before.context.events[e]
+def _missed(judged: Assessment, e: int) -> Chart:
+    bench, event = judged.context, judged.context.events[e]
     part = bench.drive.part(e)
-    base = before.without.calculated[:, part]
+    base = judged.gap.before.calculated[:, part]
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
-    more = before.with_it.calculated[:, part] - base
+    more = judged.gap.after.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
     measured = [c for c in range(len(base)) if bench.valid[c, part].any()]  # a delta winding has no zero sequence
     chart = Chart(f"t [s], {event.record.name}", [f"{bench.drive.names[c]} [pu]" for c in measured])
@@ -110,7 +112,7 @@ def _missed(before: Before, e: int) -> Chart:
 def _rivals(page: Report, proposal: Proposal) -> None:
     if proposal.ties:
         page.table(
-            ["also possible", "closed on the fitted events", "on the held-out events"],
+            ["also possible", "explained of the fitted events", "of the held-out events"],
             [[t.words, percent(a), percent(b)] for t, a, b in proposal.ties],
             "These events cannot tell them from the term proposed.",
         )  # fmt: skip
@@ -130,8 +132,8 @@ def _tried(page: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
         return
     with page.folded("The best terms of the library, judged"):
         page.table(
-            ["term", "closed, fitted", "closed, held out", "left, fitted", "left, held out", "chance"],
-            [[t.words, percent(w.train.closed), percent(w.validate.closed), f"{w.train.left:.2f}",
-              f"{w.validate.left:.2f}", in_words(w.p)] for t, w in tried],
-            "Shares of the explainable gap closed, and what is left over the variance of the noise.",
+            ["term", "explained, fitted", "explained, held out", "left, fitted", "left, held out", "chance"],
+            [[t.words, *(percent(g.explained) for g in gaps), *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
+              in_words(w.p)] for t, w in tried for gaps in ((w.train.gap, w.validate.gap),)],
+            "Shares explained, and what is left over the variance of the noise.",
         )  # fmt: skip

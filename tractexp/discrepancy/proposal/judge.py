@@ -1,8 +1,8 @@
 """Whether a fitted term is proposed: held-out events and chance decide, not how well it fits.
 
-Shares are of the gap that can be explained, as in `gap`: what a term gains, over that and what pushes into the balances
-and the other terms, or itself in another size, would gain beside it. The deviance in excess of the noise is no measure
-of it: its level is estimated, and that and chance move it by more than what is missing may do.
+The share explained is that of names, with what the other terms, or itself in another size, would gain beside it among
+the rest. The deviance in excess of the noise is no measure of it: its level is estimated, and that and chance move it
+by more than what is missing may do.
 """
 
 from collections.abc import Sequence
@@ -13,8 +13,8 @@ import numpy as np
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import Curves, beyond_chance, curves, pushed
-from tractexp.discrepancy.held_out import carried
+from tractexp.discrepancy.gap import gap, pushed
+from tractexp.discrepancy.held_out import Assessment, carried
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import JUDGED, Fitted
 from tractexp.discrepancy.records import Records
@@ -23,43 +23,13 @@ from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Before:
-    """A model on some events without a term and with it, and how much more than chance explains what is left."""
-
-    context: Context  # of the events
-    without: Curves
-    with_it: Curves
-    explainable: float  # beside the term, of the deviance
-
-    @property
-    def gain(self) -> float:
-        """By how much the term lowers the deviance."""
-        return self.without.deviance - self.with_it.deviance
-
-    @property
-    def closed(self) -> float:
-        """The share of the explainable gap that the term takes away; 0 where there is none."""
-        whole = self.gain + max(self.explainable, 0.0)
-        return self.gain / whole if whole > 0 else 0.0
-
-    @property
-    def left(self) -> float:
-        """What is left, of the noise's variance."""
-        return self.with_it.chi2_per_sample
-
-
-@dataclass(frozen=True, eq=False)
 class Weighed:
-    """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the library's best as much.
-
-    `unit` (D,) are its coordinates on the held-out events.
-    """
+    """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the best of all as much."""
 
     fit: Refit
-    train: Before
-    validate: Before
+    train: Assessment
+    validate: Assessment
     p: float
-    unit: np.ndarray
 
     def stands(self, criteria: Criteria) -> bool:
         """Whether it is proposed."""
@@ -67,12 +37,15 @@ class Weighed:
 
     def objections(self, criteria: Criteria) -> list[str]:
         """Why it is not proposed, each as the end of a sentence."""
-        closed = self.validate.closed
+        gap = self.validate.gap
         least = 1 - 1 / criteria.ahead**2  # of squares
-        little = f"it closes {closed:.0%} of the gap on the held-out events, less than {least:.0%}"
+        little = (
+            f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events, less than {least:.0%}"
+        )
+        enough = gap.gain > 0 and gap.explained >= least
         rows = {
-            (little if closed >= 0 else "it makes the held-out events worse"): closed < least,
-            "the held-out events are too mild to show it": closed >= least and self.validate.gain < criteria.shown,
+            (little if gap.gain > 0 else "it makes the held-out events worse"): not enough,
+            "the held-out events are too mild to show it": enough and not gap.helps,
             "chance gives the best of the library as much": self.p > criteria.proposal_p,
         }
         return [why for why, true in rows.items() if true]
@@ -87,31 +60,36 @@ def weighed(original: Context, result: Fitted, events: Sequence[Event], p: Seque
     other, units, noise = carried(result.context, events, [result.bare, *reversed(fits)])
     bare, held = units[0], list(reversed(units[1:]))
     fitted = [*result.context.coordinates.base, *result.context.coordinates.before]
-    train = _compared(
+    train = _assessed(
         original, result.context, result.noise, fitted, result.bare.unit, fits, [fit.unit for fit in fits]
     )
     there = original.on(Records.of(events, original.records.window))
-    validate = _compared(there, other, noise, [*other.coordinates.before], bare, fits, held)
-    return [Weighed(*each) for each in zip(fits, train, validate, p, held, strict=False)]
+    validate = _assessed(there, other, noise, [*other.coordinates.before], bare, fits, held)
+    return [Weighed(*each) for each in zip(fits, train, validate, p, strict=False)]
 
 
-def _compared(
+def _assessed(
     original: Context, context: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
     units: Sequence[np.ndarray],
-) -> list[Before]:  # fmt: skip
+) -> list[Assessment]:  # fmt: skip
     """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `context`.
 
     `original` has the same events; coordinates `fitted` were fitted to them.
     """
-    without = curves(context, bare, noise, ())
-    result = [curves(context, unit, noise, fit.names) for fit, unit in zip(fits, units, strict=True)]
-    terms = context.whiten(noise, np.array([(m.calculated - without.calculated) * context.valid for m in result]))
-    rows = []
-    for fit, unit, with_it in zip(fits, units, result, strict=True):
+    without = context.residuals(bare[None], ())[0]
+    apart = [
+        (context.residuals(unit[None], fit.names)[0] - without) * context.valid
+        for fit, unit in zip(fits, units, strict=True)
+    ]
+    terms = context.whiten(noise, np.array(apart))
+
+    def assessed(fit: Refit, unit: np.ndarray) -> Assessment:
         perturbations = pushed(original, carried_over(original, context, unit), (), noise)
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
-        rows.append(Before(context, without, with_it, beyond_chance(context, unit, fit.names, noise, fitted, changes)))
-    return rows
+        judged = gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
+        return Assessment(judged, context, (bare, unit))
+
+    return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
 def tied(result: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:

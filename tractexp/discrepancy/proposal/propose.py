@@ -8,11 +8,12 @@ import numpy as np
 from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.fitting import Refit
+from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
-from tractexp.discrepancy.proposal.judge import Before, Weighed, tied, weighed
+from tractexp.discrepancy.proposal.judge import Weighed, tied, weighed
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import Fitted, fitted, standard_errors
 from tractexp.discrepancy.proposal.screen import Ground, screen
@@ -42,11 +43,11 @@ class Proposal:
 
     term: Term
     estimates: tuple[ParameterEstimate, ...]
-    train: Before
-    validate: Before
+    train: Assessment
+    validate: Assessment
     p: float
     acting: tuple[Acting, ...]
-    ties: tuple[tuple[Term, float, float], ...]  # with the shares they close on fitted and on held-out events
+    ties: tuple[tuple[Term, float, float], ...]  # with the shares they explain on fitted and on held-out events
     alike: tuple[tuple[str, float], ...]  # textbook effects, and the share of its change that each could have made
     source: str  # of a plugin file
     next_event: NextEvent | None  # that would tell the terms apart
@@ -105,7 +106,7 @@ def _proposal(result: Fitted, first: Disagreement, standing: Sequence[Weighed], 
     return Proposal(
         term=term, estimates=estimates, train=chosen.train, validate=chosen.validate, p=chosen.p,
         acting=tuple(_acting(result, chosen.fit)),
-        ties=tuple((result.term(o.fit), o.train.closed, o.validate.closed) for o in alternatives),
+        ties=tuple((result.term(o.fit), o.train.gap.explained, o.validate.gap.explained) for o in alternatives),
         alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
         next_event=_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
@@ -164,6 +165,7 @@ def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
     """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
     if (proposal := proposed.proposal) is None:
         return None
+    judged = ("train", proposal.train.gap), ("validate", proposal.validate.gap)
     return {
         "terms": [
             _named(proposal.term)
@@ -172,11 +174,11 @@ def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
                 "parameters": {k.parameter.name: k.plain() for k in proposal.estimates},
             }
         ],
-        "closed": {"train": proposal.train.closed, "validate": proposal.validate.closed},
-        "left": {"train": proposal.train.left, "validate": proposal.validate.left},
+        "explained": {role: gap.explained for role, gap in judged},
+        "left": {role: gap.after.chi2_per_sample for role, gap in judged},
         "p": proposal.p,
         "when": [vars(a) for a in proposal.acting],
-        "ties": [_named(t) | {"closed": {"train": near, "validate": held}} for t, near, held in proposal.ties],
+        "ties": [_named(t) | {"explained": {"train": near, "validate": held}} for t, near, held in proposal.ties],
         "alike": dict(proposal.alike),
         "plugin": plugin,
     }

@@ -11,10 +11,10 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
     if not proposal:
         return [f"no term is proposed: {why}"] if why else []
     (term,) = proposal["terms"]
-    closed = proposal["closed"]
+    explained = proposal["explained"]
     sentences = [
-        f"proposed: {term['words']}, which closes {percent(closed['train'])} of the gap on the fitted events and"
-        f" {percent(closed['validate'])} on the held-out ones; {_numbers(term['parameters'])}",
+        f"proposed: {term['words']}, which explains {percent(explained['train'])} of what exceeds the noise on the"
+        f" fitted events and {percent(explained['validate'])} on the held-out ones; {_numbers(term['parameters'])}",
     ]
     if not term["function_of_voltage"]:
         sentences.append("it is not a function of the voltage: something happened by itself")
