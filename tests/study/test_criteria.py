@@ -22,7 +22,7 @@ from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
-from tractexp.discrepancy.proposal.judge import Weighed
+from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.score_test import Score
 from tractexp.errors import UserError
 from tractexp.noise.random_walk import Rest, find
@@ -130,7 +130,7 @@ def with_a_member(c, **assessment):
 def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
     """A term that would be proposed; with the pushes it explains the `whole`."""
     judged = judged_by(c, closed=explained, gain=explained * whole, expected=whole)
-    return Weighed(None, judged, judged, p)
+    return TermAssessment(None, judged, judged, p)
 
 
 CASES = {  # criterion: a looser value, the decision, what it is by default

@@ -25,7 +25,7 @@ from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, pl
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, pick_of, term, terms
 from tractexp.discrepancy.proposal.propose import propose, to_dict
-from tractexp.discrepancy.proposal.refit import fitted
+from tractexp.discrepancy.proposal.refit import term_fits
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
 from tractexp.discrepancy.records import Records
@@ -102,7 +102,7 @@ def test_the_linear_drop_is_that_of_a_refit_where_the_term_is_small():
     fit = fitted_base(events("load_step", 0.15, count=2))
     bench = context_of_terms(fit.context)
     there = Ground.at(bench, carried_over(bench, fit.context, fit.fit.unit), fit.noise)
-    made = fitted(screen(there, [term(STEP)], 0, 20), [])
+    made = term_fits(screen(there, [term(STEP)], 0, 20), [])
     (found,) = scores(there, [(term(STEP), {"instant": made.values(made.fits[0])["instant"]})])
     lowered = made.bare.deviance - made.fits[0].deviance
     assert lowered > 20
@@ -230,7 +230,7 @@ def test_what_a_proposal_ties_with_and_looks_like_is_said():
     }
     told = {"terms": [term], "explained": {"train": 0.9, "validate": 0.8}, "ties": [], "alike": {}}
     alone = proposed_in_words(told, None)
-    assert alone[0].startswith("proposed: a step of P, which closes 90%")
+    assert alone[0].startswith("proposed: a step of P, which explains 90% of")
     assert alone[1:] == ["it is not a function of the voltage: something happened by itself"]
     further = proposed_in_words(
         {**told, "ties": [{"words": "a ramp of P"}], "alike": {"undervoltage_trip": 0.93}}, None

@@ -21,7 +21,7 @@ from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import ParameterEstimate, estimates
-from tractexp.discrepancy.proposal.propose import Proposed, propose
+from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
@@ -46,7 +46,7 @@ class Findings:
     verdict: Verdict
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
-    proposed: Proposed  # the term that an unexplained disagreement asks for
+    proposed: ProposalResult  # the term that an unexplained disagreement asks for
 
     @property
     def context(self) -> Context:
@@ -234,9 +234,9 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     if word_of(weighed) == UNEXPLAINED and not weighed.open:
         weighed = incomplete(weighed, validate, seed)
     said = verdict(weighed, validate)
-    proposed = Proposed()
+    proposed = ProposalResult()
     if said.word == UNEXPLAINED and by_likelihood.open:
-        proposed = Proposed(why="the held-out events are too mild to show a term")
+        proposed = ProposalResult(why="the held-out events are too mild to show a term")
     elif said.word == UNEXPLAINED:
         proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
     return Findings(

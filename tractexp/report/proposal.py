@@ -9,7 +9,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import PLUGIN
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.proposal.judge import Weighed
+from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
@@ -82,8 +82,9 @@ def _explained(page: Report, proposal: Proposal) -> None:
     ]
     page.table(
         ["events", "model's error without it", "with it", "explained"], rows,
-        "Errors are of the response; explained is the term's part of what it gains and what pushes into the balances or"
-        f" the other terms tried would gain beside it, beyond chance; {chance(proposal.p)}.",
+        "Errors are of the response, faults of the measurement free in both; explained is the term's part of what it"
+        " gains and what pushes into the balances or the other terms tried would gain beside it, beyond chance;"
+        f" {chance(proposal.p)}.",
     )  # fmt: skip
 
 
@@ -126,7 +127,7 @@ def _rivals(page: Report, proposal: Proposal) -> None:
         page.text("No textbook effect of the catalogue could have made half of its change.")
 
 
-def _tried(page: Report, tried: Sequence[tuple[Term, Weighed]]) -> None:
+def _tried(page: Report, tried: Sequence[tuple[Term, TermAssessment]]) -> None:
     """The best of the library as held-out events judged them."""
     if not tried:
         return

@@ -6,7 +6,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
-from tractexp.discrepancy.proposal.refit import JUDGED, fitted
+from tractexp.discrepancy.proposal.refit import JUDGED, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.noise import Noise
 
@@ -20,7 +20,7 @@ def best_terms(context: Context, bare: Refit, noise: Noise) -> tuple[Context, Se
     context.effort.say("looking for a term of the library that predicts better")
     under = context_of_terms(context).with_measured_power
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
-    result = fitted(screen(ground, terms(), seed=0, draws=0), [])
+    result = term_fits(screen(ground, terms(), seed=0, draws=0), [])
     there, at = result.context, result.context.coordinates
     chosen = [(fit.names, at.without_faults(fit.unit, ())) for fit in result.fits[:JUDGED]]
     return there, refit(there, noise, chosen, faults=())

@@ -16,14 +16,14 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import gap, pushed
 from tractexp.discrepancy.held_out import Assessment, carried
 from tractexp.discrepancy.proposal.bed import carried_over
-from tractexp.discrepancy.proposal.refit import JUDGED, Fitted
+from tractexp.discrepancy.proposal.refit import JUDGED, TermFits
 from tractexp.discrepancy.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
 
 @dataclass(frozen=True, eq=False)
-class Weighed:
+class TermAssessment:
     """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the best of all as much."""
 
     fit: Refit
@@ -51,7 +51,9 @@ class Weighed:
         return [why for why, true in rows.items() if true]
 
 
-def weighed(original: Context, result: Fitted, events: Sequence[Event], p: Sequence[float]) -> list[Weighed]:
+def term_assessments(
+    original: Context, result: TermFits, events: Sequence[Event], p: Sequence[float]
+) -> list[TermAssessment]:
     """The best fits weighed on held-out events, in their order; `p` of each by chance.
 
     `original` is the context of the investigation, by which the balances are pushed.
@@ -65,7 +67,7 @@ def weighed(original: Context, result: Fitted, events: Sequence[Event], p: Seque
     )
     there = original.on(Records.of(events, original.records.window))
     validate = _assessed(there, other, noise, [*other.coordinates.before], bare, fits, held)
-    return [Weighed(*each) for each in zip(fits, train, validate, p, strict=False)]
+    return [TermAssessment(*each) for each in zip(fits, train, validate, p, strict=False)]
 
 
 def _assessed(
@@ -92,7 +94,7 @@ def _assessed(
     return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
-def tied(result: Fitted, chosen: Weighed, others: Sequence[Weighed]) -> list[Weighed]:
+def tied(result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]) -> list[TermAssessment]:
     """Those that neither held-out events nor, by its better fit, the chosen one denies."""
     criteria = result.context.criteria
     return [o for o in others if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)]

@@ -13,9 +13,9 @@ from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
-from tractexp.discrepancy.proposal.judge import Weighed, tied, weighed
+from tractexp.discrepancy.proposal.judge import TermAssessment, term_assessments, tied
 from tractexp.discrepancy.proposal.library import Term, terms
-from tractexp.discrepancy.proposal.refit import Fitted, fitted, standard_errors
+from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.noise import Noise
 from tractexp.record import Event
@@ -58,45 +58,45 @@ class Proposal:
 
 
 @dataclass(frozen=True, eq=False)
-class Proposed:
+class ProposalResult:
     """What became of the search for a term: a proposal, or the sentence why there is none."""
 
     proposal: Proposal | None = None
     why: str = ""
-    tried: tuple[tuple[Term, Weighed], ...] = field(default=())
+    tried: tuple[tuple[Term, TermAssessment], ...] = field(default=())
 
 
 def propose(
     base: BaseFit, first: Disagreement, bare: Refit, noise: Noise, validate: Sequence[Event], seed: int,
     among: Sequence[Term] = (),
-) -> Proposed:  # fmt: skip
+) -> ProposalResult:  # fmt: skip
     """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the last tests.
 
     `among` are the terms that are tried, by default the whole library.
     """
     context = base.context
     if not validate:
-        return Proposed(why="a term is proposed only where a held-out event confirms it, and none was held out")
+        return ProposalResult(why="a term is proposed only where a held-out event confirms it, and none was held out")
     under = context_of_terms(context)
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
     screened = screen(ground, among or terms(), seed, DRAWS)
     context.effort.say("refitting the most promising terms")
-    result = fitted(screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]])
+    result = term_fits(screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]])
     context.effort.say("judging terms on the held-out events")
     lowered = [result.bare.deviance - fit.deviance for fit in result.fits]
-    ranked = weighed(context, result, validate, [screened.p(drop) for drop in lowered])
+    ranked = term_assessments(context, result, validate, [screened.p(drop) for drop in lowered])
     tried = tuple((result.term(w.fit), w) for w in ranked)
     standing = [w for w in ranked if w.stands(context.criteria)]
     if not standing:
         objections = joined(ranked[0].objections(context.criteria))
-        return Proposed(
+        return ProposalResult(
             None, f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}", tried
         )
-    return Proposed(_proposal(result, first, standing, screened.ground), "", tried)
+    return ProposalResult(_proposal(result, first, standing, screened.ground), "", tried)
 
 
-def _proposal(result: Fitted, first: Disagreement, standing: Sequence[Weighed], ground: Ground) -> Proposal:
+def _proposal(result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], ground: Ground) -> Proposal:
     chosen, *others = standing
     term, values = result.term(chosen.fit), result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)
@@ -113,21 +113,21 @@ def _proposal(result: Fitted, first: Disagreement, standing: Sequence[Weighed], 
     )  # fmt: skip
 
 
-def _next_event(result: Fitted, fits: Sequence[Refit]) -> NextEvent | None:
+def _next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
     """What to record to tell a term from its near-synonyms."""
     if len(fits) == 1:
         return None
     return next_event(result.context, result.noise, result.bare, fits, [result.term(fit).words for fit in fits])
 
 
-def change(result: Fitted, fit: Refit) -> np.ndarray:
+def change(result: TermFits, fit: Refit) -> np.ndarray:
     """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
     without = result.context.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))})
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 
 
-def _acting(result: Fitted, fit: Refit) -> list[Acting]:
+def _acting(result: TermFits, fit: Refit) -> list[Acting]:
     """Where in each event a term changes a channel by more than a tenth of the most it does."""
     context, added, terms = result.context, change(result, fit), []
     for e, event in enumerate(context.events):
@@ -143,7 +143,7 @@ def _acting(result: Fitted, fit: Refit) -> list[Acting]:
     return terms
 
 
-def alike(result: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
+def alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
     """Textbook effects that could make most of what a term changes, the base model giving way: best first."""
     context = result.context
     rows = context.whiten(result.noise, change(result, fit)[None])
@@ -161,7 +161,7 @@ def alike(result: Fitted, fit: Refit, first: Disagreement) -> list[tuple[str, fl
     return sorted(((n, v) for n, v in shares.items() if v >= LOOKS_LIKE), key=lambda pair: -pair[1])[:4]
 
 
-def to_dict(proposed: Proposed, plugin: str) -> Mapping[str, object] | None:
+def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | None:
     """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
     if (proposal := proposed.proposal) is None:
         return None

@@ -16,7 +16,7 @@ from tractexp.discrepancy.fitting import Refit, Start, best_of, off_bounds, refi
 from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
-from tractexp.discrepancy.proposal.screen import Ground, Scored, Screened, scores
+from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore, scores
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
@@ -34,7 +34,7 @@ AGAIN = 10  # terms that start from the other fits of the base model, too
 
 
 @dataclass(frozen=True, eq=False)
-class Fitted:
+class TermFits:
     """Terms fitted under one noise, the best first, and the base model alone."""
 
     context: Context  # with these terms as candidates
@@ -50,9 +50,9 @@ class Fitted:
         return values_of(self.context.coordinates, fit.unit, self.term(fit))
 
 
-def shortlist(screened: Screened) -> list[Scored]:
+def shortlist(screened: ScreenResult) -> list[TermScore]:
     """The most promising terms, each at its best setting, so that no kind of signal crowds out the others."""
-    best: dict[str, Scored] = {}
+    best: dict[str, TermScore] = {}
     for scored in screened.scored:
         if scored.drop > 0:
             best.setdefault(scored.term.name, scored)
@@ -68,9 +68,9 @@ def shortlist(screened: Screened) -> list[Scored]:
     return sorted([*answers, *rest], key=lambda f: -f.drop)
 
 
-def further(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
+def further(screened: ScreenResult, listed: Sequence[TermScore]) -> list[TermScore]:
     """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
-    more: dict[str, list[Scored]] = {f.term.name: [f] for f in listed}
+    more: dict[str, list[TermScore]] = {f.term.name: [f] for f in listed}
     for scored in screened.scored:
         there = more.get(scored.term.name)
         if there and len(there) < PEAKS and all(_far(scored, f) for f in there):
@@ -78,7 +78,7 @@ def further(screened: Screened, listed: Sequence[Scored]) -> list[Scored]:
     return [f for there in more.values() for f in there[1:] if f.drop > PROMISING * there[0].drop]
 
 
-def _far(a: Scored, b: Scored) -> bool:
+def _far(a: TermScore, b: TermScore) -> bool:
     """Whether two settings differ by two places of the grid in some parameter."""
 
     def places(s: Shape) -> int:
@@ -88,7 +88,7 @@ def _far(a: Scored, b: Scored) -> bool:
     return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
 
 
-def zoomed(ground: Ground, scored: Sequence[Scored]) -> list[Scored]:
+def zoomed(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
     best = list(scored)
     for turn in range(ROUNDS):
@@ -101,7 +101,7 @@ def zoomed(ground: Ground, scored: Sequence[Scored]) -> list[Scored]:
     return sorted(best, key=lambda f: -f.drop)
 
 
-def _finer(scored: Scored, which: int, scale: float) -> list[dict[str, float]]:
+def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]]:
     """Settings between a setting and its neighbors on the grid, one parameter moved."""
     shapes = scored.term.signal.shapes
     if which >= len(shapes) or shapes[which].name == "phase":
@@ -114,7 +114,7 @@ def _finer(scored: Scored, which: int, scale: float) -> list[dict[str, float]]:
     return [{**scored.setting, shape.name: value} for value in dict.fromkeys(moved) if value != now]
 
 
-def fitted(screened: Screened, local_minima: Sequence[np.ndarray]) -> Fitted:
+def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> TermFits:
     """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms' coordinates."""
     ground = screened.ground
     listed = shortlist(screened)
@@ -134,7 +134,7 @@ def fitted(screened: Screened, local_minima: Sequence[np.ndarray]) -> Fitted:
     near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
     exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
-    return Fitted(context, noise, bare, tuple(ranked))
+    return TermFits(context, noise, bare, tuple(ranked))
 
 
 def _searched_anew(
@@ -187,13 +187,13 @@ def _without(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str
     )
 
 
-def _starts(context: Context, chosen: Sequence[Scored], units: Sequence[np.ndarray]) -> list[Start]:
+def _starts(context: Context, chosen: Sequence[TermScore], units: Sequence[np.ndarray]) -> list[Start]:
     """Each term at its one-step size on each of the base model's fits (D,)."""
     at = context.coordinates
     return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
 
 
-def standard_errors(result: Fitted, fit: Refit) -> dict[str, float]:
+def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
     context, chosen = result.context, result.term(fit)
     at = context.coordinates

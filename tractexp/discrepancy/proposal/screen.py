@@ -65,7 +65,7 @@ class Ground:
 
 
 @dataclass(frozen=True, eq=False)
-class Scored:
+class TermScore:
     """A term at one setting: by how much its best size lowers the deviance, and that size."""
 
     term: Term
@@ -75,11 +75,11 @@ class Scored:
 
 
 @dataclass(frozen=True, eq=False)
-class Screened:
+class ScreenResult:
     """Every term of the library at every setting, the most promising first, and the best of each draw of noise (b,)."""
 
     ground: Ground
-    scored: list[Scored]
+    scored: list[TermScore]
     chance: np.ndarray
 
     def p(self, drop: float) -> float:
@@ -89,7 +89,7 @@ class Screened:
         return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
 
 
-def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Screened:
+def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> ScreenResult:
     """Score terms on their grids."""
     noise = ground.drawn(seed, draws)
     best = np.zeros(draws)
@@ -97,10 +97,10 @@ def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Scre
     for score, drops in _scores(ground, [(t, s) for t in terms for s in t.signal.settings], noise):
         scored.append(score)
         best = np.maximum(best, drops)
-    return Screened(ground, sorted(scored, key=lambda s: -s.drop), best)
+    return ScreenResult(ground, sorted(scored, key=lambda s: -s.drop), best)
 
 
-def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[Scored]:
+def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
     """Score terms at settings of their own, in this order; a phase is found, not given."""
     by_key = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
     return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
@@ -112,7 +112,7 @@ def _key(setting: Setting) -> tuple:
 
 def _scores(
     ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
-) -> Iterator[tuple[Scored, np.ndarray]]:
+) -> Iterator[tuple[TermScore, np.ndarray]]:
     """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
     ground.noise.prepare(ground.context.drive, ground.context.valid)
     scored = lambda batch: _batch(ground, batch, noise)  # noqa: E731
@@ -137,7 +137,7 @@ def _kind(members: Members) -> str:
     return members[0][0].signal.kind
 
 
-def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[Scored, np.ndarray]]:
+def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermScore, np.ndarray]]:
     at, index = ground.context.coordinates, {}
     points, spans = [], []
     blocks = []
@@ -178,18 +178,18 @@ def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
     return (vectors[:, large] / values[large]) @ vectors[:, large].T
 
 
-def _scored(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> Scored:
+def _scored(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> TermScore:
     """A score; of two phases the amplitude, and the phase of the larger balance."""
     if "phase" not in setting:
-        return _within(Scored(t, dict(setting), drop, tuple(sizes.tolist())))
+        return _within(TermScore(t, dict(setting), drop, tuple(sizes.tolist())))
     pairs = sizes.reshape(-1, 2)
     turned = pairs[:, 0] + 1j * pairs[:, 1]
     phase = float(np.angle(turned[np.abs(turned).argmax()]))
     amplitudes = (turned * np.exp(-1j * phase)).real
-    return _within(Scored(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
+    return _within(TermScore(t, {**setting, "phase": phase}, drop, tuple(amplitudes.tolist())))
 
 
-def _within(score: Scored) -> Scored:
+def _within(score: TermScore) -> TermScore:
     """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all of them."""
     over = max(abs(k) / size.bound for k, size in zip(score.sizes, score.term.balance.sizes, strict=True))
     if over <= 1:
