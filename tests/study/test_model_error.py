@@ -10,7 +10,7 @@ import uncertainty as study
 from scipy import stats
 
 import tractexp
-from tractexp.identification.model_error import ModelError, in_percent, model_error, noise_variance
+from tractexp.identification.model_error import ModelError, block_sums, in_percent, model_error, noise_variance
 from tractexp.identification.result import Fit
 from tractexp.noise.random_walk import SLOW
 
@@ -66,8 +66,20 @@ def test_a_drift_before_the_dip_is_no_noise():
     assert np.sqrt(quiet) == pytest.approx(np.sqrt(2) * 4e-3, rel=0.2)
 
 
+def test_a_short_record_has_as_many_blocks_as_one_of_a_second():
+    """0.24 s of it has ten blocks of 24 ms; together with a long one it has blocks of a tenth of a second."""
+    long = played(-0.1, -0.1)
+    end = long.event.start + 120
+    record = long.event.record
+    cut = {name: getattr(record, name)[:end] for name in ("t", "U", "P", "Q")}
+    short = replace(long, event=replace(long.event, record=replace(record, **cut)), P=long.P[:end], Q=long.Q[:end])
+    assert [len(sums) for sums in block_sums([short])] == [10]
+    assert [len(sums) for sums in block_sums([short, long])] == [3, len(block_sums([long])[0])]
+
+
 def test_one_block_tells_nothing_of_chance(monkeypatch):
     monkeypatch.setattr("tractexp.identification.model_error.LENGTH", 100.0)
+    monkeypatch.setattr("tractexp.identification.model_error.BLOCKS", 1)
     error = model_error([played(-0.1, -0.1)])
     assert error.value == pytest.approx(0.1, rel=1e-3)
     assert error.interval == (0.0, np.inf)

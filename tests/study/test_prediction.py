@@ -90,6 +90,16 @@ def test_a_pair_needs_both_of_its_members():
     assert named(*sets, off("a", "b", "c", error=0.09)) == [("a", "b")]
 
 
+def test_a_pair_needs_both_of_its_members_though_the_lead_of_one_may_be_chance():
+    bare, one, pair = off(error=1.0), off("a", error=0.3), off("a", "b", error=0.42)
+    bare.squares[3] += 60.0
+    one.squares[4] += 3.0
+    pair.squares[3] += 1.5
+    assert [p.ahead_of(bare, 1.5) for p in (one, pair)] == [False, True]
+    assert named(bare, pair) == [("a", "b")]
+    assert named(bare, one, pair) == []
+
+
 def test_what_one_block_decides_is_chance():
     """Without its loudest block the rival is as good."""
     one, other = off("a", error=0.1), off("b", error=0.1)

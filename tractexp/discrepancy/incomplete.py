@@ -66,15 +66,16 @@ def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
 
 
 def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
-    """The single effects of the search by likelihood, and the larger sets that the fitted events do not reject, without
-    faults of the measurement: what is missing looks like those.
+    """The single effects of the search by likelihood, and the larger sets that the fitted events do not reject.
+
+    None beside faults of the measurement, which what is missing looks like.
     """
     surviving, noise = weighed.survivors, weighed.survivors.explanations.last.noise
     explained, context = surviving.explanations, surviving.explanations.base.context
     least = context.criteria.shown
     rejected = {r.fit.names: r.rejected for r in surviving.rivals}
     fits = {n: f for n, f in explained.refits.items() if n and (len(n) == 1 or not rejected.get(n, True))}
-    if not fits:
+    if weighed.faults or not fits:
         return weighed
     wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
     unit = context.coordinates.without_faults
@@ -100,7 +101,7 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
 
     retained = [rival(c) for c in chosen]
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
-    return _named(replace(weighed, faults=()), retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
+    return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 
 
 def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:

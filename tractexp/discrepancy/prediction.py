@@ -141,10 +141,14 @@ class Predictions(Generic[OneSet]):
         """The set that predicts best and needs each of its members; the base model where none is ahead of it."""
         chosen = self.bare
         for size in range(1, 1 + max(map(len, self.sets))):
-            ranked = self.ranked(size, criteria.ahead)
-            ahead = (p for p in ranked if len(p.names) == size and p.ahead_of(chosen, criteria.ahead))
-            chosen = next(ahead, chosen)
+            ranked = (p for p in self.ranked(size, criteria.ahead) if len(p.names) == size)
+            chosen = next((p for p in ranked if p.ahead_of(chosen, criteria.ahead) and self.whole(p, criteria)), chosen)
         return chosen
+
+    def whole(self, one: OneSet, criteria: Criteria) -> bool:
+        """Whether a set needs each of its members: it leaves less without none, by a factor, and chance aside."""
+        fewer = (tuple(n for n in one.names if n != left) for left in one.names if len(one.names) > 1)
+        return all(self.sets[names].left >= criteria.ahead**2 * one.left for names in fewer if names in self.sets)
 
     def nearest(self, criteria: Criteria) -> OneSet:
         """The same, or else what leaves least."""
@@ -257,11 +261,12 @@ def _predicted(there: Context, fit: Refit, kind: type[OneError] = PredictionErro
     """A fit on other events."""
     unit = there.coordinates.at_measured_power(fit.unit)
     calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
+    played = [
+        there.domain.comparison(event, calculated[:, there.drive.part(e)]) for e, event in enumerate(there.events)
+    ]
     left, noise, response = [], [], []
-    for e, event in enumerate(there.events):
-        played = there.domain.comparison(event, calculated[:, there.drive.part(e)])
-        sums, phasors = block_sums(played), played.event
-        own = noise_variance(phasors) * (phasors.record.samples - phasors.start) / len(sums)
+    for one, sums in zip(played, block_sums(played), strict=True):
+        own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
         left.append(sums[:, 0] + own)
         noise.append(np.full(len(sums), own))
         response.append(sums[:, 1])

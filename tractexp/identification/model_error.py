@@ -3,8 +3,9 @@ r"""The size of a model's error: what it leaves of a load's response beyond the 
     e² = (sum |S_calculated - S|² - n s²) / (sum |S - S_0|² - n s²)
 
 over the n samples from each dip on, S = P + jQ, S_0 its mean before, s² the variance of the noise before the dip, its
-slow part left out: that is drift. Its interval is that of the delete-a-block jackknife. A test of significance says
-whether something is left; this says how much it matters.
+slow part left out: that is drift. Its interval is that of the delete-a-block jackknife; a second of records and more
+has blocks of a tenth of a second, less has as many as that. A test of significance says whether something is left; this
+says how much it matters.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,6 +19,7 @@ from tractexp.identification.blocks import LENGTH, reach
 from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
+BLOCKS = 10  # of short records: two or three would tell nothing of chance
 MOST = 10_000  # percent: more tells no more
 
 
@@ -56,7 +58,7 @@ def in_percent(share: float) -> str:
 
 def model_error(played: Sequence[Playback]) -> ModelError:
     """The error of a model over some events together."""
-    sums = np.concatenate([block_sums(one) for one in played])  # (blocks, 3)
+    sums = np.concatenate(block_sums(played))  # (blocks, 3)
     left, response, power = sums.sum(axis=0)
     ratio = left / max(response, 1e-30)
     if not np.isfinite(left):
@@ -67,8 +69,14 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     return ModelError(root(ratio), (root(ratio - half), root(ratio + half)), root(left / max(power, 1e-30)), ratio)
 
 
-def block_sums(played: Playback) -> np.ndarray:
-    """Squares of what is left, of the response, both less those of the noise, and of the power; by block (b, 3)."""
+def block_sums(played: Sequence[Playback]) -> list[np.ndarray]:
+    """Squares of what is left, of the response, both less those of the noise, and of the power: (b, 3) by the blocks of
+    each event."""
+    seconds = sum((one.event.record.samples - one.event.start) * one.event.record.step for one in played)
+    return [_block_sums(one, min(LENGTH, seconds / BLOCKS)) for one in played]
+
+
+def _block_sums(played: Playback, length: float) -> np.ndarray:
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
     squares = np.stack([np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2])
@@ -76,7 +84,7 @@ def block_sums(played: Playback) -> np.ndarray:
     valid = np.isfinite(S)
     squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # what diverged
     squares = np.where(valid, squares, 0.0)[:, event.start :]
-    return np.add.reduceat(squares, np.arange(0, squares.shape[1], max(1, round(LENGTH / record.step))), axis=1).T
+    return np.add.reduceat(squares, np.arange(0, squares.shape[1], max(1, round(length / record.step))), axis=1).T
 
 
 def noise_variance(event: Event) -> float:
