@@ -133,6 +133,10 @@ def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
     return TermAssessment(None, judged, judged, p)
 
 
+def test_what_only_gets_worse_explains_nothing():
+    assert [judged_by(Criteria(), gain=gain).gap.explained for gain in (-5.0, 0.0, 5.0)] == [0.0, 0.0, 1.0]
+
+
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
     "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),

@@ -58,9 +58,9 @@ class GapTest:
 
     @property
     def explained(self) -> float:
-        """The share of what could be explained: of what was gained and what is left."""
+        """The share of what could be explained: of what was gained and what is left. 0 where that is nothing."""
         whole = self.gain + max(self.left, 0.0)
-        return self.gain / whole if whole > 0 else np.nan
+        return self.gain / whole if whole > 0 else 0.0
 
     @property
     def helps(self) -> bool:
