@@ -31,7 +31,7 @@ from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import beneath, searched, without_needless
 from tractexp.discrepancy.fit_effort import TOGETHER
 from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.held_out import carried, judged_on, weighed
+from tractexp.discrepancy.held_out import assess, carried, judged_on
 from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
@@ -641,7 +641,7 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     def judged_on(made):
         held = planted.held_out
         both = AllEvents(planted.context, made, held.noise, held.faults, held.bare)
-        found, again = weighed(both, held.extended, seed=0)
+        found, again = assess(both, held.extended, seed=0)
         assert again == []
         return found["stator_resistance",]
 

@@ -19,7 +19,7 @@ from tractexp.discrepancy.families import against_members, open_settings, starts
 from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import Assessment, HeldOut, weighed
+from tractexp.discrepancy.held_out import Assessment, HeldOut, assess
 from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.kernels import Family
@@ -262,7 +262,7 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
 def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
     both, extended, judged = compared(costs, p_left, helps)
     monkeypatch.setattr(held_out, "judged_on", judged)
-    assessments, fits = weighed(both, extended, 0)
+    assessments, fits = assess(both, extended, 0)
     assert [names[0] for names, one in assessments.items() if one.helps] == standing
     assert [f.names[0] for f in fits] == again
 
@@ -289,7 +289,7 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, ex
         return {f.names: Assessment(GapTest(None, None, *gap, 10.8, None), both.fitted, ()) for f in fits}
 
     monkeypatch.setattr(held_out, "judged_on", judged)
-    (assessment,) = weighed(both, {pair.names: pair}, 0)[0].values()
+    (assessment,) = assess(both, {pair.names: pair}, 0)[0].values()
     assert assessment.evident
     assert assessment.needless == needless
     assert assessment.helps == (not needless)

@@ -92,10 +92,10 @@ def _verdict_on(findings: Findings, name: str) -> str:
 
 def _of_set(findings: Findings, rival: Rival) -> Evidence:
     """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
-    weighed, names = findings.held_out, rival.fit.names or findings.held_out.faults
-    drop = rival.lowered if rival.fit.names else weighed.bare.deviance - weighed.extended[()].deviance
+    outcome, names = findings.held_out, rival.fit.names or findings.held_out.faults
+    drop = rival.lowered if rival.fit.names else outcome.bare.deviance - outcome.extended[()].deviance
     status, why = _fate(findings, rival)
-    fit = weighed.extended.get(rival.fit.names, rival.fit)
+    fit = outcome.extended.get(rival.fit.names, rival.fit)
     sizes = effect_sizes(findings.context, fit, names, rival.tests)
     return Evidence(names, max(drop, 0.0), FITTED, status, tuple(sizes), why)
 

@@ -140,7 +140,7 @@ def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOu
         return as_fitted
     count = len(surviving.adequate)
     context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    assessments, again = weighed(both, extended, seed)
+    assessments, again = assess(both, extended, seed)
     joint = {fit.names: fit for fit in again}
     return replace(as_fitted, assessments=assessments, together=tuple(again), extended={**extended, **joint})
 
@@ -168,7 +168,7 @@ def telling(explained: Explanations, bare: Refit) -> Names:
     return faults
 
 
-def weighed(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
+def assess(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
     """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
     Of several effects each is judged against the others alone as the whole is against the base model.

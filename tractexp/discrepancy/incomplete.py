@@ -50,41 +50,41 @@ class PredictedDeviance(Prediction):
         return gain >= self.least or (other.rejected and not self.rejected)
 
 
-def incomplete(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
+def incomplete(outcome: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The sets that predict the held-out events, if any does; what else there is stays as it was.
 
     None without held-out events: a larger set always fits better what it was fitted to. Where what is left is loud it
     is judged by its size, and all is told as least squares fit it, named or not; else by the deviance.
     """
     if not events:
-        return weighed
-    context = weighed.survivors.explanations.base.context
+        return outcome
+    context = outcome.survivors.explanations.base.context
     context.effort.say("judging what leaves something on the held-out events")
-    there, (unit,), noise = carried(context, events, [weighed.bare])
+    there, (unit,), noise = carried(context, events, [outcome.bare])
     loud = curves(there, unit, noise).chi2_per_sample > LOUD
-    return (_by_size if loud else _by_deviance)(weighed, events, seed)
+    return (_by_size if loud else _by_deviance)(outcome, events, seed)
 
 
-def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
+def _by_deviance(outcome: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """The single effects of the search by likelihood, and the larger sets that the fitted events do not reject.
 
     None beside faults of the measurement, which what is missing looks like.
     """
-    surviving, noise = weighed.survivors, weighed.survivors.explanations.last.noise
+    surviving, noise = outcome.survivors, outcome.survivors.explanations.last.noise
     explained, context = surviving.explanations, surviving.explanations.base.context
     least = context.criteria.shown
     rejected = {r.fit.names: r.rejected for r in surviving.rivals}
     fits = {n: f for n, f in explained.refits.items() if n and (len(n) == 1 or not rejected.get(n, True))}
-    if weighed.faults or not fits:
-        return weighed
+    if outcome.faults or not fits:
+        return outcome
     wanted = sorted(fits.values(), key=lambda f: f.cost)[:JUDGED]
     unit = context.coordinates.without_faults
     fitted = refit(context, noise, [(f.names, unit(f.unit, ())) for f in wanted], faults=())
-    judged = judged_on(context, events, weighed.bare, fitted[::-1])  # the best last: there the noise is its
+    judged = judged_on(context, events, outcome.bare, fitted[::-1])  # the best last: there the noise is its
     gaps = {f.names: judged[f.names].gap for f in fitted}
     whole = max(gaps.values(), key=lambda one: one.gain)
     sets: dict[Names, PredictedDeviance] = {
-        (): PredictedDeviance(weighed.bare, whole.gain + max(whole.left, 0.0), whole.before, True, least)
+        (): PredictedDeviance(outcome.bare, whole.gain + max(whole.left, 0.0), whole.before, True, least)
     }
     for fit in fitted:
         one = gaps[fit.names]
@@ -92,22 +92,22 @@ def _by_deviance(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOu
     predicted = Predictions(context.catalogue, sets)
     chosen = [p.fit for p in predicted.explaining(context.criteria) if not p.rejected]
     if not chosen or not all(gaps[f.names].helps for f in chosen):
-        return weighed
+        return outcome
 
     def rival(fit: Refit) -> Rival:
         tests = examined(explained.base.quiet, fit, noise, seed, plain=True)
-        lowered = weighed.bare.deviance - fit.deviance
+        lowered = outcome.bare.deviance - fit.deviance
         return Rival(fit, lowered, fit.cost - chosen[0].cost, rejected=False, tests=tests)
 
     retained = [rival(c) for c in chosen]
     others = [r for r in surviving.rivals if r.fit.names not in {f.names for f in chosen}]
-    return _named(weighed, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
+    return _named(outcome, retained, others, {f.names: judged[f.names] for f in chosen}, predicted)
 
 
-def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
+def _by_size(outcome: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
     """All sets as least squares fit them; retained are those that predict the held-out events best by the size of the
     model's error, none where none does."""
-    explained = weighed.survivors.explanations
+    explained = outcome.survivors.explanations
     criteria, quiet = explained.base.context.criteria, explained.base.quiet
     predicted = predictions(explained, events)
     there, bare, explaining = predicted.context, predicted.bare, predicted.explaining(criteria)
@@ -127,19 +127,19 @@ def _by_size(weighed: HeldOut, events: Sequence[Event], seed: int) -> HeldOut:
 
     rivals = [rival(p) for p in (*leading, *rest)]
     retained, others = rivals[: len(explaining)], rivals[len(explaining) :]
-    weighed = replace(
-        weighed, first=tests[()], last=tests[leading[0].names], noise=predicted.noise, faults=(), bare=bare.fit
+    outcome = replace(
+        outcome, first=tests[()], last=tests[leading[0].names], noise=predicted.noise, faults=(), bare=bare.fit
     )
-    return _named(weighed, retained, others, {p.names: assessed(p) for p in explaining}, predicted)
+    return _named(outcome, retained, others, {p.names: assessed(p) for p in explaining}, predicted)
 
 
 def _named(
-    weighed: HeldOut, retained: Sequence[Rival], others: Sequence[Rival], assessments: Mapping[Names, Assessment],
+    outcome: HeldOut, retained: Sequence[Rival], others: Sequence[Rival], assessments: Mapping[Names, Assessment],
     predicted: Predictions,
 ) -> HeldOut:  # fmt: skip
     """The sets retained in place of those that leave noise only."""
-    surviving = replace(weighed.survivors, retained=tuple(retained), rivals=(*retained, *others))
+    surviving = replace(outcome.survivors, retained=tuple(retained), rivals=(*retained, *others))
     extended = {r.fit.names: r.fit for r in retained}
     return replace(
-        weighed, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted
+        outcome, survivors=surviving, extended=extended, assessments=assessments, together=(), predictions=predicted
     )

@@ -230,10 +230,10 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     base, first = behind_recorder(base, disagreement(base, seed), seed)
     explained = explanations(base, first, seed)
     base, first = explained.base, explained.steps[0]
-    weighed = by_likelihood = held_out(survivors(explained, seed), validate, seed)
-    if word_of(weighed) == UNEXPLAINED and not weighed.open:
-        weighed = incomplete(weighed, validate, seed)
-    said = verdict(weighed, validate)
+    outcome = by_likelihood = held_out(survivors(explained, seed), validate, seed)
+    if word_of(outcome) == UNEXPLAINED and not outcome.open:
+        outcome = incomplete(outcome, validate, seed)
+    said = verdict(outcome, validate)
     proposed = ProposalResult()
     if said.word == UNEXPLAINED and by_likelihood.open:
         proposed = ProposalResult(why="the held-out events are too mild to show a term")
@@ -241,13 +241,13 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
         proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
     return Findings(
         base=base,
-        places=() if said.word == NONE else tuple(places(weighed.first)),
+        places=() if said.word == NONE else tuple(places(outcome.first)),
         explanations=explained,
-        survivors=weighed.survivors,
+        survivors=outcome.survivors,
         by_likelihood=by_likelihood,
-        held_out=weighed,
+        held_out=outcome,
         verdict=said,
-        train=_gap(weighed.first.context, weighed, said),
+        train=_gap(outcome.first.context, outcome, said),
         withheld=tuple(validate),
         proposed=proposed,
     )
@@ -258,11 +258,11 @@ def _share_of(shapes: Sequence[Remainder]) -> float:
     return sum(shape.share for shape in shapes)
 
 
-def _gap(context: Context, weighed: HeldOut, said: Verdict) -> GapTest:
+def _gap(context: Context, outcome: HeldOut, said: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
     at = context.coordinates
     chosen = said.chosen
-    after = weighed.extended[chosen.fit.names] if chosen else weighed.bare
-    noise = ((chosen and chosen.tests) or weighed.last).noise
+    after = outcome.extended[chosen.fit.names] if chosen else outcome.bare
+    noise = ((chosen and chosen.tests) or outcome.last).noise
     fitted = [*at.base, *at.before, *at.parameters(said.names)]
-    return gap(context, weighed.bare.unit, after.unit, after.names, noise, fitted)
+    return gap(context, outcome.bare.unit, after.unit, after.names, noise, fitted)

@@ -56,23 +56,23 @@ class Verdict:
     complete: bool
 
 
-def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
-    left = weighed.survivors
+def verdict(outcome: HeldOut, validate: Sequence[Event]) -> Verdict:
+    left = outcome.survivors
     explained = left.explanations
     context = explained.base.context
-    word = word_of(weighed)
-    nearest = _nearest(weighed, validate) if word == UNEXPLAINED else None
-    sets = tuple(map(weighed.names_of, weighed.retained)) if word in (NAMED, TIED) else ()
-    reason = _reason(word, weighed, sets, nearest)
-    judged = [weighed.assessments[r.fit.names].gap for r in weighed.retained if r.fit.names in weighed.assessments]
+    word = word_of(outcome)
+    nearest = _nearest(outcome, validate) if word == UNEXPLAINED else None
+    sets = tuple(map(outcome.names_of, outcome.retained)) if word in (NAMED, TIED) else ()
+    reason = _reason(word, outcome, sets, nearest)
+    judged = [outcome.assessments[r.fit.names].gap for r in outcome.retained if r.fit.names in outcome.assessments]
     if sets and judged and all(there.open for there in judged):
         reason += "; the held-out events are too mild to show it"
-    if weighed.together and weighed.retained:
+    if outcome.together and outcome.retained:
         reason += "; what the fitted events leave open of it was fitted to the held-out ones, too"
     if (window := context.records.window) is not None:
         reason += f"; {window.describe()}, which is taken into account"
-    chosen = weighed.retained[0] if sets else None
-    at = weighed.first if chosen is None else chosen.tests or weighed.last
+    chosen = outcome.retained[0] if sets else None
+    at = outcome.first if chosen is None else chosen.tests or outcome.last
     if at.resting:
         reason += f"; on a bound: {', '.join(at.resting)}"
     return Verdict(
@@ -81,52 +81,52 @@ def verdict(weighed: HeldOut, validate: Sequence[Event]) -> Verdict:
         names=sets[0] if sets else (),
         sets=sets,
         chosen=chosen,
-        next_event=_next_event(weighed, sets) if word == TIED else None,
+        next_event=_next_event(outcome, sets) if word == TIED else None,
         nearest=nearest,
-        complete=word != UNEXPLAINED and not weighed.leaves_more,
+        complete=word != UNEXPLAINED and not outcome.leaves_more,
     )
 
 
-def _next_event(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
+def _next_event(outcome: HeldOut, sets: Sequence[Sequence[str]]) -> NextEvent:
     """What to record to tell all explanations apart that are kept."""
-    context = weighed.survivors.explanations.base.context
-    fits = [weighed.extended.get(rival.fit.names, rival.fit) for rival in weighed.retained]
-    labels = [joined(_spoken(names, weighed)) for names in sets]
-    return next_event(context, weighed.noise, weighed.bare, fits, labels)
+    context = outcome.survivors.explanations.base.context
+    fits = [outcome.extended.get(rival.fit.names, rival.fit) for rival in outcome.retained]
+    labels = [joined(_spoken(names, outcome)) for names in sets]
+    return next_event(context, outcome.noise, outcome.bare, fits, labels)
 
 
-def word_of(weighed: HeldOut) -> str:
-    left = weighed.survivors
-    explaining = [rival for rival in weighed.retained if weighed.names_of(rival)]
+def word_of(outcome: HeldOut) -> str:
+    left = outcome.survivors
+    explaining = [rival for rival in outcome.retained if outcome.names_of(rival)]
     if not explaining:
         first = left.explanations.steps[0]
-        agree = first.adequate and left.adequate and not weighed.shows_more
+        agree = first.adequate and left.adequate and not outcome.shows_more
         return NONE if agree else UNEXPLAINED
     return NAMED if len(explaining) == 1 else TIED
 
 
-def _spoken(names: Sequence[str], weighed: HeldOut) -> list[str]:
+def _spoken(names: Sequence[str], outcome: HeldOut) -> list[str]:
     """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
-    catalogue = weighed.survivors.explanations.base.context.catalogue
+    catalogue = outcome.survivors.explanations.base.context.catalogue
     return [catalogue.spoken(name) for name in names]
 
 
-def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest: Nearest | None) -> str:
-    left = weighed.survivors
+def _reason(word: str, outcome: HeldOut, sets: Sequence[Sequence[str]], nearest: Nearest | None) -> str:
+    left = outcome.survivors
     first = left.explanations.steps[0]
-    if weighed.leaves_more:
-        return _by_size(weighed, sets) if sets else _too_far_off(weighed)
+    if outcome.leaves_more:
+        return _by_size(outcome, sets) if sets else _too_far_off(outcome)
     if word == NAMED:
-        return _named(_spoken(sets[0], weighed), len(first.context.catalogue.candidates), _fitted(weighed, sets[0]))
+        return _named(_spoken(sets[0], outcome), len(first.context.catalogue.candidates), _fitted(outcome, sets[0]))
     if word == TIED:
-        return _tied([_spoken(names, weighed) for names in sets])
+        return _tied([_spoken(names, outcome) for names in sets])
     if word == UNEXPLAINED and not left.adequate:
-        return _unexplained(weighed, nearest)
-    if not weighed.retained and left.adequate and not left.explanations.empty:
-        seemed = " or ".join(joined(_spoken(weighed.names_of(s), weighed)) for s in left.adequate)
+        return _unexplained(outcome, nearest)
+    if not outcome.retained and left.adequate and not left.explanations.empty:
+        seemed = " or ".join(joined(_spoken(outcome.names_of(s), outcome)) for s in left.adequate)
         if word == UNEXPLAINED:
             return (
-                f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {_denied(weighed)}"
+                f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {_denied(outcome)}"
             )
         return (
             f"what seemed to help on the fitted events, {seemed}, is not borne out by the held-out ones, and what the"
@@ -137,9 +137,9 @@ def _reason(word: str, weighed: HeldOut, sets: Sequence[Sequence[str]], nearest:
     return f"no disagreement above the noise, at a false-alarm rate of {first.criteria.false_alarms:.0%}"
 
 
-def _fitted(weighed: HeldOut, names: Sequence[str]) -> int:
+def _fitted(outcome: HeldOut, names: Sequence[str]) -> int:
     """How many other sets of so many effects were fitted."""
-    sets = {r.fit.names for r in weighed.survivors.rivals if len(r.fit.names) == len(names)}
+    sets = {r.fit.names for r in outcome.survivors.rivals if len(r.fit.names) == len(names)}
     return len(sets - {tuple(names)})
 
 
@@ -151,11 +151,11 @@ def _named(names: Sequence[str], tested: int, fitted: int) -> str:
     return f"{names[0]}{',' * (', ' in names[0])} explains the disagreement, and {rest}"
 
 
-def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
+def _by_deviance(outcome: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
-    shares = listed([weighed.assessments[tuple(names)].gap.explained for names in sets], percent)
-    spoken = alternatives([_spoken(names, weighed) for names in sets])
-    others = sum(bool(r.rejected) for r in weighed.survivors.rivals)
+    shares = listed([outcome.assessments[tuple(names)].gap.explained for names in sets], percent)
+    spoken = alternatives([_spoken(names, outcome) for names in sets])
+    others = sum(bool(r.rejected) for r in outcome.survivors.rivals)
     other = "the other set of its size is" if others == 1 else f"the {others} other sets of its size are"
     rest = f", and {other} rejected" * (len(sets) == 1 and others > 0)
     verb = "explains" if len(sets) == 1 and len(sets[0]) == 1 else "explain"
@@ -163,11 +163,11 @@ def _by_deviance(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     return f"{spoken} {verb} {shares} of what exceeds the noise on the held-out events{rest}{tie}; {CHOSEN_BY}"
 
 
-def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
+def _by_size(outcome: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     """How far the sets that predict best, the base model and the next set are off on the held-out events."""
-    predicted = weighed.predictions
+    predicted = outcome.predictions
     if not isinstance(predicted, ErrorPredictions):
-        return _by_deviance(weighed, sets)
+        return _by_deviance(outcome, sets)
     chosen = [predicted.sets[tuple(names)] for names in sets]
     size = len(chosen[0].names)
     ranked = predicted.ranked(size, predicted.context.criteria.ahead)
@@ -175,10 +175,10 @@ def _by_size(weighed: HeldOut, sets: Sequence[Sequence[str]]) -> str:
     off = listed([p.error for p in chosen], in_percent)
     worse = [f"the base model misses {in_percent(predicted.bare.error)}"]
     if rest:
-        following = joined(_spoken(rest[0].names, weighed))
+        following = joined(_spoken(rest[0].names, outcome))
         worse.append(f"the next best of {len(rest)} other sets ({following}) {in_percent(rest[0].error)}")
     worse.append(_term(predicted))
-    spoken = alternatives([_spoken(names, weighed) for names in sets])
+    spoken = alternatives([_spoken(names, outcome) for names in sets])
     if len(sets) > 1:
         sentence = (
             f"{spoken}: they predict the held-out events within {off} of the response, which cannot tell them apart"
@@ -194,41 +194,41 @@ def _tied(sets: Sequence[Sequence[str]]) -> str:
     return f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them apart"
 
 
-def _unexplained(weighed: HeldOut, nearest: Nearest | None) -> str:
+def _unexplained(outcome: HeldOut, nearest: Nearest | None) -> str:
     """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
-    best, explained = weighed.survivors.retained[0], weighed.survivors.explanations
+    best, explained = outcome.survivors.retained[0], outcome.survivors.explanations
     assert best.tests is not None
     chance = f"would come about by chance with a probability of {by_draws(best.tests.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not explained.faults:
-        return f"{_none(weighed)} helps more than chance does: what the base model leaves {chance}; {loudest}"
-    names, faults = _spoken(best.fit.names, weighed), _spoken(weighed.faults, weighed)
+        return f"{_none(outcome)} helps more than chance does: what the base model leaves {chance}; {loudest}"
+    names, faults = _spoken(best.fit.names, outcome), _spoken(outcome.faults, outcome)
     sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
     one = len(names or faults) == 1
     share = f"help{'s' * one}"
     if nearest and np.isfinite(nearest.closed[0]):
         share = f"close{'s' * one} {nearest.closed[0]:.0%} of the gap"
-    none = f"{_none(weighed, len(best.fit.names))} explains it all"
+    none = f"{_none(outcome, len(best.fit.names))} explains it all"
     return f"{none}: {sentence}, the nearest, {share}, but what is left {chance}; {loudest}"
 
 
-def _too_far_off(weighed: HeldOut) -> str:
+def _too_far_off(outcome: HeldOut) -> str:
     """How far the set that predicts the held-out events best is from dividing what the base model leaves of them."""
-    predicted, rivals = weighed.predictions, weighed.survivors.rivals
+    predicted, rivals = outcome.predictions, outcome.survivors.rivals
     assert isinstance(predicted, ErrorPredictions)
     bare, criteria = in_percent(predicted.bare.error), predicted.context.criteria
     if not rivals[0].fit.names:
         better = "predicts the held-out events better than the base model"
-        return f"{_none(weighed)} {better}, which misses {bare} of the response there"
+        return f"{_none(outcome)} {better}, which misses {bare} of the response there"
     if beaten := predicted.beaten(criteria):
-        name, off = joined(_spoken(beaten[0].names, weighed)), in_percent(beaten[0].error)
+        name, off = joined(_spoken(beaten[0].names, outcome)), in_percent(beaten[0].error)
         return f"{name} would be named, but misses {off} of the response of the held-out events, and {_term(predicted)}"
     near = predicted.sets[rivals[0].fit.names]
-    spoken, off = joined(_spoken(near.names, weighed)), in_percent(near.error)
+    spoken, off = joined(_spoken(near.names, outcome)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
     if near.left * criteria.divides**2 <= predicted.bare.left:
         why = "that may be chance in so few blocks of 0.1 s"
-    none = f"{_none(weighed, len(near.names))} predicts the held-out events well enough to be named"
+    none = f"{_none(outcome, len(near.names))} predicts the held-out events well enough to be named"
     misses = f"miss{'es' * (len(near.names) == 1)} {off} of the response there"
     return f"{none}: {spoken}, the nearest, {misses}, where the base model misses {bare}; {why}"
 
@@ -239,36 +239,36 @@ def _term(predicted: ErrorPredictions) -> str:
     return f"the best term of the library ({predicted.term.words}) {in_percent(predicted.term.error)}"
 
 
-def _none(weighed: HeldOut, most: int = 1) -> str:
+def _none(outcome: HeldOut, most: int = 1) -> str:
     """How a sentence begins that says what no effect does, nor a set of so many where the nearest is one."""
-    tested = len(weighed.first.context.catalogue.candidates)
+    tested = len(outcome.first.context.catalogue.candidates)
     together = f", alone or up to {most} together," * (most > 1)
     return f"the model and the records disagree, and none of the {tested} effects tested{together}"
 
 
-def _denied(weighed: HeldOut) -> str:
+def _denied(outcome: HeldOut) -> str:
     """What the held-out events have against the best explanation of the fitted ones."""
-    assessment = weighed.assessments[weighed.survivors.adequate[0].fit.names]
+    assessment = outcome.assessments[outcome.survivors.adequate[0].fit.names]
     there = assessment.gap
     if not assessment.evident:
         if there.open:
             return "they are too mild to show it, and the fitted ones leave a doubt"
         return "there it fits no better than the base model"
     if assessment.needless:
-        return f"there it fits no better than without {joined(_spoken(assessment.needless, weighed), 'or')}"
+        return f"there it fits no better than without {joined(_spoken(assessment.needless, outcome), 'or')}"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
         f" {by_draws(assessment.p_left)}"
     )
 
 
-def _nearest(weighed: HeldOut, validate: Sequence[Event]) -> Nearest | None:
+def _nearest(outcome: HeldOut, validate: Sequence[Event]) -> Nearest | None:
     """The best of the sets that were compared; None where that is the base model."""
-    rivals, context = weighed.survivors.rivals[:4], weighed.first.context
+    rivals, context = outcome.survivors.rivals[:4], outcome.first.context
     if not rivals[0].fit.names:
         return None
-    fits = [weighed.bare, *(r.fit for r in rivals)]
-    before, *after = (curves(context, f.unit, weighed.last.noise, f.names) for f in fits)
+    fits = [outcome.bare, *(r.fit for r in rivals)]
+    before, *after = (curves(context, f.unit, outcome.last.noise, f.names) for f in fits)
     there = None
     if validate:
         other, units, noise = carried(context, validate, fits[:2])

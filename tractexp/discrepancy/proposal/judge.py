@@ -54,7 +54,7 @@ class TermAssessment:
 def term_assessments(
     original: Context, result: TermFits, events: Sequence[Event], p: Sequence[float]
 ) -> list[TermAssessment]:
-    """The best fits weighed on held-out events, in their order; `p` of each by chance.
+    """The best fits judged on held-out events, in their order; `p` of each by chance.
 
     `original` is the context of the investigation, by which the balances are pushed.
     """
