@@ -224,6 +224,27 @@ def test_the_sentence_says_what_the_best_term_misses_and_takes_the_name_where_th
     assert f"{words} {in_percent(ahead.error)}" in reason
 
 
+def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
+    made, (first, *_) = inexact.held_out.predictions, inexact.held_out.survivors.rivals
+    fit = made.sets["undervoltage_trip",].fit
+
+    def reason(*sets):
+        own = [replace(one, fit=replace(fit, names=one.names)) for one in sets]
+        told = replace(made, term=None, sets={one.names: one for one in own})
+        surviving = replace(
+            inexact.held_out.survivors, retained=(), rivals=(replace(first, fit=told.nearest(Criteria()).fit),)
+        )
+        return verdict(replace(inexact.held_out, predictions=told, survivors=surviving), inexact.withheld).reason
+
+    bare, trip = off(error=1.0), off("undervoltage_trip", error=0.3)
+    pair = off("stator_resistance", "undervoltage_trip", error=0.25)
+    assert "a name must divide that by 2.25" in reason(bare, off("undervoltage_trip", error=0.6))
+    bare.squares[3] += 60.0
+    trip.squares[4] += 3.0
+    assert "that may be chance in so few blocks" in reason(bare, trip)
+    assert "one of them alone does hardly worse" in reason(bare, trip, replace(pair, squares=pair.squares + 0.1))
+
+
 def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
     """What is off is a bias by the swing, 3.6 standard errors: a covariance of residuals holds scatter alone."""
     share = next(e for e in inexact.after if e.parameter.name == "tripped_share")

@@ -54,8 +54,9 @@ class Criteria:
         CHOSEN, "no formula is exact to this, and a fault mends a little of it",
     )  # fmt: skip
     shown: float = _criterion(
-        10.8, (0.0, 1e6), "gain of the deviance by which held-out events show an explanation, and that a recorder's"
-        " window must have; events of which less is expected are too mild to show one", DERIVED,
+        10.8, (0.0, 1e6), "gain of the deviance by which held-out events show an explanation, and each of two effects"
+        " over the other alone, and that a recorder's window must have; events of which less is expected are too mild"
+        " to show one", DERIVED,
         "(2 x 1.645)^2: a true explanation of which so much is expected gains nothing in 5 % of cases",
     )  # fmt: skip
     evident: float = _criterion(

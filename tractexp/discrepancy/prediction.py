@@ -142,11 +142,13 @@ class Predictions(Generic[OneSet]):
         chosen = self.bare
         for size in range(1, 1 + max(map(len, self.sets))):
             ranked = (p for p in self.ranked(size, criteria.ahead) if len(p.names) == size)
-            chosen = next((p for p in ranked if p.ahead_of(chosen, criteria.ahead) and self.whole(p, criteria)), chosen)
+            chosen = next(
+                (p for p in ranked if p.ahead_of(chosen, criteria.ahead) and self.needs_all(p, criteria)), chosen
+            )
         return chosen
 
-    def whole(self, one: OneSet, criteria: Criteria) -> bool:
-        """Whether a set needs each of its members: it leaves less without none, by a factor, and chance aside."""
+    def needs_all(self, one: OneSet, criteria: Criteria) -> bool:
+        """Whether a set needs each of its members: without any of them more is left by a factor, chance aside."""
         fewer = (tuple(n for n in one.names if n != left) for left in one.names if len(one.names) > 1)
         return all(self.sets[names].left >= criteria.ahead**2 * one.left for names in fewer if names in self.sets)
 

@@ -227,7 +227,8 @@ def _too_far_off(outcome: HeldOut) -> str:
     spoken, off = joined(_spoken(near.names, outcome)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
     if near.left * criteria.divides**2 <= predicted.bare.left:
-        why = "that may be chance in so few blocks of 0.1 s"
+        needed = predicted.needs_all(near, criteria)
+        why = "that may be chance in so few blocks" if needed else "one of them alone does hardly worse"
     none = f"{_none(outcome, len(near.names))} predicts the held-out events well enough to be named"
     misses = f"miss{'es' * (len(near.names) == 1)} {off} of the response there"
     return f"{none}: {spoken}, the nearest, {misses}, where the base model misses {bare}; {why}"
