@@ -73,6 +73,11 @@ class GapTest:
         return not self.helps and (self.gain > 0 or self.expected < self.shown)
 
 
+def share_gone(factor: float) -> float:
+    """The share of squares that is gone where their root is divided by a factor."""
+    return 1 - 1 / factor**2
+
+
 def closed(before: Curves, after: Curves) -> float:
     """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
     below 0 where more is left than before. nan where that falls short of the noise by more than there was before, which

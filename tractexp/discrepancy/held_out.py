@@ -11,7 +11,7 @@ from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.fitting import Names, Refit, refit, settled
-from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed
+from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed, share_gone
 from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.prediction import Predictions
 from tractexp.discrepancy.records import Records
@@ -60,7 +60,7 @@ class Assessment:
     @property
     def convincing(self) -> bool:
         """Whether it closes as much of the gap there as a true explanation does."""
-        return self.gap.explained >= 1 - 1 / self.context.criteria.divides**2
+        return self.gap.explained >= share_gone(self.context.criteria.divides)
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,11 +171,11 @@ def telling(explained: Explanations, bare: Refit) -> Names:
 def assess(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
     """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
-    Of several effects each is judged against the others alone as the whole is against the base model.
-    A single textbook effect that has no rival stands if it closes as much of the gap there as a true one does. Any
-    other must leave nothing in a fit to all events and not be rejected there by the best one. That fit may also bear
-    out what does not help as it was fitted, or leaves more than chance does, since the fitted events may leave a part
-    of it open; it is returned as fitted to all.
+    Of several effects each is judged against the others alone as the whole is against the base model. A single textbook
+    effect that has no rival stands if it closes as much of the gap there as a true one does. Any other must leave
+    nothing in a fit to all events and not be rejected there by the best one. That fit may also bear out what does not
+    help as it was fitted, or leaves more than chance does, since the fitted events may leave a part of it open; it is
+    returned as fitted to all.
     """
     context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
     without = {fit.names: both.without_each(fit) for fit in fits}

@@ -70,9 +70,13 @@ class Prediction(ABC):
     def clear_of(self, other: "Prediction") -> bool:
         """Whether this one leaves less by more than chance."""
 
+    def divides(self, other: "Prediction", factor: float) -> bool:
+        """Whether it divides what the other leaves, as a root of squares, by a factor."""
+        return other.left >= factor**2 * self.left
+
     def ahead_of(self, other: "Prediction", factor: float) -> bool:
-        """Whether it divides what the other leaves, as a root of squares, by a factor, and by more than chance."""
-        return other.left >= factor**2 * self.left and self.clear_of(other)
+        """The same, and by more than chance."""
+        return self.divides(other, factor) and self.clear_of(other)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +153,8 @@ class Predictions(Generic[OneSet]):
 
     def needs_all(self, one: OneSet, criteria: Criteria) -> bool:
         """Whether a set needs each of its members: without any of them more is left by a factor, chance aside."""
-        fewer = (tuple(n for n in one.names if n != left) for left in one.names if len(one.names) > 1)
-        return all(self.sets[names].left >= criteria.ahead**2 * one.left for names in fewer if names in self.sets)
+        fewer = itertools.combinations(one.names, len(one.names) - 1)
+        return all(one.divides(self.sets[names], criteria.ahead) for names in fewer if names in self.sets)
 
     def nearest(self, criteria: Criteria) -> OneSet:
         """The same, or else what leaves least."""

@@ -226,7 +226,7 @@ def _too_far_off(outcome: HeldOut) -> str:
     near = predicted.sets[rivals[0].fit.names]
     spoken, off = joined(_spoken(near.names, outcome)), in_percent(near.error)
     why = f"a name must divide that by {criteria.divides:g}"
-    if near.left * criteria.divides**2 <= predicted.bare.left:
+    if near.divides(predicted.bare, criteria.divides):
         needed = predicted.needs_all(near, criteria)
         why = "that may be chance in so few blocks" if needed else "one of them alone does hardly worse"
     none = f"{_none(outcome, len(near.names))} predicts the held-out events well enough to be named"

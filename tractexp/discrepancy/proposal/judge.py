@@ -13,7 +13,7 @@ import numpy as np
 from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.gap import gap, pushed
+from tractexp.discrepancy.gap import gap, pushed, share_gone
 from tractexp.discrepancy.held_out import Assessment, carried
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import JUDGED, TermFits
@@ -38,11 +38,11 @@ class TermAssessment:
     def objections(self, criteria: Criteria) -> list[str]:
         """Why it is not proposed, each as the end of a sentence."""
         gap = self.validate.gap
-        least = 1 - 1 / criteria.ahead**2  # of squares
+        least = share_gone(criteria.ahead)
         little = (
             f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events, less than {least:.0%}"
         )
-        enough = gap.gain > 0 and gap.explained >= least
+        enough = gap.explained >= least
         rows = {
             (little if gap.gain > 0 else "it makes the held-out events worse"): not enough,
             "the held-out events are too mild to show it": enough and not gap.helps,
