@@ -143,6 +143,8 @@ def _groups(rows: Rows) -> dict[str, Rows]:
     field = [r for r in rows if r["group"] == "field 4 x" and reached(r, 4.0)]
     groups["4 x, any recorder, window and noise"] = [r for r in field if not r["imperfect"]]
     groups["4 x, the same in loads of which no model is exact to 0.5 %"] = [r for r in field if r["imperfect"]]
+    loud = [r for r in rows if r["group"] == "loud 4 x" and reached(r, 4.0)]
+    groups["4 x, noise of 0.1 % in loads of which no model is exact to 2 %"] = loud
     return {what: members for what, members in groups.items() if members}
 
 
@@ -168,12 +170,14 @@ def _answers(rows: Rows) -> tuple[list[str], list[list]]:
 
 def _strangers(rows: Rows) -> tuple[list[str], list[list]]:
     """What the catalogue does not hold: the verdicts, and the terms proposed."""
-    outside, left_out = (
-        [r for r in rows if r["group"].startswith(start) and "lambda_left" in r] for start in ("outside", "left out")
+    outside, loud, left_out = (
+        [r for r in rows if r["group"].startswith(start) and "lambda_left" in r]
+        for start in ("outside", "loud outside", "left out")
     )
     cells = {
         f"outside the catalogue, above {FAR:g}": [r for r in outside if r["lambda_left"] >= FAR],
         f"outside the catalogue, below {FAR:g}": [r for r in outside if r["lambda_left"] < FAR],
+        "outside the catalogue, noise of 0.1 % in loads of which no model is exact to 2 %": loud,
         "left out of it": left_out,
     }
     lines = []

@@ -56,7 +56,7 @@ HIDDEN = {  # one effect is hidden: group of trials, multiples, effects
 }
 Trials = Iterator[cases.Planned]
 ERROR = 0.01  # of the response: how inexact the loads are in which nothing is hidden
-SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", "pairs")
+SUITES = ("nulls", "nuisances", "inexact", *HIDDEN, "field", "loud", "pairs")
 BEST = 3  # single effects of which the least that any leaves is taken
 SAME = {  # effects whose amount is a parameter of the model, in its units
     "stator_resistance": "R_s",
@@ -79,6 +79,10 @@ def rows_of(name: str, salt: int | None, multiples: Container[float], **settings
     elif name == "field":
         for multiple, effect in itertools.product((m for m in PAIRED if m in multiples), PHYSICAL):
             yield f"field {multiple:g} x", cases.in_the_field(effect, multiple, salt, **settings)
+    elif name == "loud":
+        for start, m, effects in ("loud ", 4.0, PHYSICAL), ("loud outside ", 8.0, HIDDEN["outside"][2]):
+            if m in multiples:
+                yield from ((f"{start}{m:g} x", cases.loud(effect, m, salt, **settings)) for effect in effects)
     elif name == "pairs":
         for m in (m for m in PAIRED if m in multiples):
             yield f"{name} {m:g} x", cases.several(2, m, salt, **settings)

@@ -817,6 +817,15 @@ def test_data_sets_of_the_field_differ_in_recorder_noise_and_error():
     assert len(three.case.effect) == 3
 
 
+def test_a_loud_data_set_has_a_load_that_no_model_fits_to_twenty_times_its_noise():
+    """The effect leaves four times as much as the load's own error, or as much as there is room for."""
+    (made,) = made_of(cases.loud("feeder_impedance", 4.0, events=2), 1)
+    alone = replace(made.case, effect=None, size=1.0)
+    assert misfit(alone, made.seed) == pytest.approx(0.02, rel=0.2)
+    assert made.case.noise.level == 0.001
+    assert 1 < made.multiples[0] <= 4.0 + 1e-9
+
+
 def test_names_are_those_of_the_contract():
     assert len(PHYSICAL) == 16
     assert len(CATALOG) == 19

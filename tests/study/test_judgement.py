@@ -40,7 +40,7 @@ def test_seeds_follow_from_the_commit_that_froze_product_and_generator():
 def series_of(group: str, label: str) -> str:
     """Of which series of seeds a row's is: one for all pairs, all inexact loads."""
     shared = {"pairs": "pairs", "null, error": "inexact"}
-    own = {"null, ": f"null {label}", "field": f"field {label}"}
+    own = {"null, ": f"null {label}", "field": f"field {label}", "loud": f"loud {label}"}
     return next((series for start, series in (shared | own).items() if group.startswith(start)), label)
 
 

@@ -77,6 +77,22 @@ def test_a_short_record_has_as_many_blocks_as_one_of_a_second():
     assert [len(sums) for sums in block_sums([short, long])] == [3, len(block_sums([long])[0])]
 
 
+def test_blocks_are_shortened_until_so_many_share_the_response():
+    """A dip of a tenth of a second is one block in seventeen; ten share it at a cycle, which is the shortest."""
+    fit = played(-0.1, -0.1)
+    record, start = fit.event.record, fit.event.start
+    response = np.abs((record.P + 1j * record.Q)[start:] - S_before(fit)) ** 2 - noise_variance(fit.event)
+
+    def sharing(sums):
+        return sums[0][:, 1].sum() ** 2 / np.sum(sums[0][:, 1] ** 2)
+
+    whole, some, cycles = (block_sums([fit], blocks) for blocks in (0.0, 1.5 * sharing(block_sums([fit])), 1e9))
+    assert sharing(some) >= 1.5 * sharing(whole)
+    assert len(whole[0]) < len(some[0]) < len(cycles[0]) == -(-len(response) // 10)
+    assert cycles[0][:, 1].sum() == pytest.approx(response.sum())
+    assert whole[0].sum(axis=0) == pytest.approx(cycles[0].sum(axis=0))
+
+
 def test_one_block_tells_nothing_of_chance(monkeypatch):
     monkeypatch.setattr("tractexp.identification.model_error.LENGTH", 100.0)
     monkeypatch.setattr("tractexp.identification.model_error.BLOCKS", 1)

@@ -90,6 +90,25 @@ def test_a_pair_needs_both_of_its_members():
     assert named(*sets, off("a", "b", "c", error=0.09)) == [("a", "b")]
 
 
+PAIRS = off(error=1.0), off("a", error=0.5), off("a", "b", error=0.4), off("a", "c", error=0.42)
+
+
+@pytest.mark.parametrize(("error", "names"), [(0.8, [("a",)]), (0.7, [])])
+def test_what_all_sets_share_that_divide_the_error_is_named(error, names):
+    """Alone it divides it by 2 only, and no pair needs its second; ahead of every other single effect it must be."""
+    assert named(*PAIRS, off("b", error=error)) == names
+
+
+def test_what_all_share_is_named_though_pairs_are_ahead_of_it():
+    assert named(off(error=1.0), off("a", error=0.25), off("a", "b", error=0.15), off("a", "c", error=0.16)) == [("a",)]
+
+
+def test_of_sets_that_share_nothing_the_smallest_are_tied():
+    """Of the pairs with `a` neither is told beside `a` itself, which does as well as they do."""
+    others = off("b", error=0.9), off("c", error=0.9), off("b", "c", error=0.41)
+    assert named(*PAIRS, *others) == [("b", "c"), ("a",)]
+
+
 def test_a_pair_needs_both_of_its_members_though_the_lead_of_one_may_be_chance():
     bare, one, pair = off(error=1.0), off("a", error=0.3), off("a", "b", error=0.42)
     bare.squares[3] += 60.0

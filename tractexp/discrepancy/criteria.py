@@ -65,8 +65,8 @@ class Criteria:
         "loads that no model fits to 1 % leave 12 to 80 to effects that imitate them, effects of four limits 250",
     )  # fmt: skip
     divides: float = _criterion(
-        2.25, (1.0, 1e6), "factor by which a name must divide the error on the held-out events not to be doubted, or to"
-        " be named where it leaves more than noise", CHOSEN,
+        2.25, (1.0, 1e6), "factor by which a name must divide the error on the held-out events not to be doubted, and"
+        " by which it, or all of the best sets that have it, must where it leaves more than noise", CHOSEN,
         "true names divide it by four and more, the best imitation of what no effect has by less than two",
     )  # fmt: skip
     ahead: float = _criterion(

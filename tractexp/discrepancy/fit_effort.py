@@ -28,8 +28,8 @@ NESTED_TOLERANCE = 0.1
 MOVE_REACHES = 2.0 ** -np.arange(1, 10)
 # Such moves in a row, and the deviance that one must gain: half of what a parameter costs.
 MOST_MOVES, LEAST_GAIN = 8, 1.0
-# Turns of moving and descending, and the starts that take part.
-MOST_TURNS, STARTS_IN_TURNS = 3, 6
+# Turns of moving and descending, the starts that take part, and by how much these differ in some coordinate.
+MOST_TURNS, STARTS_IN_TURNS, DISTINCT = 3, 6, 0.01
 # Starts of a set that a descent is begun from, the most promising by one simulation each: on nine development sets the
 # best fit was the same to 0.1 of the deviance with 40 % fewer simulations.
 MOST_STARTS = 8

@@ -13,6 +13,7 @@ from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.promising import promising
 from tractexp.identification.descent import descend
 from tractexp.noise import Noise
+from tractexp.parameter import best_distinct
 
 Names = tuple[str, ...]
 Start = tuple[Sequence[str], np.ndarray]  # names of effects, and coordinates (D,) to start from
@@ -87,31 +88,41 @@ def wide_refit(
     A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted. Around the best it is
     begun `again` so often.
     """
-    fits = _in_turns(context, noise, wanted, faults)
+    return _around(context, noise, _in_turns(context, noise, wanted, faults), faults, again)
+
+
+def _around(
+    context: Context, noise: Noise, fits: list[Refit], faults: Sequence[str] | None, again: int
+) -> list[Refit]:  # fmt: skip
+    """Fits of one set searched further around the best of them as long as that gains, and the nearest then exactly."""
     for _ in range(again if context.coordinates.settings(fits[0].names) else 0):
         others = _in_turns(context, noise, scattered(context, fits[0]), faults)
         if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
             break
         fits = others
-    return refit(
-        context, noise, [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + fit_effort.NEAR_BEST], faults
-    )
+    near = [(f.names, f.unit) for f in fits if f.cost < fits[0].cost + fit_effort.NEAR_BEST]
+    return refit(context, noise, near, faults)
 
 
 def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
-    """The best of these starts, moved and descended in turn until none gains that may end best; the best first."""
-    fits = _begun(context, noise, wanted, faults)
+    """The best of these starts, each moved and descended in turn as long as it gains more than it is behind the best;
+    the best first."""
+    turning = _begun(context, noise, wanted, faults)
+    ended: list[Refit] = []
     for _ in range(fit_effort.MOST_TURNS):
-        moved = [(f.names, moved_across(context, noise, f, faults)) for f in fits]
-        ended = _descended(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
-        best = min(f.deviance for f in (*fits, *ended))
-        gains = [before.deviance - after.deviance for before, after in zip(fits, ended, strict=True)]
-        promising = [gain > max(fit_effort.LEAST_GAIN, f.deviance - best) for gain, f in zip(gains, ended, strict=True)]
-        better = [min(pair, key=lambda f: f.deviance) for pair in zip(fits, ended, strict=True)]
-        fits = sorted(better, key=lambda f: f.cost)
-        if not any(promising):
+        moved = [(f.names, moved_across(context, noise, f, faults)) for f in turning]
+        after = _descended(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
+        better = [min(pair, key=lambda f: f.deviance) for pair in zip(turning, after, strict=True)]
+        best = min(f.deviance for f in (*ended, *better))
+        gains = [before.deviance - now.deviance for before, now in zip(turning, better, strict=True)]
+        promising = [
+            gain > max(fit_effort.LEAST_GAIN, f.deviance - best) for gain, f in zip(gains, better, strict=True)
+        ]
+        ended += [f for f, more in zip(better, promising, strict=True) if not more]
+        turning = [f for f, more in zip(better, promising, strict=True) if more]
+        if not turning:
             break
-    return fits
+    return sorted([*ended, *turning], key=lambda f: f.cost)
 
 
 def scattered(context: Context, fit: Refit) -> list[Start]:
@@ -135,16 +146,20 @@ def wide_refits(
 ) -> list[Refit]:  # fmt: skip
     """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations.
 
-    What is far behind the best of `others` then is given up.
+    What is far behind the best of them and of `others` after these, or after its turns, is given up.
     """
-    begun = each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort)
-    begun.sort(key=lambda fits: fits[0].cost)
-    if costs := [fit.cost for fit in others]:
-        begun = [fits for fits in begun if fits[0].cost <= min(costs) + _far(costs)]
-    begun = begun[:most]
+    costs = [fit.cost for fit in others]
+
+    def near(every: list[list[Refit]]) -> list[list[Refit]]:
+        best = [fits[0].cost for fits in every] + costs
+        return [fits for fits in every if fits[0].cost <= min(best) + _far(best)]
+
+    begun = near(each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort))
+    begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
-    search = lambda starts: wide_refit(context, noise, starts)  # noqa: E731
-    return best_of(itertools.chain(*each_apart(search, again, context.effort)))
+    turned = each_apart(lambda starts: _in_turns(context, noise, starts, None), again, context.effort)
+    ended = lambda fits: _around(context, noise, fits, None, fit_effort.SCATTER_ROUNDS)  # noqa: E731
+    return best_of([*itertools.chain(*turned), *itertools.chain(*each_apart(ended, near(turned), context.effort))])
 
 
 def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
@@ -154,7 +169,9 @@ def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequ
     units = promising(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, fit_effort.MOST_STARTS)
     effort = fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]
     begun = _descended(context, noise, [(names, u) for u in units], faults, effort)
-    return sorted(begun, key=lambda f: f.cost)[: fit_effort.STARTS_IN_TURNS]
+    at = np.array([f.unit for f in begun])
+    chosen = best_distinct(at, np.array([f.cost for f in begun]), fit_effort.DISTINCT, fit_effort.STARTS_IN_TURNS)
+    return [begun[k] for k in chosen]
 
 
 def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:

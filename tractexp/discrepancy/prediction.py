@@ -1,18 +1,17 @@
 """Which sets of effects predict held-out events best, where none of them leaves noise only.
 
 A formula is not the physics. What the right one leaves is often no noise, and then a test of significance rejects it
-as it rejects a wrong one. What can be asked still is how much each set predicts in events that it was not fitted to. A
-set is named that
+as it rejects a wrong one. What can be asked still is how much each set predicts in events that it was not fitted to.
 
-- divides what the base model leaves of the held-out events (`criteria.divides`),
-- is ahead of every other set of its size or smaller, so that it needs each of its members (`criteria.ahead`),
-- has no term of the library ahead of it,
-- and all by more than chance.
+The sets that predict best are those that the best of all is not ahead of (`criteria.ahead`), where that divides what
+the base model leaves of the held-out events (`criteria.divides`). What all of them share is named, if it is ahead of
+every other set of its size or smaller: what stands beside it is open. Else the smallest of them that needs each of its
+members is named, or tied with the sets that it is not ahead of. All by more than chance, and none where a term of the
+library is ahead of it.
 
-Sets that it is not ahead of are tied with it where they are ahead of the base model. What is left has two measures.
-Where the disagreement is of the noise's size it is what pushes into the balances would still gain of the deviance, with
-the fits of the search by likelihood. Where it is far above the noise it is the squared error in S, with every set
-fitted by least squares (`least_squares`).
+What is left has two measures. Where the disagreement is of the noise's size it is what pushes into the balances would
+still gain of the deviance, with the fits of the search by likelihood. Where it is far above the noise it is the squared
+error in S, with every set fitted by least squares (`least_squares`).
 """
 
 import itertools
@@ -43,6 +42,7 @@ from tractexp.record import Event
 
 FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
+SHARING = 10.0  # blocks that share the response: where two or three hold all of it, nothing is clear of chance
 LEAST = 0.1  # of the noise: a model's squared error is told no finer
 
 
@@ -141,34 +141,46 @@ class Predictions(Generic[OneSet]):
                 families.setdefault(self.catalogue.textbook(one.names), []).append(one)
         return sorted((_simplest(members, factor) for members in families.values()), key=_rank)
 
-    def best(self, criteria: Criteria) -> OneSet:
-        """The set that predicts best and needs each of its members; the base model where none is ahead of it."""
-        chosen = self.bare
-        for size in range(1, 1 + max(map(len, self.sets))):
-            ranked = (p for p in self.ranked(size, criteria.ahead) if len(p.names) == size)
-            chosen = next(
-                (p for p in ranked if p.ahead_of(chosen, criteria.ahead) and self.needs_all(p, criteria)), chosen
-            )
-        return chosen
+    def explaining(self, criteria: Criteria) -> list[OneSet]:
+        """The set that is named, or those that are tied; none where none divides what the base model leaves."""
+        return self._leading(criteria, criteria.divides)
+
+    def nearest(self, criteria: Criteria) -> OneSet:
+        """The same of what divides that by less, or else what leaves least."""
+        return next(iter(self._leading(criteria, criteria.ahead)), min(self.sets.values(), key=_rank))
+
+    def _leading(self, criteria: Criteria, factor: float) -> list[OneSet]:
+        """What the sets that predict best share; else the smallest of them that needs all its members, and its rivals.
+
+        None where the best does not divide what the base model leaves by the factor.
+        """
+        ranked = self.ranked(max(map(len, self.sets)), criteria.ahead)
+        ahead = [p for p in ranked if p.ahead_of(self.bare, criteria.ahead)]
+        dividing = [p for p in ranked if p.ahead_of(self.bare, factor)]
+        if not dividing:
+            return []
+        alike = [p for p in ahead if not dividing[0].ahead_of(p, criteria.ahead)]
+        if (shared := self._shared(alike, ranked, criteria.ahead)) is not None:
+            return [shared]
+        needed = (p for p in dividing if p in alike and self.needs_all(p, criteria))
+        if (chosen := min(needed, key=lambda p: len(p.names), default=None)) is None:
+            return []
+        rivals = [p for p in ahead if p is not chosen and len(p.names) <= len(chosen.names)]
+        rivals = [p for p in rivals if not chosen.ahead_of(p, criteria.ahead)]
+        return [chosen, *(p for p in rivals if not any({*q.names} < {*p.names} for q in rivals))]
+
+    def _shared(self, alike: Sequence[OneSet], ranked: Sequence[OneSet], factor: float) -> OneSet | None:
+        """The effects that all of these sets share, if they are ahead of every other set of their size or smaller."""
+        names = lambda one: frozenset(self.catalogue.textbook(one.names))  # noqa: E731
+        common = frozenset.intersection(*map(names, alike))
+        shared = next((p for p in ranked if names(p) == common), None)
+        others = [self.bare, *(p for p in ranked if len(p.names) <= len(common) and p is not shared)]
+        return shared if shared and all(shared.ahead_of(p, factor) for p in others) else None
 
     def needs_all(self, one: OneSet, criteria: Criteria) -> bool:
         """Whether a set needs each of its members: without any of them more is left by a factor, chance aside."""
         fewer = itertools.combinations(one.names, len(one.names) - 1)
         return all(one.divides(self.sets[names], criteria.ahead) for names in fewer if names in self.sets)
-
-    def nearest(self, criteria: Criteria) -> OneSet:
-        """The same, or else what leaves least."""
-        best = self.best(criteria)
-        return best if best.names else min(self.sets.values(), key=_rank)
-
-    def explaining(self, criteria: Criteria) -> list[OneSet]:
-        """The set that predicts best and those tied with it; none where none divides what the base model leaves."""
-        chosen = self.best(criteria)
-        if not chosen.names or not chosen.ahead_of(self.bare, criteria.divides):
-            return []
-        factor = criteria.ahead
-        others = [p for p in self.ranked(len(chosen.names), factor) if p is not chosen]
-        return [chosen, *(p for p in others if p.ahead_of(self.bare, factor) and not chosen.ahead_of(p, factor))]
 
     def contributions(self, names: Names) -> list[OneSet]:
         """The base model, then with one member more at a time, the one that helps most: what each is good for."""
@@ -271,7 +283,7 @@ def _predicted(there: Context, fit: Refit, kind: type[OneError] = PredictionErro
         there.domain.comparison(event, calculated[:, there.drive.part(e)]) for e, event in enumerate(there.events)
     ]
     left, noise, response = [], [], []
-    for one, sums in zip(played, block_sums(played), strict=True):
+    for one, sums in zip(played, block_sums(played, SHARING), strict=True):
         own = noise_variance(one.event) * (one.event.record.samples - one.event.start) / len(sums)
         left.append(sums[:, 0] + own)
         noise.append(np.full(len(sums), own))

@@ -185,7 +185,9 @@ def _by_size(outcome: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         )
     else:
         sentence = f"{spoken} predict{'s' * (size == 1)} the held-out events within {off} of the response"
-    return f"{sentence}, where {joined(worse)}; {CHOSEN_BY}"
+    factor = predicted.context.criteria.divides
+    shared = "" if chosen[0].divides(predicted.bare, factor) else f"; all sets that divide that by {factor:g} have it"
+    return f"{sentence}, where {joined(worse)}{shared}; {CHOSEN_BY}"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:

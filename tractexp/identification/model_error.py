@@ -20,6 +20,7 @@ from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 
 BLOCKS = 10  # of short records: two or three would tell nothing of chance
+CYCLE = 0.02  # s: what is left within a phasor's window hangs together
 MOST = 10_000  # percent: more tells no more
 
 
@@ -69,11 +70,18 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     return ModelError(root(ratio), (root(ratio - half), root(ratio + half)), root(left / max(power, 1e-30)), ratio)
 
 
-def block_sums(played: Sequence[Playback]) -> list[np.ndarray]:
+def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndarray]:
     """Squares of what is left, of the response, both less those of the noise, and of the power: (b, 3) by the blocks of
-    each event."""
+    each event. Blocks are shortened, to a cycle at most, until `sharing` of them share the response: the inverse of the
+    sum of squares of their shares."""
     seconds = sum((one.event.record.samples - one.event.start) * one.event.record.step for one in played)
-    return [_block_sums(one, min(LENGTH, seconds / BLOCKS)) for one in played]
+    length = min(LENGTH, seconds / BLOCKS)
+    while True:
+        sums = [_block_sums(one, length) for one in played]
+        response = np.concatenate([each[:, 1] for each in sums])
+        if length <= CYCLE or response.sum() ** 2 >= sharing * np.sum(response**2):
+            return sums
+        length = max(length / 2, CYCLE)
 
 
 def _block_sums(played: Playback, length: float) -> np.ndarray:

@@ -34,7 +34,7 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
         _bars(findings, rows),
         "The model's error on the held-out events, in percent of the response, with the sets that predict them best"
         " (green: added, orange: tied with it, gray: the base model). All were fitted to the other events by least"
-        " squares. Dashed: what a name must undercut.",
+        " squares. Dashed: what a name, or each of the best sets that have it, undercuts.",
     )
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
@@ -43,9 +43,9 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
              _status(findings, one), "; ".join(map(str, _sizes(findings, one)))]
             for one in rows
         ],
-        f"A name divides the error of the base model by {criteria.divides:g} and is ahead of every other set of its"
-        f" size or smaller by {criteria.ahead:g}, and no term of the library is ahead of it by that, all by more than"
-        " chance (blocks of 0.1 s left out in turn)."
+        f"A name, or each of the best sets that have it, divides the error of the base model by {criteria.divides:g}."
+        f" It is ahead of every other set of its size or smaller by {criteria.ahead:g}, and no term of the library is"
+        " ahead of it by that, all by more than chance (blocks that share the response, left out in turn)."
         + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
         words=(0, 3, 4),
     )  # fmt: skip

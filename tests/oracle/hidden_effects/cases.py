@@ -126,11 +126,23 @@ def in_the_field(name: str, multiple: float, salt: int | None = None, **settings
             pmu=window if window in ("P", "M") else "",
         )  # fmt: skip
         noise = NOISES[str(rng.choice(list(NOISES)))]
-        own = settings | {"noise": noise, "recorder": recorder}
-        case = imperfect(Case(effect=name, **own), seed, float(rng.choice([0.0, 0.005])))
-        return at_limit((name,), multiple, seed, imperfections=case.imperfections, **own)
+        error = float(rng.choice([0.0, 0.005]))
+        return in_an_inexact_load(name, multiple, seed, error, **settings | {"noise": noise, "recorder": recorder})
 
     return (Planned(name, seed, partial(made, seed)) for seed in seeds(f"field {name}", salt))
+
+
+def loud(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
+    """One effect in noise of 0.1 %, twenty times less than any model of the load leaves, as in records of faults."""
+    own = settings | {"noise": Noise(0.001)}
+    made = partial(in_an_inexact_load, name, multiple, error=0.02, **own)
+    return (Planned(name, seed, partial(made, seed)) for seed in seeds(f"loud {name}", salt))
+
+
+def in_an_inexact_load(name: str, multiple: float, seed: int, error: float, **settings: Any) -> Trial:
+    """One effect in a load of which no model is exact to `error` of the response."""
+    case = imperfect(Case(effect=name, **settings), seed, error)
+    return at_limit((name,), multiple, seed, imperfections=case.imperfections, **settings)
 
 
 def single(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
