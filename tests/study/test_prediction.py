@@ -21,7 +21,7 @@ from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
-from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError, Predictions, predictions
+from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions, predictions
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.records import Records
@@ -262,6 +262,24 @@ def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
     trip.squares[4] += 3.0
     assert "that may be chance in so few blocks" in reason(bare, trip)
     assert "one of them alone does hardly worse" in reason(bare, trip, replace(pair, squares=pair.squares + 0.1))
+
+
+def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
+    made, share = inexact.held_out.predictions, "all sets that divide that by 2.25 have it"
+    assert share not in inexact.verdict.reason
+    trip = made.sets["undervoltage_trip",]
+    louder = replace(trip, squares=trip.squares * made.bare.left / trip.left / 2.0**2)
+    told = replace(made, sets={**made.sets, trip.names: louder})
+    assert share in verdict(replace(inexact.held_out, predictions=told), inexact.withheld).reason
+
+
+def test_leads_are_told_by_blocks_that_share_the_response(inexact):
+    """A dip of 0.15 s in 0.7 s has two of the seven blocks of a tenth of a second, and fourteen of 20 ms."""
+    response = inexact.held_out.predictions.bare.response
+    assert len(response) == 35
+    assert response.sum() ** 2 >= SHARING * np.sum(response**2)
+    tenths = response.reshape(-1, 5).sum(axis=1)
+    assert tenths.sum() ** 2 < SHARING / 2 * np.sum(tenths**2)
 
 
 def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
