@@ -9,7 +9,7 @@ from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.gap import Curves, closed, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.prediction import ErrorPredictions
+from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
 from tractexp.discrepancy.survivors import Rival
 from tractexp.identification.model_error import in_percent
 from tractexp.record import Event
@@ -185,9 +185,17 @@ def _by_size(outcome: HeldOut, sets: Sequence[Sequence[str]]) -> str:
         )
     else:
         sentence = f"{spoken} predict{'s' * (size == 1)} the held-out events within {off} of the response"
-    factor = predicted.context.criteria.divides
-    shared = "" if chosen[0].divides(predicted.bare, factor) else f"; all sets that divide that by {factor:g} have it"
-    return f"{sentence}, where {joined(worse)}{shared}; {CHOSEN_BY}"
+    return f"{sentence}, where {joined(worse)}{_shared(outcome, predicted, chosen[0])}; {CHOSEN_BY}"
+
+
+def _shared(outcome: HeldOut, predicted: ErrorPredictions, chosen: PredictionError) -> str:
+    """Of a name that does not divide the error by as much as names must: what the best of all sets misses, which has
+    it, as the end of a sentence."""
+    if chosen.divides(predicted.bare, predicted.context.criteria.divides):
+        return ""
+    best = min(predicted.sets.values(), key=lambda one: one.left)
+    spoken = joined(_spoken(best.names, outcome))
+    return f"; {spoken} miss {in_percent(best.error)}, the least, and all sets that come near have it"
 
 
 def _tied(sets: Sequence[Sequence[str]]) -> str:
