@@ -71,8 +71,8 @@ class Criteria:
         " strangers by less than 1.6 but for one, by 3.6",
     )  # fmt: skip
     ahead: float = _criterion(
-        1.5, (1.0, 1e6), "factor by which the error of a set that leaves more than noise must be below that of every"
-        " other set of its size or smaller, and that of the base model with a proposed term below its own", CHOSEN,
+        1.5, (1.0, 1e6), "factor by which the error of a set that leaves more than noise must be below that of"
+        " any rival of its size or smaller, and that of the base model with a proposed term below its own", CHOSEN,
         "a right effect by a wrong formula is no farther from a wrong effect than that, and tied with it",
     )  # fmt: skip
     window_share: float = _criterion(

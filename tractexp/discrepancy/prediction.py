@@ -4,10 +4,10 @@ A formula is not the physics. What the right one leaves is often no noise, and t
 as it rejects a wrong one. What can be asked still is how much each set predicts in events that it was not fitted to.
 
 The sets that predict best are those that the best of all is not ahead of (`criteria.ahead`), where that divides what
-the base model leaves of the held-out events (`criteria.divides`). What all of them share is named, if it is ahead of
-every other set of its size or smaller: what stands beside it is open. Else the smallest of them that needs each of its
-members is named, or tied with the sets that it is not ahead of. All by more than chance, and none where a term of the
-library is ahead of it.
+the base model leaves of the held-out events (`criteria.divides`). What all of them share is named, if it needs each of
+its members and has no rival: what stands beside it is open. Else the smallest of them that needs each of its members is
+named, or tied with its rivals. A rival is a set of its size or smaller that is ahead of the base model, and that it is
+not ahead of. All by more than chance, and none is named where a term of the library is ahead of it.
 
 What is left has two measures. Where the disagreement is of the noise's size it is what pushes into the balances would
 still gain of the deviance, with the fits of the search by likelihood. Where it is far above the noise it is the squared
@@ -150,7 +150,7 @@ class Predictions(Generic[OneSet]):
         return next(iter(self._leading(criteria, criteria.ahead)), min(self.sets.values(), key=_rank))
 
     def _leading(self, criteria: Criteria, factor: float) -> list[OneSet]:
-        """What the sets that predict best share; else the smallest of them that needs all its members, and its rivals.
+        """What the sets that predict best share, if it has no rival; else the smallest of them, and its rivals.
 
         None where the best does not divide what the base model leaves by the factor.
         """
@@ -160,22 +160,22 @@ class Predictions(Generic[OneSet]):
         if not dividing:
             return []
         alike = [p for p in ahead if not dividing[0].ahead_of(p, criteria.ahead)]
-        if (shared := self._shared(alike, ranked, criteria.ahead)) is not None:
+        common = frozenset.intersection(*map(self._textbook, alike))
+        shared = next((p for p in ahead if self._textbook(p) == common), None)
+        if shared and self.needs_all(shared, criteria) and not self._rivals(shared, ahead, criteria):
             return [shared]
         needed = (p for p in dividing if p in alike and self.needs_all(p, criteria))
-        if (chosen := min(needed, key=lambda p: len(p.names), default=None)) is None:
-            return []
-        rivals = [p for p in ahead if p is not chosen and len(p.names) <= len(chosen.names)]
-        rivals = [p for p in rivals if not chosen.ahead_of(p, criteria.ahead)]
-        return [chosen, *(p for p in rivals if not any({*q.names} < {*p.names} for q in rivals))]
+        chosen = min(needed, key=lambda p: len(p.names), default=None)
+        return [chosen, *self._rivals(chosen, ahead, criteria)] if chosen else []
 
-    def _shared(self, alike: Sequence[OneSet], ranked: Sequence[OneSet], factor: float) -> OneSet | None:
-        """The effects that all of these sets share, if they are ahead of every other set of their size or smaller."""
-        names = lambda one: frozenset(self.catalogue.textbook(one.names))  # noqa: E731
-        common = frozenset.intersection(*map(names, alike))
-        shared = next((p for p in ranked if names(p) == common), None)
-        others = [self.bare, *(p for p in ranked if len(p.names) <= len(common) and p is not shared)]
-        return shared if shared and all(shared.ahead_of(p, factor) for p in others) else None
+    def _textbook(self, one: OneSet) -> frozenset[str]:
+        return frozenset(self.catalogue.textbook(one.names))
+
+    def _rivals(self, one: OneSet, ahead: Sequence[OneSet], criteria: Criteria) -> list[OneSet]:
+        """What it is not ahead of, of its size or smaller, without needless supersets."""
+        rivals = [p for p in ahead if p is not one and len(p.names) <= len(one.names)]
+        rivals = [p for p in rivals if not one.ahead_of(p, criteria.ahead)]
+        return [p for p in rivals if not any({*q.names} < {*p.names} for q in rivals)]
 
     def needs_all(self, one: OneSet, criteria: Criteria) -> bool:
         """Whether a set needs each of its members: without any of them more is left by a factor, chance aside."""

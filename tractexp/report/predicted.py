@@ -44,7 +44,7 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
             for one in rows
         ],
         f"A name, or each of the best sets that have it, divides the error of the base model by {criteria.divides:g}."
-        f" It is ahead of every other set of its size or smaller by {criteria.ahead:g}, and no term of the library is"
+        f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of the library is"
         " ahead of it by that, all by more than chance (blocks that share the response, left out in turn)."
         + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
         words=(0, 3, 4),
