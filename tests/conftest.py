@@ -23,11 +23,9 @@ MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p
 def pytest_configure(config):
     """Files begin in the order they are collected in: xdist's own puts those of few tests, long ones, at the end.
 
-    What tests log goes to no store of the developer's own. Investigations in one of several workers fork no processes.
+    What tests log goes to no store of the developer's own.
     """
     os.environ.pop("MLFLOW_TRACKING_URI", None)
-    if "PYTEST_XDIST_WORKER" in os.environ:  # the workers share the cores
-        os.environ.setdefault("LOKY_MAX_CPU_COUNT", "1")
     if hasattr(config.option, "loadscopereorder"):
         config.option.loadscopereorder = False
 
