@@ -65,6 +65,12 @@ def test_a_stranger_s_best_imitation_is_not():
     assert named(off(error=1.0), off("a", error=0.5), off("b", error=0.9)) == []
 
 
+def test_a_name_must_be_ahead_of_the_base_model_though_it_need_not_divide_the_error_by_more():
+    sets = {one.names: one for one in (off(error=1.0), off("a", error=0.8))}
+    assert Predictions(Catalogue(), sets).explaining(Criteria(divides=1.2)) == []
+    assert Predictions(Catalogue(), sets).explaining(Criteria(divides=1.2, ahead=1.2)) == [sets["a",]]
+
+
 def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
     """The best pair owes its lead to the one block in which the base model is far off."""
     bare, best = off(error=1.0), off("a", "b", error=0.3)

@@ -156,7 +156,7 @@ class Predictions(Generic[OneSet]):
         """
         ranked = self.ranked(max(map(len, self.sets)), criteria.ahead)
         ahead = [p for p in ranked if p.ahead_of(self.bare, criteria.ahead)]
-        dividing = [p for p in ranked if p.ahead_of(self.bare, factor)]
+        dividing = [p for p in ahead if p.divides(self.bare, factor)]
         if not dividing:
             return []
         alike = [p for p in ahead if not dividing[0].ahead_of(p, criteria.ahead)]
