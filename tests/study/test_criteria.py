@@ -17,7 +17,7 @@ from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.incomplete import PredictedDeviance
-from tractexp.discrepancy.investigate import investigate
+from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.judgement import assessment
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
@@ -73,6 +73,12 @@ def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
 def deviance(left):
     """What a set leaves of held-out events."""
     return PredictedDeviance(refitted(0.0, 1), left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)
+
+
+def named_of_all(c, lowered, word="named"):
+    """An investigation of all events whose name lowers the deviance by so much."""
+    verdict = SimpleNamespace(word=word, chosen=SimpleNamespace(lowered=lowered))
+    return SimpleNamespace(verdict=verdict, context=SimpleNamespace(criteria=c))
 
 
 def wandering(c, seed, rests=(), walk=0.0):
@@ -163,6 +169,7 @@ FURTHER = [  # decisions by a criterion that has one above, too
     ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
     ("shown", 9.0, lambda c: with_a_member(c, gain=10.0).helps, False),
     ("evident", 90.0, lambda c: with_a_member(c, gain=5.0, expected=6.0, explained=95.0).helps, False),
+    ("evident", 90.0, lambda c: Findings.evident.fget(named_of_all(c, lowered=95.0)), False),
     ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
     ("ahead", 1.45, lambda c: proposed(c, explained=0.54).stands(c), False),
     ("shown", 9.0, lambda c: proposed(c, whole=11.0).stands(c), False),
@@ -176,6 +183,11 @@ def test_every_criterion_has_a_case_and_an_origin():
         assert told["origin"] in (CHOSEN, DERIVED), name
         assert told["about"], name
         assert told["why"], name
+
+
+@pytest.mark.parametrize(("word", "evident"), [("named", True), ("tied", False)])
+def test_what_no_held_out_event_shows_is_told_without_a_rival_only(word, evident):
+    assert Findings.evident.fget(named_of_all(Criteria(), 1e3, word)) == evident
 
 
 def test_a_member_of_a_family_pays_as_a_second_name_does():

@@ -349,17 +349,24 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
-def test_what_only_the_held_out_dip_shows_is_left_to_a_fit_of_it():
-    """The relay trips there alone: not "none", and no name either, for no event is left that it would predict."""
+def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt():
+    """The relay trips there alone, and no event is left that the name would predict."""
     made = events("trip_in_two_stages", 0.09768, 1865577783, count=4, noise=LOUD, recorder=FAST)
-    told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
-    assert told.first.adequate
-    assert told.verdict.word == "unexplained"
-    assert "the fitted events alone show no disagreement, but all events together do" in told.verdict.reason
-    assert recommendation(told) == "fit the held-out events, too (data.train)"
-    assert recommended.adequacy(told).grade == "effect_missing"
-    swapped = investigate(base(), made[1:], made[:1], {}, {}, only=TRIPS[:1])
-    assert swapped.names == ("undervoltage_trip",)
+
+    def investigated(criteria):
+        return investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1], criteria=criteria)
+
+    told = investigated(Criteria())
+    assert told.names == ("undervoltage_trip",)
+    assert "only all events together show it, so all were fitted, and none confirms it" in told.verdict.reason
+    assert told.fitted_to_both
+    assert (len(told.context.events), told.withheld, told.validate) == (4, (), None)
+    doubtful = investigated(Criteria(evident=1.1 * told.verdict.chosen.lowered))
+    assert doubtful.first.adequate
+    assert doubtful.verdict.word == "unexplained"
+    assert "the fitted events alone show no disagreement, but all events together do" in doubtful.verdict.reason
+    assert recommendation(doubtful) == "fit the held-out events, too (data.train)"
+    assert recommended.adequacy(doubtful).grade == "effect_missing"
 
 
 def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():

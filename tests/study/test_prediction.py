@@ -183,13 +183,36 @@ def test_contributions_begin_with_the_member_that_helps_most():
     assert [one.names for one in steps] == [(), ("b",), ("a", "b")]
 
 
+def by_deviance(*names, left, rejected=False):
+    """A set that leaves so much of the deviance on held-out events, beyond chance."""
+    curves = SimpleNamespace(deviance=900.0 + left)
+    return PredictedDeviance(Refit(names, np.zeros(0), 0.0, 1), left, curves, rejected, Criteria().shown)
+
+
 def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not():
-    one, other = (
-        PredictedDeviance(Refit((n,), np.zeros(0), 0.0, 1), 50.0, SimpleNamespace(deviance=900.0), n == "b", 10.8)
-        for n in "ab"
-    )
+    one, other = by_deviance("a", left=50.0), by_deviance("b", left=50.0, rejected=True)
     assert one.clear_of(other)
     assert not other.clear_of(one)
+
+
+@pytest.mark.parametrize(
+    ("bare", "left", "names"),
+    [
+        (20.0, 8.0, [("a",)]),  # chance may leave as much
+        (20.0, 10.0, []),  # and as much as its lead
+        (10.0, -5.0, []),  # chance may leave what the base model does
+        (40.0, 12.0, []),  # it leaves something, and divides that by no more than 1.8
+        (61.0, 12.0, [("a",)]),
+    ],
+)
+def test_what_leaves_no_more_than_chance_need_not_divide_what_the_base_model_leaves(bare, left, names):
+    assert named(by_deviance(left=bare), by_deviance("a", left=left)) == names
+
+
+def test_by_deviance_what_chance_leaves_is_no_lead():
+    """Of two that leave no more than chance, neither is told from the other, though one is far below the other."""
+    sets = by_deviance(left=100.0, rejected=True), by_deviance("a", left=-20.0), by_deviance("b", left=10.0)
+    assert named(*sets) == [("a",), ("b",)]
 
 
 # a motor whose law nobody has

@@ -61,7 +61,7 @@ class Criteria:
     )  # fmt: skip
     evident: float = _criterion(
         100.0, (0.0, 1e9), "deviance that an explanation must explain of the fitted events where the held-out ones are"
-        " too mild to show it", CHOSEN,
+        " too mild to show it, or had to be fitted, too", CHOSEN,
         "loads that no model fits to 1 % leave 12 to 80 to effects that imitate them, effects of four limits 250",
     )  # fmt: skip
     divides: float = _criterion(

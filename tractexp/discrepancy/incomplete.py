@@ -28,7 +28,7 @@ LOUD = 2.0  # deviance of a sample from which what the base model leaves is more
 @dataclass(frozen=True, eq=False)
 class PredictedDeviance(Prediction):
     """By the deviance: what is left of it on the held-out events beyond chance, the curves there, and whether the
-    fitted events reject the set. `least` is what chance may leave.
+    fitted events reject the set. `least` is what chance may leave: no more than that is nothing.
     """
 
     left_over: float
@@ -38,7 +38,7 @@ class PredictedDeviance(Prediction):
 
     @property
     def left(self) -> float:
-        return max(self.left_over, self.least)
+        return self.left_over if self.left_over > self.least else 0.0
 
     @property
     def error(self) -> float:

@@ -25,7 +25,7 @@ from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
-from tractexp.discrepancy.verdict import NONE, UNEXPLAINED, Verdict, verdict, word_of
+from tractexp.discrepancy.verdict import NAMED, NONE, UNEXPLAINED, Verdict, verdict, word_of
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
 from tractexp.model.model import Model
@@ -47,6 +47,7 @@ class Findings:
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
     proposed: ProposalResult  # the term that an unexplained disagreement asks for
+    all_fitted: bool = False  # whether the held-out events were fitted like the others, since only all show something
 
     @property
     def context(self) -> Context:
@@ -186,7 +187,13 @@ class Findings:
     @property
     def fitted_to_both(self) -> bool:
         """Whether the extended model was fitted to the held-out events, too."""
-        return bool(self.held_out.together and self.held_out.retained)
+        return self.all_fitted or bool(self.held_out.together and self.held_out.retained)
+
+    @property
+    def evident(self) -> bool:
+        """Whether one set of names explains so much of the fitted events that no held-out one need show it."""
+        word, chosen = self.verdict.word, self.verdict.chosen
+        return word == NAMED and chosen is not None and chosen.lowered >= self.context.criteria.evident
 
 
 def investigate(
@@ -211,7 +218,8 @@ def investigate(
     criteria = criteria or Criteria()
     train, validate = (domain_of(model).events(events) for events in (train, validate))
     check_events(train, validate)
-    with Effort(tell).audible() as effort:
+
+    def investigated(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
         missing = catalogue(model, train, only, criteria.frequency_swing)
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
@@ -223,6 +231,20 @@ def investigate(
             effort.say("the fits lie where the motor is fast: again with shorter steps")
             findings = _findings(base_fit(Context.of(*given, context.kernels.box_substeps)), validate, seed)
         return findings
+
+    with Effort(tell).audible() as effort:
+        findings = investigated(train, validate)
+        if not findings.held_out.shows_more:
+            return findings
+        effort.say("only all events together show something: again, fitted to all of them")
+        of_all = investigated([*train, *validate], ())
+        return _all_fitted(of_all) if of_all.evident else findings
+
+
+def _all_fitted(findings: Findings) -> Findings:
+    """The same, where events were fitted that were to be held out."""
+    reason = f"{findings.verdict.reason}; only all events together show it, so all were fitted, and none confirms it"
+    return replace(findings, verdict=replace(findings.verdict, reason=reason), all_fitted=True)
 
 
 def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:

@@ -59,7 +59,7 @@ class Prediction(ABC):
     @property
     @abstractmethod
     def left(self) -> float:
-        """Squares beyond the noise, no less than can be told of it."""
+        """Squares beyond the noise, no less than can be told of them."""
 
     @property
     @abstractmethod
@@ -71,8 +71,8 @@ class Prediction(ABC):
         """Whether this one leaves less by more than chance."""
 
     def divides(self, other: "Prediction", factor: float) -> bool:
-        """Whether it divides what the other leaves, as a root of squares, by a factor."""
-        return other.left >= factor**2 * self.left
+        """Whether it divides what the other leaves, as a root of squares, by more than a factor."""
+        return other.left > factor**2 * self.left
 
     def ahead_of(self, other: "Prediction", factor: float) -> bool:
         """The same, and by more than chance."""
