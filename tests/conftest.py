@@ -78,6 +78,15 @@ def planted():
     return investigate(base(), dips[:2], dips[2:], {}, {}, only=FEW)
 
 
+@pytest.fixture
+def no_proposal(monkeypatch):
+    """What nothing explains is left without a term, for tests that look at none: a search takes seconds."""
+    from tractexp.discrepancy.proposal.propose import ProposalResult
+
+    result = ProposalResult(why="none is searched in this test")
+    monkeypatch.setattr("tractexp.discrepancy.investigate.propose", lambda *_: result)
+
+
 collect_ignore = ["process/acme"]  # a package of its own, whose tests run where it is installed
 
 

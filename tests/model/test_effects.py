@@ -84,8 +84,10 @@ def halfway(p):
 # what all together must satisfy; what each must is in tractexp.testing
 
 
-def test_all_stack_and_at_their_nulls_are_the_base_model():
-    union = model(*(name for name in NAMES if name not in REFUSED["electromechanical"]))
+@pytest.mark.parametrize("half", [0, 1])
+def test_many_stack_and_at_their_nulls_are_the_base_model(half):
+    """All in two unions: what lowers the equations of one of 36 takes ten times as long."""
+    union = model(*[name for name in NAMES if name not in REFUSED["electromechanical"]][half::2])
     null = np.r_[TRUTH, [p.default if p.null is None else p.null for p in union.parameters[len(TRUTH) :]]]
     drive = Drive.of([dip(0.5)])
     together, alone = union.simulate(drive, null), model().simulate(drive, TRUTH)

@@ -787,6 +787,7 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     assert "R_s" in json.loads((tmp_path / "again" / "result.json").read_text())["parameters"]
 
 
+@pytest.mark.usefixtures("no_proposal")
 def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     """Two dips of a fault recorder: the base model does not fit, an effect helps on both dips and is not adequate."""
     record = shared_data / "dfr220kv-shandong" / "xtz.cfg"

@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
+import tractexp.discrepancy.investigate as investigating
 from tractexp.discrepancy import families, fit_effort, fitting, held_out, recommended, survivors
 from tractexp.discrepancy.all_events import AllEvents, JointFit
 from tractexp.discrepancy.catalogue import catalogue
@@ -349,24 +350,32 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
-def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt():
+@pytest.mark.usefixtures("no_proposal")
+def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt(monkeypatch):
     """The relay trips there alone, and no event is left that the name would predict."""
     made = events("trip_in_two_stages", 0.09768, 1865577783, count=4, noise=LOUD, recorder=FAST)
+    investigations, findings_of = [], investigating._findings
 
-    def investigated(criteria):
-        return investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1], criteria=criteria)
+    def kept(*given):
+        investigations.append(findings_of(*given))
+        return investigations[-1]
 
-    told = investigated(Criteria())
-    assert told.names == ("undervoltage_trip",)
+    monkeypatch.setattr(investigating, "_findings", kept)
+    told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
+    doubtful, of_all = investigations
+    assert told.names == of_all.names == ("undervoltage_trip",)
     assert "only all events together show it, so all were fitted, and none confirms it" in told.verdict.reason
     assert told.fitted_to_both
+    assert not of_all.fitted_to_both
     assert (len(told.context.events), told.withheld, told.validate) == (4, (), None)
-    doubtful = investigated(Criteria(evident=1.1 * told.verdict.chosen.lowered))
     assert doubtful.first.adequate
     assert doubtful.verdict.word == "unexplained"
     assert "the fitted events alone show no disagreement, but all events together do" in doubtful.verdict.reason
     assert recommendation(doubtful) == "fit the held-out events, too (data.train)"
     assert recommended.adequacy(doubtful).grade == "effect_missing"
+    monkeypatch.setattr(investigating.Findings, "evident", False)
+    monkeypatch.setattr(investigating, "_findings", lambda *given: doubtful if given[1] else of_all)
+    assert investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1]) is doubtful
 
 
 def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():

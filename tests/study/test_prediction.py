@@ -21,7 +21,7 @@ from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
-from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions, predictions
+from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.records import Records
@@ -343,6 +343,7 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
         assert abs(e.value - alone.result.parameters[e.parameter.name]) < errors[e.parameter.name]
 
 
+@pytest.mark.usefixtures("no_proposal")
 def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least_squares():
     """The trip is not among the effects that are tried."""
     found = tractexp.investigate(dips()[:2], validate=dips()[2:], effects=("dc_link_lag",), progress=False)
@@ -360,7 +361,7 @@ def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least
 
 def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
     """By least squares its members fit a swing that none of them has, too; they are told by one name."""
-    predicted = predictions(inexact.explanations, inexact.withheld)
+    predicted = inexact.held_out.predictions
     best = predicted.explaining(inexact.context.criteria)
     assert [inexact.catalogue.textbook(one.names) for one in best] == [("undervoltage_trip",)]
     assert {n for names in predicted.sets for n in names} - set(inexact.catalogue.of_load)
