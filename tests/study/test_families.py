@@ -375,7 +375,7 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
     assert recommended.adequacy(doubtful).grade == "effect_missing"
     monkeypatch.setattr(investigating.Findings, "evident", False)
     monkeypatch.setattr(investigating, "_findings", lambda *given: doubtful if given[1] else of_all)
-    assert investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1]) is doubtful
+    assert investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1]).verdict is doubtful.verdict
 
 
 def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():

@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -46,7 +46,7 @@ class Findings:
     verdict: Verdict
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
-    proposed: ProposalResult  # the term that an unexplained disagreement asks for
+    proposed: ProposalResult = field(default_factory=ProposalResult)  # of a term, where nothing explains
     all_fitted: bool = False  # whether the held-out events were fitted like the others, since only all show something
 
     @property
@@ -234,11 +234,11 @@ def investigate(
 
     with Effort(tell).audible() as effort:
         findings = investigated(train, validate)
-        if not findings.held_out.shows_more:
-            return findings
-        effort.say("only all events together show something: again, fitted to all of them")
-        of_all = investigated([*train, *validate], ())
-        return _all_fitted(of_all) if of_all.evident else findings
+        if findings.held_out.shows_more:
+            effort.say("only all events together show something: again, fitted to all of them")
+            of_all = investigated([*train, *validate], ())
+            findings = _all_fitted(of_all) if of_all.evident else findings
+        return replace(findings, proposed=_proposed(findings, seed))
 
 
 def _all_fitted(findings: Findings) -> Findings:
@@ -251,18 +251,12 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     """The investigation from the base model's fit to the verdict."""
     base, first = behind_recorder(base, disagreement(base, seed), seed)
     explained = explanations(base, first, seed)
-    base, first = explained.base, explained.steps[0]
     outcome = by_likelihood = held_out(survivors(explained, seed), validate, seed)
     if word_of(outcome) == UNEXPLAINED and not outcome.open:
         outcome = incomplete(outcome, validate, seed)
     said = verdict(outcome, validate)
-    proposed = ProposalResult()
-    if said.word == UNEXPLAINED and by_likelihood.open:
-        proposed = ProposalResult(why="the held-out events are too mild to show a term")
-    elif said.word == UNEXPLAINED:
-        proposed = propose(base, first, by_likelihood.bare, explained.last.noise, validate, seed)
     return Findings(
-        base=base,
+        base=explained.base,
         places=() if said.word == NONE else tuple(places(outcome.first)),
         explanations=explained,
         survivors=outcome.survivors,
@@ -271,8 +265,17 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
         verdict=said,
         train=_gap(outcome.first.context, outcome, said),
         withheld=tuple(validate),
-        proposed=proposed,
     )
+
+
+def _proposed(findings: Findings, seed: int) -> ProposalResult:
+    """The term that an unexplained disagreement asks for."""
+    base, explained, outcome = findings.base, findings.explanations, findings.by_likelihood
+    if findings.verdict.word != UNEXPLAINED:
+        return ProposalResult()
+    if outcome.open:
+        return ProposalResult(why="the held-out events are too mild to show a term")
+    return propose(base, explained.steps[0], outcome.bare, explained.last.noise, findings.withheld, seed)
 
 
 def _share_of(shapes: Sequence[Remainder]) -> float:
