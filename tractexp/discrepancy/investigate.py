@@ -243,8 +243,9 @@ def investigate(
 
 def _all_fitted(findings: Findings) -> Findings:
     """The same, where events were fitted that were to be held out."""
-    reason = f"{findings.verdict.reason}; only all events together show it, so all were fitted, and none confirms it"
-    return replace(findings, verdict=replace(findings.verdict, reason=reason), all_fitted=True)
+    why = "only all events together show it, so all were fitted, and none is left to confirm it"
+    said = replace(findings.verdict, reason=f"{findings.verdict.reason}; {why}")
+    return replace(findings, verdict=said, all_fitted=True)
 
 
 def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
