@@ -3,8 +3,9 @@
     python false_alarms.py [--count 24] [--jobs 2]        (from the folder benchmarks)
 
 Were chance's draws all there is to it, the share of data sets whose best effect is as rare as a level of the draws says
-would be that level. The criterion `naming_share` is chosen by it: what the search does beyond one linear step, and the
-noise's own estimate, make small p more frequent. Rows go to false_alarms.json; no rate is ever reported of these seeds.
+would be that level. What the search does beyond one linear step, and the noise's own estimate, make small p more
+frequent. The criterion `naming_share` is chosen by it, so that with the doubts by what is left all false alarms are at
+most `false_alarms`. Rows go to false_alarms.json; no rate is ever reported of these seeds.
 """
 
 import argparse
@@ -51,9 +52,11 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
 
 
 def shares(rows: list[dict]) -> dict[float, float]:
-    """The share of data sets at or below each level of chance."""
-    ranks = np.array([row["rank"] for row in rows])
-    return {level: float(np.mean(ranks <= level)) for level in LEVELS}
+    """The share of data sets in which something is named or doubted, for each level of chance that naming may take."""
+    from tractexp.discrepancy.criteria import Criteria
+
+    ranks, left = (np.array([row[what] for row in rows]) for what in ("rank", "p_left"))
+    return {level: float(np.mean((ranks <= level) | (left < Criteria().adequate_p))) for level in LEVELS}
 
 
 def main() -> None:

@@ -45,14 +45,14 @@ def series_of(group: str, label: str) -> str:
 
 
 def test_what_naming_may_spend_is_calibrated_on_development_seeds():
-    """The share of data sets below the level of chance's draws, and that nothing of them is left out."""
+    """All false alarms are within `false_alarms`, which twice the level would exceed; no data set is left out."""
     rows = json.loads(false_alarms.RESULTS.read_text())
     for noise in study.cases.NOISES:
         own = [row["seed"] for row in rows if row["noise"] == noise]
         assert own == [p.seed for p in itertools.islice(study.cases.nulls(noise, events=4), len(own))]
     assert len(rows) >= 300
     found, level = false_alarms.shares(rows), Criteria().naming
-    assert 0.036 < found[round(level, 6)] < 0.05
+    assert found[round(level, 6)] < Criteria().false_alarms < found[round(2 * level, 6)]
     assert found[0.5] == pytest.approx(0.5, abs=0.06)  # it is the tail that is heavy
 
 

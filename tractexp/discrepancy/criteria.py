@@ -34,8 +34,8 @@ class Criteria:
     )  # fmt: skip
     naming_share: float = _criterion(
         0.4, (0.0, 1.0), "part of the false alarms that chance's draws may give to naming", CHOSEN,
-        "a level of 0.02 takes 0.026 of data sets, one of 0.05 takes 0.074: the draws lack the tail of small p"
-        " (benchmarks/false_alarms.py)",
+        "with the doubts by what is left a level of 0.02 takes 0.029 of data sets, one of 0.04 takes 0.061: the draws"
+        " lack the tail of small p (benchmarks/false_alarms.py)",
     )  # fmt: skip
     adequate_p: float = _criterion(
         ADEQUATE_P, (0.0, 1.0), "p of what a fit leaves, below which it leaves something", CHOSEN,
