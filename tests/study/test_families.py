@@ -1,5 +1,6 @@
 """Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
 
+import dataclasses
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -23,8 +24,9 @@ from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment, HeldOut, assess
 from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.kernels import Family
+from tractexp.discrepancy.kernels import Family, Kernels
 from tractexp.discrepancy.linearization import tangent
+from tractexp.discrepancy.verdict import Verdict
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.model.declaration import Refused
@@ -356,11 +358,11 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
     made = events("trip_in_two_stages", 0.09768, 1865577783, count=4, noise=LOUD, recorder=FAST)
     investigations, findings_of = [], investigating._findings
 
-    def kept(*given):
+    def recorder(*given):
         investigations.append(findings_of(*given))
         return investigations[-1]
 
-    monkeypatch.setattr(investigating, "_findings", kept)
+    monkeypatch.setattr(investigating, "_findings", recorder)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
     doubtful, of_all = investigations
     assert told.names == of_all.names == ("undervoltage_trip",)
@@ -373,9 +375,35 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
     assert "the fitted events alone show no disagreement, but all events together do" in doubtful.verdict.reason
     assert recommendation(doubtful) == "fit the held-out events, too (data.train)"
     assert recommended.adequacy(doubtful).grade == "effect_missing"
-    monkeypatch.setattr(investigating.Findings, "evident", False)
-    monkeypatch.setattr(investigating, "_findings", lambda *given: doubtful if given[1] else of_all)
-    assert investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1]).verdict is doubtful.verdict
+    swapped = investigate(base(), made[1:], made[:1], {}, {}, only=TRIPS[:1])
+    assert swapped.names == ("undervoltage_trip",)
+    assert not swapped.fitted_to_both
+
+
+@pytest.mark.parametrize(
+    ("word", "evident", "chosen"),
+    [("unexplained", True, "of all"), ("unexplained", False, "as asked"), ("named", True, "as asked")],
+)
+def test_all_events_are_fitted_where_nothing_is_named_and_their_name_leaves_no_doubt(
+    monkeypatch, word, evident, chosen
+):
+    """A name that predicts the held-out events is kept: that of all events predicts none."""
+    held = SimpleNamespace(shows_more=True, open=True)
+    empty = dict.fromkeys(item.name for item in dataclasses.fields(investigating.Findings))
+
+    def findings_of(base, validate, seed):
+        verdict = Verdict(word, "as asked" if validate else "of all", (), (), None, None, None, complete=False)
+        return investigating.Findings(**empty | {"held_out": held, "by_likelihood": held, "verdict": verdict})
+
+    monkeypatch.setattr(investigating.Findings, "evident", evident)
+    monkeypatch.setattr(investigating.Findings, "base_values", None)
+    monkeypatch.setattr(Kernels, "too_coarse", lambda *_: False)
+    monkeypatch.setattr(investigating, "base_fit", lambda context: None)
+    monkeypatch.setattr(investigating, "_findings", findings_of)
+    made = events(count=2)
+    told = investigate(base(), made[:1], made[1:], {}, {}, only=TRIPS[:1])
+    assert told.verdict.reason.startswith(chosen)
+    assert bool(told.all_fitted) == (chosen == "of all")
 
 
 def test_nothing_is_asked_of_all_events_where_the_base_model_cannot_run_before_the_held_out_ones():

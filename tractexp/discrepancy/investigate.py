@@ -219,7 +219,7 @@ def investigate(
     train, validate = (domain_of(model).events(events) for events in (train, validate))
     check_events(train, validate)
 
-    def investigated(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
+    def findings_of(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
         missing = catalogue(model, train, only, criteria.frequency_swing)
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
@@ -233,15 +233,15 @@ def investigate(
         return findings
 
     with Effort(tell).audible() as effort:
-        findings = investigated(train, validate)
-        if findings.held_out.shows_more:
+        findings = findings_of(train, validate)
+        if findings.verdict.word == UNEXPLAINED and findings.held_out.shows_more:
             effort.say("only all events together show something: again, fitted to all of them")
-            of_all = investigated([*train, *validate], ())
-            findings = _all_fitted(of_all) if of_all.evident else findings
-        return replace(findings, proposed=_proposed(findings, seed))
+            of_all = findings_of([*train, *validate], ())
+            findings = _without_confirmation(of_all) if of_all.evident else findings
+        return replace(findings, proposed=_proposal(findings, seed))
 
 
-def _all_fitted(findings: Findings) -> Findings:
+def _without_confirmation(findings: Findings) -> Findings:
     """The same, where events were fitted that were to be held out."""
     why = "only all events together show it, so all were fitted, and none is left to confirm it"
     said = replace(findings.verdict, reason=f"{findings.verdict.reason}; {why}")
@@ -269,7 +269,7 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
     )
 
 
-def _proposed(findings: Findings, seed: int) -> ProposalResult:
+def _proposal(findings: Findings, seed: int) -> ProposalResult:
     """The term that an unexplained disagreement asks for."""
     base, explained, outcome = findings.base, findings.explanations, findings.by_likelihood
     if findings.verdict.word != UNEXPLAINED:
