@@ -241,3 +241,9 @@ def test_phasors_of_a_raw_report_are_refused_with_the_way_to_read_it(write):
 def test_refused(write, change, says):
     with pytest.raises(UserError, match=says):
         cev.load(write(change(report())))
+
+
+def test_a_column_of_bits_without_names_gives_no_status_channel(write):
+    recording = cev.load(write([line.replace(BITS, "") for line in report()]))
+    assert recording.status == []
+    assert len(recording.channels) == 9

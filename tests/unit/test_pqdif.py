@@ -1,6 +1,7 @@
 """PQDIF files that the tests write themselves, from the layout of IEEE 1159.3."""
 
 import struct
+import zlib
 from datetime import datetime, timedelta
 
 import made_pqdif as made
@@ -227,3 +228,64 @@ def test_a_collection_that_holds_itself_ends(write):
     struct.pack_into("<16s", content, at + 4 + 28, made.guid("b48d858d", "f5f5"))
     with pytest.raises(UserError, match=r"is observed, and 0 are defined|more than fit"):
         pqdif.load(write(bytes(content)))
+
+
+def four_observations(**options):
+    """A file of four observations a minute apart, and where its records begin."""
+    observed = [made.observation(START + timedelta(minutes=k), *instances()) for k in range(4)]
+    data = made.file([made.source(*DEFINITIONS), made.settings(), *observed], **options)
+    starts = [0]
+    while following := struct.unpack_from("<i", data, starts[-1] + 40)[0]:
+        starts.append(following)
+    return data, starts
+
+
+def linked(data, at, to):
+    return data[: at + 40] + struct.pack("<i", to) + data[at + 44 :]
+
+
+def test_a_whole_file_has_no_remark_on_its_links(write):
+    assert pqdif.load(write(four_observations()[0])).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("at", "to", "says"),
+    [
+        (4, None, "no link leads to 2 records"),  # the link is lost
+        (4, 3, "record 5 links back to byte"),
+        (4, 3, "no link leads to 2 records"),
+        (4, 6, "no link leads to 1 record "),  # one is jumped over
+    ],
+)
+def test_records_behind_a_damaged_link_are_said_to_be_unread(write, at, to, says):
+    data, starts = four_observations()
+    notes = pqdif.load(write(linked(data, starts[at], starts[to] if to else 0))).notes
+    assert any(says in note for note in notes), notes
+
+
+def test_zeros_between_records_and_at_the_end_are_no_loss(write):
+    data = four_observations()[0]
+    assert pqdif.load(write(data + bytes(512))).notes == ()
+
+
+@pytest.mark.parametrize("of", ["compressed", "body"])
+@pytest.mark.parametrize("sum_of", [zlib.crc32, zlib.adler32])
+@pytest.mark.parametrize("compressed", [True, False])
+def test_every_checksum_that_writers_use_is_accepted_and_another_is_told(write, compressed, sum_of, of):
+    data, starts = four_observations(compressed=compressed)
+    for k, at in enumerate(starts):
+        header, size = struct.unpack_from("<ii", data, at + 32)
+        content = data[at + header : at + header + size]
+        whole = zlib.decompress(content) if compressed and k and of == "body" else content
+        data = data[: at + 44] + struct.pack("<I", sum_of(whole)) + data[at + 48 :]
+    assert pqdif.load(write(data)).notes == ()
+    odd = data[: starts[4] + 44] + struct.pack("<I", 1234) + data[starts[4] + 48 :]
+    assert [note.partition(": ")[2] for note in pqdif.load(write(odd)).notes] == [
+        "record 5: the checksum does not fit: it was altered, or damaged on its way"
+    ]
+
+
+def test_a_count_of_millions_is_refused_before_it_takes_memory(write, monkeypatch):
+    monkeypatch.setattr(pqdif_records, "MOST_ELEMENTS", 3)
+    with pytest.raises(UserError, match="more than fit into the record"):
+        pqdif.load(write(waveform_file()))

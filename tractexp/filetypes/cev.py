@@ -359,8 +359,10 @@ def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     for word in words:
         held = word if re.fullmatch(r"[0-9A-Fa-f]+", word) else held
         rows.append(bytes.fromhex(held + "0" * (len(held) % 2)))
+    if not names:
+        return []
     width = -(-len(names) // 8)
     packed = np.frombuffer(b"".join(row[:width].ljust(width, b"\0") for row in rows), np.uint8).reshape(-1, width)
     return [
-        StatusChannel(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*" and width
+        StatusChannel(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*"
     ]  # fmt: skip

@@ -9,7 +9,7 @@ Source: IEEE Std 1159.3-2019 (and -2003), clause on the physical structure.
 import struct
 import uuid
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,12 +20,14 @@ from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode
+from tractexp.wording import counted
 
 SIGNATURE = uuid.UUID("4a111440-e49f-11cf-9900-505144494600").bytes_le
 HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")
 HEADER_BYTES = 64
 LARGEST = 256 * 2**20  # bytes of all bodies together, decompressed
 MOST_RECORDS = 100_000
+MOST_ELEMENTS = 200_000  # of one record: compressed zeros may announce millions, each of which takes memory
 LONGEST = 400  # letters of a text that are read
 BYTE, COUNT = np.dtype("u1"), np.dtype("<i4")
 COLLECTION, SCALAR, VECTOR = 1, 2, 3  # kinds of elements
@@ -72,7 +74,7 @@ class Collection:
         """Raises `UserError` for what is no collection, and where more elements are read than the body can hold."""
         count = int(body.part(at, 1, COUNT)[0])
         body.entries += max(count, 0)
-        if count < 0 or body.entries * ENTRY.size > len(body.data):
+        if count < 0 or body.entries * ENTRY.size > len(body.data) or body.entries > MOST_ELEMENTS:
             raise body.damaged(f"a collection at byte {at} has {count} elements, more than fit into the record")
         self.body = body
         self.entries = list(ENTRY.iter_unpack(body.part(at + 4, count * ENTRY.size).tobytes()))
@@ -137,13 +139,15 @@ class Collection:
 
 
 def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tuple[bytes, Collection]]:
-    """(tag, body's collection) of each record after the container. Raises `UserError` for what is no PQDIF file."""
+    """(tag, body's collection) of each record after the container. Raises `UserError` for what is no PQDIF file.
+
+    Remarks tell what no link between the records reaches.
+    """
     data = files.read(path)
     if not data.startswith(SIGNATURE):
         raise UserError(f"{path}: this is no PQDIF file: it does not begin with the signature of a PQDIF record")
-    at, count, compressed, room, visited = 0, 0, False, LARGEST, set[int]()
-    while at not in visited and count < MOST_RECORDS:
-        visited.add(at)
+    at, count, compressed, room, reached = 0, 0, False, LARGEST, dict[int, int]()
+    while count < MOST_RECORDS:
         count += 1
         where = f"{path}: record {count}"
         if at + HEADER_BYTES > len(data):
@@ -156,21 +160,49 @@ def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tupl
         if len(content) < size:
             remarks.add(f"the file ends within record {count}: it is not whole; what comes before is read")
             return
-        if checksum and zlib.adler32(content) != checksum:
+        reached[at] = at + header + size
+        body = _decompressed(content, room, where) if compressed else content
+        room -= len(body)
+        if checksum and checksum not in _checksums(content, body):
             remarks.add(f"record {count}: the checksum does not fit: it was altered, or damaged on its way")
-        content = _decompressed(content, room, where) if compressed else content
-        room -= len(content)
         if size:
-            body = Collection(Body(content, where, encoding), 0)
+            collection = Collection(Body(body, where, encoding), 0)
             if kind == CONTAINER:
-                compressed = _compression(body, where)
+                compressed = _compression(collection, where)
             else:
-                yield kind, body
-        if not 0 < following < len(data):
-            if following > len(data):
-                remarks.add(f"the file ends before record {count + 1}: it is not whole; what comes before is read")
-            return
+                yield kind, collection
+        if not 0 < following < len(data) or following in reached:
+            break
         at = following
+    if following > len(data):
+        remarks.add(f"the file ends before record {count + 1}: it is not whole; what comes before is read")
+    elif following > 0 and following in reached:
+        remarks.add(f"record {count} links back to byte {following}, a record that was read: a link is damaged")
+    _tell_unreached(data, reached, remarks)
+
+
+def _checksums(content: bytes, body: bytes) -> Iterator[int]:
+    """What writers take for the checksum of a record: Adler-32 or CRC-32, of its body compressed or not."""
+    for data in (content, body):
+        yield zlib.adler32(data)
+        yield zlib.crc32(data)
+
+
+def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -> None:
+    """Remark on bytes that belong to no record that was read; `reached` {first byte of a record: its end}.
+
+    Zeros fill a file up. Other bytes are records that a damaged link, or a deleted one, leaves out.
+    """
+    end = 0
+    for first, stop in [*sorted(reached.items()), (len(data), len(data))]:
+        if first > end and (between := data[end:first]).strip(b"\0"):
+            found = between.count(SIGNATURE)
+            what = counted(found, "record") if found else f"{len(between)} bytes"
+            remarks.add(
+                f"no link leads to {what} from byte {end} on: they are not read; where the recorder did not delete "
+                "them, a link is damaged: get the file again"
+            )
+        end = max(end, stop)
 
 
 def _compression(container: Collection, where: str) -> bool:

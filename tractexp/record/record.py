@@ -230,7 +230,10 @@ class Record:
             )
         if (self.U <= 0).any():
             i = int(np.argmax(self.U <= 0))
-            raise UserError(f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero everywhere")
+            raise UserError(
+                f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero everywhere; without it "
+                "no load draws power: give the rows before it, or after it, as a file of their own"
+            )
 
     def _check_times(self, place: Callable[[int], str]) -> None:
         off = np.abs(self.t - np.linspace(self.t[0], self.t[-1], self.samples)) / self.step
