@@ -12,9 +12,9 @@ for library in ("OPENBLAS", "OMP", "MKL"):
 
 import numpy as np  # noqa: E402
 
-from tractexp.discrepancy.catalogue import Catalogue, catalogue  # noqa: E402
-from tractexp.discrepancy.injection import PUSHES  # noqa: E402
-from tractexp.discrepancy.kernels import Family  # noqa: E402
+from tractexp.inference.catalogue import Catalogue, catalogue  # noqa: E402
+from tractexp.inference.injection import PUSHES  # noqa: E402
+from tractexp.inference.kernels import Family  # noqa: E402
 from tractexp.model.drive import Drive, Excitation  # noqa: E402
 from tractexp.model.model import Model, compose  # noqa: E402
 from tractexp.plugin import get  # noqa: E402

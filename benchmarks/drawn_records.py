@@ -12,8 +12,8 @@ import oracle  # noqa: F401
 
 from independent import Dip, Load, Machine, Recorder, Stall, Static, record
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import parts
+from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect

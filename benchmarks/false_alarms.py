@@ -30,13 +30,13 @@ LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.5)
 
 def ranked(noise: str, planned: cases.Planned) -> dict:
     """The rank of the best effect among chance's draws, from 0 to 1, and p of what the base model leaves."""
-    from tractexp.discrepancy.base_fit import base_fit
-    from tractexp.discrepancy.catalogue import catalogue
-    from tractexp.discrepancy.context import Context
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
-    from tractexp.discrepancy.effort import Effort
-    from tractexp.discrepancy.records import Records
+    from tractexp.inference.base_fit import base_fit
+    from tractexp.inference.catalogue import catalogue
+    from tractexp.inference.context import Context
+    from tractexp.inference.effort import Effort
+    from tractexp.inference.records import Records
     from tractexp.model.model import compose
     from tractexp.plugin import get
     from tractexp.record import Record, detect

@@ -177,7 +177,7 @@ def _predicted(found) -> list[tuple[list[str], float]]:
 def _refits(found) -> list[tuple[list[str], float, int]]:
     """Every set that the investigation fitted, under one noise: its names, by how much it lowers the deviance, and its
     parameters. What other criteria choose among."""
-    from tractexp.discrepancy.fitting import refit
+    from tractexp.inference.fitting import refit
 
     fits = refit(found.context, found.first.noise, [(f.names, f.unit) for f in found.explanations.refits.values()])
     bare = next(f.deviance for f in fits if not f.names)
@@ -231,7 +231,7 @@ def _left(found, clean: np.ndarray) -> float:
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
     from tractexp.discrepancy.explanations import searched
-    from tractexp.discrepancy.linearization import tangent
+    from tractexp.inference.linearization import tangent
 
     bench, first, refits = found.context, found.first, found.explanations.refits
     singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]

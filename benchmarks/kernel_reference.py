@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from tractexp.discrepancy.injection import Injection
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.errors import UserError
+from tractexp.inference.injection import Injection
 from tractexp.model.drive import PHASORS, WAVES, Drive, Excitation, WaveformDrive
 from tractexp.model.model import Model, compose
 from tractexp.parameter import Parameter

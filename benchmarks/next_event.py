@@ -26,12 +26,12 @@ import oracle  # noqa: F401
 from hidden_effects import Case, Noise
 from hidden_effects.generator import Scene, scene
 from independent import Dip
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagined
 from tractexp.domain import PHASORS
+from tractexp.inference.context import Context
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Event, Record, detect

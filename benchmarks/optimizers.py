@@ -31,8 +31,8 @@ import numpy as np
 import yaml
 
 from tractexp import files, provenance
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import Limits, SearchResult, search
+from tractexp.inference.problem import Problem
 from tractexp.plugin import build
 from tractexp.studies.bbob import runs as bbob
 from tractexp.studies.comparison import floor

@@ -118,9 +118,9 @@ def model():
 
 def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None = None):
     """Search and judgement as in `task=identify`: the values of Eq. (8), and the `Uncertainty`."""
-    from tractexp.identification.problem import Problem
     from tractexp.identification.profile import checked
     from tractexp.identification.search import search
+    from tractexp.inference.problem import Problem
     from tractexp.plugin import get
 
     problem = Problem(load, events, bounds)
@@ -138,9 +138,9 @@ def judged(problem, values):
 
 def bound(load, events, truth: np.ndarray, deviation: float, correlation: float):
     """Cramér-Rao: the information at the truth under the noise that was really added, P0 and Q0 unknown."""
-    from tractexp.identification.information import Information
-    from tractexp.identification.likelihood import Likelihood
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.information import Information
+    from tractexp.inference.likelihood import Likelihood
+    from tractexp.inference.problem import Problem
     from tractexp.noise import Autoregression, Noise
 
     shock = deviation * np.sqrt(1 - correlation**2)
@@ -263,7 +263,7 @@ def verdict_record(seed: int) -> dict:
 def independent_record(seed: int) -> dict:
     """A record of the flux-state simulator, stator transients and all: the truth is outside the model class."""
     from independent import Dip, Load, Machine, Recorder, Static, record
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.problem import Problem
     from tractexp.record import Record, detect
 
     rng = np.random.default_rng([33, seed])
@@ -282,9 +282,9 @@ def independent_record(seed: int) -> dict:
 
 def timing(repeats: int = 9) -> dict:
     """Seconds for fit, judgement and seven profiles of a record of 1,000 samples, the kernel loaded; medians."""
-    from tractexp.identification.problem import Problem
     from tractexp.identification.profile import profiles
     from tractexp.identification.search import search
+    from tractexp.inference.problem import Problem
     from tractexp.plugin import get
 
     load, (t, U) = model(), Shape(0.5).voltage()

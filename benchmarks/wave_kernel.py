@@ -23,8 +23,8 @@ import wave_records as waves
 from simulation import excitation
 
 from tractexp.domain import domain_of
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
+from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
 from tractexp.plugin import get

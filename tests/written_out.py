@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from tractexp.identification.separable import NormalMatrix, Sensitivities
+from tractexp.inference.separable import NormalMatrix, Sensitivities
 
 
 def dense(J: Sensitivities) -> np.ndarray:

@@ -11,7 +11,7 @@ from scipy.optimize import fsolve, least_squares
 
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive, Excitation, slopes
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
-from tractexp.discrepancy.jumps import AROUND, _at_jumps
+from tractexp.inference.jumps import AROUND, _at_jumps
 
 RATE, FINER = 3200.0, 12
 

@@ -8,8 +8,8 @@ import uncertainty as study
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import search
+from tractexp.inference.problem import Problem
 from tractexp.parameter import even
 from tractexp.plugin import build, get
 

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.identification.blocks import blocks_of
-from tractexp.identification.descent import descend
 from tractexp.identification.estimate import held_to_usual
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.prior import departures, held_in_words
-from tractexp.identification.problem import Problem
-from tractexp.identification.sandwich import scatter
+from tractexp.inference.blocks import blocks_of
+from tractexp.inference.descent import descend
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.prior import departures, held_in_words
+from tractexp.inference.problem import Problem
+from tractexp.inference.sandwich import scatter
 from tractexp.plugin import get
 
 # R_s, X_s, X_m, R_r, X_r, H, load factor of the seven types of the source

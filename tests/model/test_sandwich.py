@@ -5,12 +5,12 @@ import pytest
 import uncertainty as study
 from written_out import dense
 
-from tractexp.identification.blocks import LENGTH, blocks_of, quantile
-from tractexp.identification.descent import descend
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
-from tractexp.identification.sandwich import scatter
 from tractexp.identification.uncertainty import conclude, threshold
+from tractexp.inference.blocks import LENGTH, blocks_of, quantile
+from tractexp.inference.descent import descend
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.problem import Problem
+from tractexp.inference.sandwich import scatter
 
 NOISE = 0.004
 

@@ -7,7 +7,7 @@ import pytest
 from sympy import Piecewise
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.model.parts import Static

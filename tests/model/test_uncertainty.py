@@ -16,15 +16,15 @@ import tractexp
 from tractexp.identification import advice, agreement
 from tractexp.identification.advice import advise
 from tractexp.identification.agreement import compare_events
-from tractexp.identification.descent import central_differences, descend, normal
-from tractexp.identification.information import Information
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
-from tractexp.identification.residual_tests import jarque_bera, ljung_box
-from tractexp.identification.separable import NOT_SEPARABLE
 from tractexp.identification.uncertainty import conclude
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
+from tractexp.inference.descent import central_differences, descend, normal
+from tractexp.inference.information import Information
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.problem import Problem
+from tractexp.inference.residual_tests import jarque_bera, ljung_box
+from tractexp.inference.separable import NOT_SEPARABLE
 from tractexp.noise import Noise
 from tractexp.noise.color import Autoregression, fit_autoregression, stretches
 

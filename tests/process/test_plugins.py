@@ -80,7 +80,7 @@ STRANGERS = """
 import pytest
 
 import tractexp.testing
-from tractexp.discrepancy.injection import PERTURBATIONS, Injection
+from tractexp.inference.injection import PERTURBATIONS, Injection
 from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 

@@ -7,13 +7,9 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events, steady
 
-from tractexp.discrepancy.catalogue import candidate, missing_channel
-from tractexp.discrepancy.chance import Chance
-from tractexp.discrepancy.coordinates import Coordinates
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.families import worth
-from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.incomplete import PredictedDeviance
@@ -23,8 +19,12 @@ from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
 from tractexp.discrepancy.proposal.judge import TermAssessment
-from tractexp.discrepancy.score_test import Score
 from tractexp.errors import UserError
+from tractexp.inference.catalogue import candidate, missing_channel
+from tractexp.inference.chance import Chance
+from tractexp.inference.coordinates import Coordinates
+from tractexp.inference.fitting import Refit
+from tractexp.inference.score_test import Score
 from tractexp.noise.random_walk import Rest, find
 from tractexp.plugin import get
 

@@ -18,33 +18,33 @@ from written_out import dense_normal
 
 from hidden_effects import Case, Noise, Recorder, make, write
 from tractexp import store
-from tractexp.discrepancy import explanations, kernels
+from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
-from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.chance import scales
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
 from tractexp.discrepancy.discrepancy_json import content, write_left, write_model
-from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import beneath, searched, without_needless
-from tractexp.discrepancy.fit_effort import TOGETHER
-from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.held_out import assess, carried, judged_on
-from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.linearization import tangent
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.records import Records, check_events
-from tractexp.discrepancy.score_test import ScoreTest, signed_drop
 from tractexp.errors import UserError
-from tractexp.identification import local_minima, observed, surprises
-from tractexp.identification.descent import normal
-from tractexp.identification.problem import Problem
-from tractexp.identification.separable import SeparableColumns
-from tractexp.identification.surprises import Scale, tail
+from tractexp.inference import kernels, local_minima, observed, surprises
+from tractexp.inference.base_fit import base_fit
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.chance import scales
+from tractexp.inference.context import Context
+from tractexp.inference.descent import normal
+from tractexp.inference.effort import Effort
+from tractexp.inference.fit_effort import TOGETHER
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.injection import PUSHES
+from tractexp.inference.linearization import tangent
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.problem import Problem
+from tractexp.inference.records import Records, check_events
+from tractexp.inference.score_test import ScoreTest, signed_drop
+from tractexp.inference.separable import SeparableColumns
+from tractexp.inference.surprises import Scale, tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
@@ -813,7 +813,7 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
 
 def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(planted, monkeypatch):
     """Products of matrices round by how many rows they have: the same descents go together on any machine."""
-    from tractexp.discrepancy import cores, fitting
+    from tractexp.inference import cores, fitting
 
     bench = planted.context
     wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.problem.power)

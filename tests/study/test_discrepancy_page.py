@@ -16,7 +16,7 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.recommended import adequacy
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, overlay
 from tractexp.report.events import WITHIN

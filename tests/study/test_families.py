@@ -10,25 +10,26 @@ from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
 import tractexp.discrepancy.investigate as investigating
-from tractexp.discrepancy import families, fit_effort, fitting, held_out, recommended, survivors
+from tractexp.discrepancy import families, held_out, recommended, survivors
 from tractexp.discrepancy.all_events import AllEvents, JointFit
-from tractexp.discrepancy.catalogue import catalogue
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.discrepancy_json import recommendation
-from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
-from tractexp.discrepancy.fitting import Refit, scattered
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment, HeldOut, assess
-from tractexp.discrepancy.injection import PUSHES
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.kernels import Family, Kernels
-from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.verdict import Verdict
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
+from tractexp.inference import fit_effort, fitting
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import Refit, scattered
+from tractexp.inference.injection import PUSHES
+from tractexp.inference.kernels import Family, Kernels
+from tractexp.inference.linearization import tangent
 from tractexp.model.declaration import Refused
 from tractexp.plugin import discover, get
 

@@ -10,8 +10,8 @@ import pytest
 import tractexp
 from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import respond
+from tractexp.inference.problem import Problem
 from tractexp.record.window import average, sharpened
 
 DATA = Path(tractexp.__file__).parent / "data"

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import tractexp
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.plugin import build, get
 from tractexp.provenance import digest

@@ -10,8 +10,8 @@ import uncertainty as study
 from scipy import stats
 
 import tractexp
-from tractexp.identification.model_error import ModelError, block_sums, in_percent, model_error, noise_variance
 from tractexp.identification.result import Fit
+from tractexp.inference.model_error import ModelError, block_sums, in_percent, model_error, noise_variance
 from tractexp.noise.random_walk import SLOW
 
 
@@ -94,8 +94,8 @@ def test_blocks_are_shortened_until_so_many_share_the_response():
 
 
 def test_one_block_tells_nothing_of_chance(monkeypatch):
-    monkeypatch.setattr("tractexp.identification.model_error.LENGTH", 100.0)
-    monkeypatch.setattr("tractexp.identification.model_error.BLOCKS", 1)
+    monkeypatch.setattr("tractexp.inference.model_error.LENGTH", 100.0)
+    monkeypatch.setattr("tractexp.inference.model_error.BLOCKS", 1)
     error = model_error([played(-0.1, -0.1)])
     assert error.value == pytest.approx(0.1, rel=1e-3)
     assert error.interval == (0.0, np.inf)

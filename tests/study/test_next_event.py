@@ -18,23 +18,23 @@ import tractexp
 from hidden_effects import Case, Noise
 from hidden_effects.generator import scene
 from independent import Dip
-from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.catalogue import Catalogue, candidate, catalogue
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.discrepancy_json import content
-from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagined
 from tractexp.discrepancy.next_event.same import same
 from tractexp.discrepancy.next_event.separation import Chances, EventView, Separation, _reduced, seen, sided
-from tractexp.discrepancy.records import Records
 from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
+from tractexp.inference.base_fit import base_fit
+from tractexp.inference.catalogue import Catalogue, candidate, catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import refit
+from tractexp.inference.records import Records
 from tractexp.record import Record, detect
 
 TIE = ("feeder_impedance", "speed_dependent_torque")

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp.identification.descent import central_differences, descend
-from tractexp.identification.information import Information
+from tractexp.inference.descent import central_differences, descend
+from tractexp.inference.information import Information
 from tractexp.parameter import Box
 
 FILES = Path(__file__).parents[1] / "oracle" / "nist"

@@ -418,8 +418,8 @@ def test_a_reading_is_the_optimizer_of_its_name(name):
 
 
 def _recipe(motor="electromechanical", shift=0.0, integration="classical", **known):
-    from tractexp.identification.problem import Problem
     from tractexp.identification.result import parts
+    from tractexp.inference.problem import Problem
     from tractexp.model.model import compose
     from tractexp.plugin import build
     from tractexp.record import detect

@@ -16,9 +16,9 @@ from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.advice import advise
 from tractexp.identification.plan import DipShape, best_events, combined, depth_needed, each, forecast, over_depth
-from tractexp.identification.problem import Problem
 from tractexp.identification.profile import checked
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
+from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.report.plan import marks

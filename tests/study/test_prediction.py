@@ -11,22 +11,22 @@ import hidden_effects
 import tractexp
 from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
-from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.incomplete import PredictedDeviance
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
-from tractexp.discrepancy.linearization import tangent
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.recommended import adequacy
-from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.verdict import verdict
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.linearization import tangent
+from tractexp.inference.model_error import in_percent
+from tractexp.inference.records import Records
 from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import compose
 from tractexp.noise import Noise

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from test_discrepancy import FAST, LOUD, base, bench, events
 
-from tractexp.discrepancy import fit_effort, fitting
-from tractexp.discrepancy.base_fit import base_fit
 from tractexp.discrepancy.disagreement import disagreement
-from tractexp.discrepancy.promising import promising
+from tractexp.inference import fit_effort, fitting
+from tractexp.inference.base_fit import base_fit
+from tractexp.inference.promising import promising
 
 TRIP = ("undervoltage_trip",)
 

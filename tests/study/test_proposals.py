@@ -13,13 +13,8 @@ from nasty import NASTY
 
 import tractexp
 from hidden_effects import EFFECTS, Case, Noise, Recorder, make
-from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement
-from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.fitting import refit
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, place, sizes_of, with_terms
 from tractexp.discrepancy.proposal.effect import Library
@@ -28,7 +23,12 @@ from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import term_fits
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
 from tractexp.discrepancy.proposal.wording import proposed_in_words
-from tractexp.discrepancy.records import Records
+from tractexp.inference.base_fit import base_fit
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import refit
+from tractexp.inference.records import Records
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import Record, detect

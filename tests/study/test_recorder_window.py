@@ -9,7 +9,7 @@ from test_discrepancy import FAST, base, events
 
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.recorder_window import RecorderWindow, windows_of
+from tractexp.inference.recorder_window import RecorderWindow, windows_of
 from tractexp.plugin import chosen
 from tractexp.record.window import average
 

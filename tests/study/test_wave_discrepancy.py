@@ -13,14 +13,14 @@ import pytest
 from wave_records import case, events
 
 import tractexp
-from tractexp.discrepancy.catalogue import catalogue
-from tractexp.discrepancy.injection import Injection
 from tractexp.discrepancy.next_event.choose import next_event
 from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import propose
 from tractexp.discrepancy.remainder import remainders
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
+from tractexp.inference.catalogue import catalogue
+from tractexp.inference.injection import Injection
+from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.plugin import get
 from tractexp.record import in_waves

@@ -14,7 +14,7 @@ from tractexp.domain.playback import as_phasors, unsettled
 from tractexp.errors import UserError
 from tractexp.identification.advice import better_domain
 from tractexp.identification.plan import DipShape, forecast
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report.waves import Drawn, spectra, wave_chart

@@ -10,8 +10,8 @@ import pytest
 import tractexp
 from tractexp.domain import WAVES
 from tractexp.identification.linear_network import CRITERION, HELD_OUT, black_boxes
-from tractexp.identification.model_error import model_error
 from tractexp.identification.yardstick import poles_in_words, yardstick
+from tractexp.inference.model_error import model_error
 
 FAST = {"optimizer": "multistart_least_squares", "budget": 300, "check_intervals": False, "progress": False}
 TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}

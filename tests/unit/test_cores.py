@@ -10,10 +10,10 @@ from contextlib import contextmanager
 import joblib
 import pytest
 
-from tractexp.discrepancy import cores
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.effort import Effort
 from tractexp.errors import UserError
+from tractexp.inference import cores
+from tractexp.inference.cores import each_apart
+from tractexp.inference.effort import Effort
 from tractexp.workers import Workers
 
 forked = pytest.mark.skipif(not cores.FORKS, reason="processes are forked on Linux only")

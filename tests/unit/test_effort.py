@@ -3,8 +3,8 @@
 import re
 import time
 
-from tractexp.discrepancy import effort
-from tractexp.discrepancy.effort import Effort
+from tractexp.inference import effort
+from tractexp.inference.effort import Effort
 
 
 def test_a_long_step_is_not_silent(monkeypatch):

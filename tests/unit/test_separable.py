@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from written_out import dense, dense_normal
 
-from tractexp.identification.descent import central_differences, forward_differences, normal
-from tractexp.identification.separable import NOT_SEPARABLE, NormalMatrix, Sensitivities, SeparableColumns
+from tractexp.inference.descent import central_differences, forward_differences, normal
+from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, Sensitivities, SeparableColumns
 
 RNG = np.random.default_rng(7)
 LENGTHS = (6, 9, 7)

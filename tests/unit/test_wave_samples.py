@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tractexp.identification.blocks import blocks_of, quantile
+from tractexp.inference.blocks import blocks_of, quantile
 from tractexp.record.record import Base
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import Periodic, _scale

@@ -65,7 +65,7 @@ class LoadModel(Portable, Plain, Tabulated):
     @functools.cached_property
     def parameters(self) -> Mapping[str, Any]:
         """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit, about, symbol)."""
-        from tractexp.identification.problem import narrowed
+        from tractexp.inference.problem import narrowed
 
         return {p.name: p for p in narrowed(self.model.parameters, self.bounds)}
 

@@ -23,9 +23,9 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import Result, conclude
 from tractexp.identification.search import History, SearchResult
+from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
 from tractexp.progress import Progress, console, say, telling

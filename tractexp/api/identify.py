@@ -18,11 +18,11 @@ from tractexp.blocks import Report, Table
 from tractexp.choices import set_holding
 from tractexp.errors import Stopped, UserError
 from tractexp.identification.adequacy import Adequacy, graded
-from tractexp.identification.model_error import ModelError
-from tractexp.identification.prior import departures
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import Result, active_bounds, by_event, conclude, errors_of, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
+from tractexp.inference.model_error import ModelError
+from tractexp.inference.prior import departures
+from tractexp.inference.problem import Problem
 from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell

@@ -149,9 +149,9 @@ def _played(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
 
 
 def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
-    from tractexp.identification.model_error import ModelError
     from tractexp.identification.result import model_errors
     from tractexp.identification.yardstick import network_in_words
+    from tractexp.inference.model_error import ModelError
 
     fits = _played(box, of)
     error, by_poles = model_errors(fits), []

@@ -18,8 +18,8 @@ from tractexp.schema import LEAST
 from tractexp.wording import shown_in_words
 
 if TYPE_CHECKING:
-    from tractexp.identification.problem import Problem
     from tractexp.identification.search import Limits, SearchResult
+    from tractexp.inference.problem import Problem
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -57,7 +57,7 @@ class Setup(Given):
 
     def problem_of(self, train: Sequence[Event] | None = None) -> "Problem":
         """The identification problem of some events, by default of those fitted; made anew."""
-        from tractexp.identification.problem import Problem
+        from tractexp.inference.problem import Problem
 
         m, loss, events = self.model, self.objective.build("objective"), self.train if train is None else train
         return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss, priors=m.priors)

@@ -11,14 +11,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import fitted_from
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement, examined
-from tractexp.discrepancy.fitting import Names, Refit, best_of, refit, wide_refit
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.records import Records
+from tractexp.inference.base_fit import fitted_from
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.fitting import Names, Refit, best_of, refit, wide_refit
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 

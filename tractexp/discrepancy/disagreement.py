@@ -5,15 +5,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.chance import Chance, chance_at, is_noise_exact, scales
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fit_effort import NOISE_ROUNDS, QUIETER
-from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.linearization import Linearization, rich_residuals, tangent
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.score_test import Score, ScoreTest
+from tractexp.inference.base_fit import BaseFit
+from tractexp.inference.chance import Chance, chance_at, is_noise_exact, scales
+from tractexp.inference.context import Context
+from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.linearization import Linearization, rich_residuals, tangent
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.score_test import Score, ScoreTest
 from tractexp.noise import Noise
 
 PLAIN = 1e-10  # a score of this p needs no exact threshold

@@ -18,7 +18,7 @@ from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
-from tractexp.identification.model_error import ModelError, in_percent
+from tractexp.inference.model_error import ModelError, in_percent
 from tractexp.provenance import again
 from tractexp.wording import joined
 

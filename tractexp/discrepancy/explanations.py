@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.discrepancy.families import against_members
-from tractexp.discrepancy.fit_effort import BOX_APART, BOX_POINTS, BOX_STARTS, NEAR_BEST, NESTED_TOLERANCE
-from tractexp.discrepancy.fitting import (
+from tractexp.discrepancy.window_search import behind_window
+from tractexp.inference.base_fit import BaseFit
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.fit_effort import BOX_APART, BOX_POINTS, BOX_STARTS, NEAR_BEST, NESTED_TOLERANCE
+from tractexp.inference.fitting import (
     Names,
     Refit,
     Start,
@@ -28,9 +29,8 @@ from tractexp.discrepancy.fitting import (
     rough_refit,
     wide_refits,
 )  # fmt: skip
-from tractexp.discrepancy.score_test import Score
-from tractexp.discrepancy.window_search import behind_window
-from tractexp.identification.local_minima import DISTINCT
+from tractexp.inference.local_minima import DISTINCT
+from tractexp.inference.score_test import Score
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even
 

@@ -12,12 +12,12 @@ from collections.abc import Container, Mapping, Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.base_fit import BaseFit
-from tractexp.discrepancy.catalogue import Candidate
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, examined
-from tractexp.discrepancy.fit_effort import NEAR_BEST
-from tractexp.discrepancy.fitting import Names, Refit, Start, off_bounds, wide_refits
+from tractexp.inference.base_fit import BaseFit
+from tractexp.inference.catalogue import Candidate
+from tractexp.inference.context import Context
+from tractexp.inference.fit_effort import NEAR_BEST
+from tractexp.inference.fitting import Names, Refit, Start, off_bounds, wide_refits
 from tractexp.noise import Noise
 
 NEAREST = 4  # members that are searched to the end

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.injection import PUSHES, perturbations
-from tractexp.discrepancy.linear import two_sided
-from tractexp.discrepancy.linearization import resting
 from tractexp.domain.playback import relative_error
-from tractexp.identification.model_error import ModelError, model_error
+from tractexp.inference.context import Context
+from tractexp.inference.injection import PUSHES, perturbations
+from tractexp.inference.linear import two_sided
+from tractexp.inference.linearization import resting
+from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 

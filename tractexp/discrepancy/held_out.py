@@ -7,15 +7,15 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.discrepancy.all_events import AllEvents
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Names, Refit, refit, settled
 from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed, share_gone
-from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
 from tractexp.discrepancy.prediction import Predictions
-from tractexp.discrepancy.records import Records
 from tractexp.discrepancy.survivors import Rival, Survivors
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Names, Refit, refit, settled
+from tractexp.inference.noise_in_quiet import QuietNoise, white
+from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 

@@ -7,11 +7,9 @@ import numpy as np
 
 from tractexp.discrepancy.disagreement import examined
 from tractexp.discrepancy.explanations import Names
-from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.gap import Curves, curves, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, carried, judged_on
 from tractexp.discrepancy.least_squares import least_squares_tests
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
 from tractexp.discrepancy.prediction import (
     Prediction,
     PredictionError,
@@ -19,6 +17,8 @@ from tractexp.discrepancy.prediction import (
     predictions,
 )  # fmt: skip
 from tractexp.discrepancy.survivors import Rival
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.record import Event
 
 JUDGED = 10  # sets of the search by likelihood that are judged on the held-out events

@@ -6,14 +6,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import BaseFit, base_fit
-from tractexp.discrepancy.catalogue import Catalogue, catalogue
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
-from tractexp.discrepancy.effort import Effort
 from tractexp.discrepancy.explanations import Explanations, explanations
-from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest, gap
 from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
 from tractexp.discrepancy.incomplete import incomplete
@@ -22,12 +17,17 @@ from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_he
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import ParameterEstimate, estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
-from tractexp.discrepancy.records import Records, check_events
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NAMED, NONE, UNEXPLAINED, Verdict, verdict, word_of
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
+from tractexp.inference.base_fit import BaseFit, base_fit
+from tractexp.inference.catalogue import Catalogue, catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import Refit
+from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import joined

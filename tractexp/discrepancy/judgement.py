@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from tractexp.discrepancy.catalogue import Candidate
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.score_test import Score
+from tractexp.inference.catalogue import Candidate
+from tractexp.inference.score_test import Score
 from tractexp.wording import in_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %

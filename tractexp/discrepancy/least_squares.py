@@ -4,22 +4,22 @@ Under a wrong model the likelihood of the noise before the dip is no likelihood:
 louder than that noise, bend every parameter. Least squares asks for no noise, and the covariance of its estimates holds
 where residuals are correlated within blocks, and where they are noise.
 
-Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.identification.sandwich`.
+Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.inference.sandwich`.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
-from tractexp.discrepancy.chance import chance_at
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linearization import rich_residuals, tangent
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.score_test import ScoreTest
-from tractexp.identification.blocks import blocks_of
-from tractexp.identification.sandwich import moves_without_blocks, robust_root
+from tractexp.inference.blocks import blocks_of
+from tractexp.inference.chance import chance_at
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
+from tractexp.inference.linearization import rich_residuals, tangent
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.sandwich import moves_without_blocks, robust_root
+from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
 
 

@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.held_out import Assessment, carried
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.discrepancy.verdict import Nearest
 from tractexp.domain import domain_of
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
 from tractexp.noise import Noise
 from tractexp.record import Event
 

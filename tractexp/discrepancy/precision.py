@@ -8,12 +8,12 @@ import numpy as np
 from scipy.special import ndtri
 
 from tractexp import files
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.fitting import Refit
-from tractexp.identification.information import Information
 from tractexp.identification.uncertainty import LEVEL
 from tractexp.identification.verdict import BOUND, judge
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
+from tractexp.inference.information import Information
 from tractexp.parameter import Parameter
 from tractexp.wording import with_error
 

@@ -22,21 +22,21 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import minima_of
-from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searched, wide_starts
 from tractexp.discrepancy.families import member_fits
-from tractexp.discrepancy.fitting import Refit, best_of, refit, wide_refits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
 from tractexp.discrepancy.proposal.library import term
-from tractexp.discrepancy.records import Records
-from tractexp.identification.blocks import reach
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.model_error import block_sums, noise_variance
+from tractexp.inference.base_fit import minima_of
+from tractexp.inference.blocks import reach
+from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.fitting import Refit, best_of, refit, wide_refits
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.model_error import block_sums, noise_variance
+from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 from tractexp.discrepancy.disagreement import Disagreement, examined
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.fitting import Refit, refit
+from tractexp.inference.fitting import Refit, refit
 
 MOST = 6  # survivors whose adequacy is tested
 

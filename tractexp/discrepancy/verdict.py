@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.gap import Curves, closed, curves
 from tractexp.discrepancy.held_out import HeldOut, carried
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.prediction import ErrorPredictions, PredictionError
 from tractexp.discrepancy.survivors import Rival
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.chance import by_draws
+from tractexp.inference.model_error import in_percent
 from tractexp.record import Event
 from tractexp.wording import alternatives, joined, listed, percent
 

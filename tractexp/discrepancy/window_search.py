@@ -10,13 +10,13 @@ measurement beside it, it is fitted behind each window, too: one that leaves no 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.discrepancy.base_fit import BaseFit, fitted_from
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
-from tractexp.discrepancy.fitting import Refit, refit, rough_refit
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.recorder_window import windows_of
-from tractexp.discrepancy.records import Records
+from tractexp.inference.base_fit import BaseFit, fitted_from
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit, refit, rough_refit
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.recorder_window import windows_of
+from tractexp.inference.records import Records
 from tractexp.noise import Noise
 
 

@@ -19,7 +19,7 @@ from tractexp.record import Event
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.problem import Problem
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from tractexp.record.wave_event import COARSEST, smeared
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.problem import Problem
 
 FINEST_STEP = 5e-4  # s, longest Runge-Kutta step of a forecast
 

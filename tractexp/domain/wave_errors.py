@@ -15,7 +15,7 @@ from tractexp.noise.color import SMALLEST
 from tractexp.record import Event, WaveEvent
 
 if TYPE_CHECKING:
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.problem import Problem
 
 DIVERGED = 10.0  # pu: a wrong sample of the voltage makes no such difference
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off

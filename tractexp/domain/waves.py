@@ -25,7 +25,7 @@ from tractexp.wording import joined
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
-    from tractexp.identification.problem import Problem
+    from tractexp.inference.problem import Problem
 
 PLAYED = 64  # samples per cycle at least, of a voltage that is played
 

@@ -8,8 +8,8 @@ take and return.
 """
 
 from tractexp.errors import DATA, TASK, Unfit, UserError, check_choice, check_distinct, check_range
-from tractexp.identification.loss import Loss
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Iterative, Optimizer
+from tractexp.inference.loss import Loss
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.kernel.stencil import Stencil
 from tractexp.model import sites

@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identification import surprises
-from tractexp.identification.descent import MOST_NUMBERS
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.model_error import ModelError
-from tractexp.identification.observed import Observed
-from tractexp.identification.problem import Problem
-from tractexp.identification.sandwich import off_walls
-from tractexp.identification.separable import Sensitivities, SeparableBasis
-from tractexp.identification.surprises import PER_EVENT, SMALLEST_P, tail
+from tractexp.inference import surprises
+from tractexp.inference.descent import MOST_NUMBERS
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.model_error import ModelError
+from tractexp.inference.observed import Observed
+from tractexp.inference.problem import Problem
+from tractexp.inference.sandwich import off_walls
+from tractexp.inference.separable import Sensitivities, SeparableBasis
+from tractexp.inference.surprises import PER_EVENT, SMALLEST_P, tail
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:

@@ -6,11 +6,11 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
-from tractexp.identification.information import SHARE
 from tractexp.identification.plan import DipShape, Forecast, over_depth
-from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import BOUND, EDGE, HELD, UNIDENTIFIED, WEAK, WITHIN, shown, size
+from tractexp.inference.information import SHARE
+from tractexp.inference.problem import Problem
 from tractexp.provenance import again
 from tractexp.record.change import runs
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.identification.descent import MOST_NUMBERS, Rows, descend
-from tractexp.identification.information import Information
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.separable import Sensitivities
 from tractexp.identification.uncertainty import Uncertainty
+from tractexp.inference.descent import MOST_NUMBERS, Rows, descend
+from tractexp.inference.information import Information
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.separable import Sensitivities
 
 DISAGREES = 0.01  # p-value below which an event does not fit with the others
 SUSPECTS = 4  # events that are fitted by themselves, and the others without them

@@ -20,14 +20,14 @@ import numpy as np
 
 from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
-from tractexp.identification.blocks import blocks_of, exceeds
-from tractexp.identification.descent import Descent
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.local_minima import along_least_certain, distinct, explored, screened
-from tractexp.identification.observed import Observed
-from tractexp.identification.prior import held_in_words
-from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
+from tractexp.inference.blocks import blocks_of, exceeds
+from tractexp.inference.descent import Descent
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.local_minima import along_least_certain, distinct, explored, screened
+from tractexp.inference.observed import Observed
+from tractexp.inference.prior import held_in_words
+from tractexp.inference.problem import Problem
 from tractexp.noise.color import FEWEST, SMALLEST, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 

@@ -9,12 +9,11 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from tractexp.errors import check_choice, check_range
+from tractexp.inference.loss import REFUSED
 from tractexp.parameter import Box
 from tractexp.plugin import Plugin
 
 __all__ = ["REFUSED", "Box", "Evaluate", "Iterative", "Optimizer"]
-
-REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
 
 
 class Evaluate(Protocol):

@@ -11,10 +11,10 @@ import numpy as np
 
 from tractexp.domain import PHASORS, Domain, domain_of
 from tractexp.errors import TASK, UserError, among, check_range
-from tractexp.identification.information import Information
-from tractexp.identification.likelihood import Likelihood, before_the_event
-from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import LEVEL
+from tractexp.inference.information import Information
+from tractexp.inference.likelihood import Likelihood, before_the_event
+from tractexp.inference.problem import Problem
 from tractexp.noise import Autoregression, Noise
 from tractexp.record import Event
 

@@ -16,10 +16,10 @@ from tractexp.domain.playback import relative_error
 from tractexp.errors import MODEL, UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
-from tractexp.identification.model_error import ModelError, in_percent, model_error
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.identification.verdict import EDGE
+from tractexp.inference.model_error import ModelError, in_percent, model_error
+from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build

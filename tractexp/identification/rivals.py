@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
 from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import IDENTIFIED, WITHIN, ParameterVerdict, size
+from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
 from tractexp.plugin import discover, get

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp import files
-from tractexp.identification.blocks import LEVEL
-from tractexp.identification.descent import CENTRAL
-from tractexp.identification.information import Information
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.residual_tests import jarque_bera, ljung_box
-from tractexp.identification.sandwich import scatter
-from tractexp.identification.separable import Sensitivities
 from tractexp.identification.verdict import ParameterVerdict, judge
+from tractexp.inference.blocks import LEVEL
+from tractexp.inference.descent import CENTRAL
+from tractexp.inference.information import Information
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.residual_tests import jarque_bera, ljung_box
+from tractexp.inference.sandwich import scatter
+from tractexp.inference.separable import Sensitivities
 from tractexp.noise.color import FEWEST
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.identification.information import SHARE, Information
+from tractexp.inference.information import SHARE, Information
 
 IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "identified",

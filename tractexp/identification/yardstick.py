@@ -12,8 +12,8 @@ import numpy as np
 from tractexp.domain import domain_of
 from tractexp.errors import UserError
 from tractexp.identification.linear_network import best
-from tractexp.identification.model_error import in_percent
 from tractexp.identification.result import TRAIN, Fit, model_errors
+from tractexp.inference.model_error import in_percent
 from tractexp.wording import counted
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
-from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.evidence import (
     CHOSEN,
     FITTED,
@@ -22,6 +21,7 @@ from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.verdict import TIED
+from tractexp.inference.chance import by_draws
 from tractexp.report.predicted import BAR, predicted
 from tractexp.wording import joined
 

@@ -1,8 +1,8 @@
 """Where the base model disagrees with the records, and the noise by which that is judged."""
 
 from tractexp.blocks import Report
-from tractexp.discrepancy.chance import by_draws
 from tractexp.discrepancy.investigate import Findings
+from tractexp.inference.chance import by_draws
 from tractexp.wording import in_words
 
 

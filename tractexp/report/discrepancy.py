@@ -13,7 +13,7 @@ from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity, described, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places

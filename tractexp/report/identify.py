@@ -11,13 +11,13 @@ from tractexp.blocks import Report, Table, style
 from tractexp.blocks.chart import Chart
 from tractexp.identification.agreement import EventAgreement
 from tractexp.identification.estimate import EstimationResult
-from tractexp.identification.model_error import in_percent
-from tractexp.identification.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.identification.result import by_event
 from tractexp.identification.search import REFUSED, History
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED, TRADES, brief
 from tractexp.identification.yardstick import poles_in_words
+from tractexp.inference.model_error import in_percent
+from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
 from tractexp.record.identity import Identity, described, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart

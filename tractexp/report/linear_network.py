@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from tractexp.blocks import Report, Table
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.model_error import in_percent
 from tractexp.provenance import command
 from tractexp.record.identity import title_of
 from tractexp.report.identify import all_curves, error_table

@@ -13,7 +13,7 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
 from tractexp.domain import PHASORS, WAVES
 from tractexp.identification.plan import INERTIA, ChosenEvent, Forecast, Needed, column
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.wording import as_sentence
 
 DEPTH, DURATION, RATE = "depth", "duration [s]", "samples per second"

@@ -10,7 +10,7 @@ from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
 from tractexp.discrepancy.prediction import ErrorPredictions, PredictedTerm, PredictionError
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.model_error import in_percent
 from tractexp.wording import joined
 
 ADDED, TIED, OTHER, BASE = PALETTE[2], PALETTE[4], PALETTE[0], MEASURED

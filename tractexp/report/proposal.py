@@ -13,7 +13,7 @@ from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
-from tractexp.identification.model_error import in_percent
+from tractexp.inference.model_error import in_percent
 from tractexp.report.extended import interval
 from tractexp.wording import as_sentence, in_words, joined, percent, with_error
 

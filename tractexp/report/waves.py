@@ -8,8 +8,8 @@ import numpy as np
 from tractexp.blocks import style
 from tractexp.blocks.chart import Chart
 from tractexp.domain.playback import AFTER
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit
+from tractexp.inference.problem import Problem
 from tractexp.record import WaveEvent
 from tractexp.report.events import EXCESS, WITHIN
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagined
 from tractexp.discrepancy.next_event.same import Same, same
 from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, seen, sided
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.records import Records
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.records import Records
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
 from tractexp.domain import PHASORS, Domain
+from tractexp.inference.context import Context
 from tractexp.model.drive import Drive, Excitation, WaveformDrive
 from tractexp.noise import Autoregression, Noise
 from tractexp.noise.random_walk import Load

@@ -4,16 +4,16 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import base_fit
-from tractexp.discrepancy.catalogue import Catalogue, catalogue
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.fitting import Names, Start, refit
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.records import Records, check_events
 from tractexp.domain import domain_of
 from tractexp.errors import TASK, UserError
+from tractexp.inference.base_fit import base_fit
+from tractexp.inference.catalogue import Catalogue, catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.effort import Effort
+from tractexp.inference.fitting import Names, Start, refit
+from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
 from tractexp.wording import joined

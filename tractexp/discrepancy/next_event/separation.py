@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.linear import linearised, slopes, two_sided
-from tractexp.discrepancy.linearization import resting
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
+from tractexp.inference.linear import linearised, slopes, two_sided
+from tractexp.inference.linearization import resting
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 

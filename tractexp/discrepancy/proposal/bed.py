@@ -8,12 +8,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from tractexp.discrepancy.catalogue import Candidate, Catalogue
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.coordinates import Coordinates
-from tractexp.discrepancy.kernels import Family, Key
 from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, pick_of, shape_of, size_of
+from tractexp.inference.catalogue import Candidate, Catalogue
+from tractexp.inference.context import Context
+from tractexp.inference.coordinates import Coordinates
+from tractexp.inference.kernels import Family, Key
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter

@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fitting import Refit, refit
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
 from tractexp.discrepancy.proposal.refit import JUDGED, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit, refit
 from tractexp.noise import Noise
 
 

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.gap import gap, pushed, share_gone
 from tractexp.discrepancy.held_out import Assessment, carried
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import JUDGED, TermFits
-from tractexp.discrepancy.records import Records
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit
+from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 

@@ -5,9 +5,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.discrepancy.base_fit import BaseFit
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.fitting import Refit
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.precision import ParameterEstimate
@@ -17,6 +15,8 @@ from tractexp.discrepancy.proposal.judge import TermAssessment, term_assessments
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
+from tractexp.inference.base_fit import BaseFit
+from tractexp.inference.fitting import Refit
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import joined

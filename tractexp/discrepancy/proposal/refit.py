@@ -10,13 +10,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
-from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import place, values_of, with_terms
 from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, terms
 from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore, scores
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
+from tractexp.inference.linear import linearised
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states

@@ -11,11 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.linear import linearised
 from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.linear import linearised
 from tractexp.noise import Noise
 
 STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken

@@ -10,7 +10,7 @@ from typing import Any
 from tractexp import files, provenance
 from tractexp.api.setup import Setup
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 from tractexp.plugin import build, discover, get
 from tractexp.progress import counting
 from tractexp.record import detect

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.estimate import estimate
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, parts, respond
 from tractexp.identification.search import search
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.identification.verdict import IDENTIFIED
+from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
 from tractexp.model.operations import Cost, Operations, count
 from tractexp.plugin import build

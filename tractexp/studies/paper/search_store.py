@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from tractexp import files, store
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import History, Limits, SearchResult
+from tractexp.inference.problem import Problem
 from tractexp.plugin import build
 from tractexp.store import DAMAGED, SEARCHES
 

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import Limits, SearchResult, search
+from tractexp.inference.problem import Problem
 from tractexp.plugin import build
 from tractexp.studies.paper.search_store import SearchStore
 from tractexp.workers import Workers

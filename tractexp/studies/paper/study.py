@@ -10,9 +10,9 @@ import numpy as np
 
 from tractexp.errors import DATA, TASK, UserError
 from tractexp.identification.generalization import by_depth, mean_residual
-from tractexp.identification.problem import Problem
 from tractexp.identification.result import Fit, respond
 from tractexp.identification.search import Limits, SearchResult
+from tractexp.inference.problem import Problem
 from tractexp.record import Event
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys

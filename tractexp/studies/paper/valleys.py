@@ -4,9 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identification.descent import descend
-from tractexp.identification.problem import Problem
 from tractexp.identification.search import REFUSED
+from tractexp.inference.descent import descend
+from tractexp.inference.problem import Problem
 
 SAME = 1.02  # descents that end within so many times of each other are in one valley
 GAIN = 1e-6  # of the lowest objective: a descent's step that gains less ends it

@@ -11,6 +11,8 @@ from tractexp.model.drive import Drive
 from tractexp.plugin import Plugin
 from tractexp.record import Event
 
+REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
+
 
 @dataclass(frozen=True, kw_only=True)
 class Loss(Plugin):

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identification.blocks import blocks_of, quantile
-from tractexp.identification.descent import central_differences
-from tractexp.identification.information import STRUCTURAL, Information
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.separable import Sensitivities
+from tractexp.inference.blocks import blocks_of, quantile
+from tractexp.inference.descent import central_differences
+from tractexp.inference.information import STRUCTURAL, Information
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.separable import Sensitivities
 
 ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
 WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out, and takes nothing from a residual

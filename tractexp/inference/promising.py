@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.linear import finite, linearised
+from tractexp.inference.context import Context
+from tractexp.inference.linear import finite, linearised
 from tractexp.noise import Noise
 
 LEAST = 1e-9  # of the deviance: a change below that is none

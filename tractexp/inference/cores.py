@@ -15,8 +15,8 @@ from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
-from tractexp.discrepancy.effort import Effort
 from tractexp.errors import UserError
+from tractexp.inference.effort import Effort
 from tractexp.workers import end_with_parent
 
 FORKS = sys.platform == "linux"  # elsewhere it is not safe, or not there

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.injection import PUSHES, Injection
 from tractexp.domain import domain_of
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
+from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.injection import PUSHES, Injection
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.problem import Problem
 from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose

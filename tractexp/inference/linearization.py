@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fit_effort import BOUND_MARGIN
-from tractexp.discrepancy.fitting import Refit
-from tractexp.discrepancy.injection import PUSHES, perturbations
-from tractexp.discrepancy.linear import slopes, two_sided
-from tractexp.discrepancy.score_test import CandidateColumn, ScoreTest
+from tractexp.inference.context import Context
+from tractexp.inference.fit_effort import BOUND_MARGIN
+from tractexp.inference.fitting import Refit
+from tractexp.inference.injection import PUSHES, perturbations
+from tractexp.inference.linear import slopes, two_sided
+from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 

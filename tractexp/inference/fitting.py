@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp import store
-from tractexp.discrepancy import fit_effort
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.promising import promising
-from tractexp.identification.descent import descend
+from tractexp.inference import fit_effort
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.descent import descend
+from tractexp.inference.promising import promising
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct
 

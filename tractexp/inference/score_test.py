@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.catalogue import Candidate
-from tractexp.identification import surprises
-from tractexp.identification.problem import Problem
-from tractexp.identification.surprises import DISTINCT, PER_EVENT, SMALLEST_P
+from tractexp.inference import surprises
+from tractexp.inference.catalogue import Candidate
+from tractexp.inference.problem import Problem
+from tractexp.inference.surprises import DISTINCT, PER_EVENT, SMALLEST_P
 from tractexp.noise.span import spanned
 
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.identification.problem import Problem
-from tractexp.identification.separable import Sensitivities
+from tractexp.inference.problem import Problem
+from tractexp.inference.separable import Sensitivities
 from tractexp.model.drive import Drive
 from tractexp.noise.model import Noise
 from tractexp.noise.quiet import louder

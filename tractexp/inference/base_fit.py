@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.fitting import Refit, refit
-from tractexp.discrepancy.noise_in_quiet import QuietNoise, white
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.local_minima import valleys
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.local_minima import valleys
+from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.noise import Noise
 
 ROUNDS = 2  # of noise and fit in turn

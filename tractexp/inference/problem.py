@@ -10,8 +10,7 @@ import numpy as np
 
 from tractexp.domain import Domain, domain_of
 from tractexp.errors import MODEL, UserError, among, check_range, setting
-from tractexp.identification.loss import Loss
-from tractexp.identification.search import REFUSED
+from tractexp.inference.loss import REFUSED, Loss
 from tractexp.model.drive import Drive
 from tractexp.model.model import CLASSICAL, MOST_SUBSTEPS, Model
 from tractexp.model.parts import COMPARED, Effect

@@ -10,8 +10,8 @@ import functools
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
 from tractexp.domain.wave_errors import off_neighbors
+from tractexp.inference.context import Context
 
 MOST = 4  # samples of one channel and event that are the least smooth
 AROUND = 3  # samples on either side that a filter may spread a jump over

@@ -5,9 +5,9 @@ What a model seems to miss in a wrong valley is not missing, and what is estimat
 
 import numpy as np
 
-from tractexp.identification.descent import Descent
-from tractexp.identification.likelihood import Likelihood
-from tractexp.identification.problem import Problem
+from tractexp.inference.descent import Descent
+from tractexp.inference.likelihood import Likelihood
+from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
 
 SCREENED = 4096  # points of the box that are simulated

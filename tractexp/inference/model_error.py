@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.domain import Playback
-from tractexp.identification.blocks import LENGTH, reach
+from tractexp.inference.blocks import LENGTH, reach
 from tractexp.noise.random_walk import SLOW, without_drift, without_slow
 from tractexp.record import Event
 

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from tractexp import store
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.cores import each_apart
-from tractexp.discrepancy.linearization import Linearization, rich_residuals
-from tractexp.discrepancy.noise_in_quiet import QuietNoise
-from tractexp.discrepancy.score_test import ScoreTest
-from tractexp.identification import surprises
-from tractexp.identification.surprises import SMALLEST_P, Scale, tail
+from tractexp.inference import surprises
+from tractexp.inference.context import Context
+from tractexp.inference.cores import each_apart
+from tractexp.inference.linearization import Linearization, rich_residuals
+from tractexp.inference.noise_in_quiet import QuietNoise
+from tractexp.inference.score_test import ScoreTest
+from tractexp.inference.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
 from tractexp.wording import in_words
 

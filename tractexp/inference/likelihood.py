@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.identification.descent import Descent, central_differences, descend
-from tractexp.identification.prior import departures
-from tractexp.identification.problem import Problem
-from tractexp.identification.separable import Sensitivities, SeparableColumns
+from tractexp.inference.descent import Descent, central_differences, descend
+from tractexp.inference.prior import departures
+from tractexp.inference.problem import Problem
+from tractexp.inference.separable import Sensitivities, SeparableColumns
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event

@@ -3,23 +3,26 @@
 import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from tractexp import store
-from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.discrepancy.coordinates import Coordinates
-from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.effort import Effort
-from tractexp.discrepancy.kernels import Family, Kernels, Key
-from tractexp.discrepancy.records import Records
 from tractexp.domain import Domain, domain_of
-from tractexp.identification.problem import Problem
-from tractexp.identification.separable import SeparableColumns
+from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.coordinates import Coordinates
+from tractexp.inference.effort import Effort
+from tractexp.inference.kernels import Family, Kernels, Key
+from tractexp.inference.problem import Problem
+from tractexp.inference.records import Records
+from tractexp.inference.separable import SeparableColumns
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.record import Event
+
+if TYPE_CHECKING:
+    from tractexp.discrepancy.criteria import Criteria
 
 
 def finite(changes: np.ndarray) -> np.ndarray:
@@ -36,13 +39,13 @@ class Context:
     records: Records
     kernels: Kernels
     coordinates: Coordinates
-    criteria: Criteria
+    criteria: "Criteria"
     effort: Effort
 
     @classmethod
     def of(
         cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
-        fixed: Mapping[str, float], criteria: Criteria, effort: Effort, substeps: int | None = None,
+        fixed: Mapping[str, float], criteria: "Criteria", effort: Effort, substeps: int | None = None,
         family: type[Family] = Family,
     ) -> "Context":  # fmt: skip
         """A context for these records; the load is simulated behind the recorder's window, where there is one."""

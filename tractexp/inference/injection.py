@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.identification.surprises import windows
+from tractexp.inference.surprises import windows
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 
 if TYPE_CHECKING:
-    from tractexp.discrepancy.context import Context
+    from tractexp.inference.context import Context
 
 PUSHES = "injection"
 SOURCE = "a unit push, for the tangent space only"

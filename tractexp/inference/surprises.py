@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one

@@ -7,9 +7,9 @@ import functools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from tractexp.discrepancy.recorder_window import RecorderWindow
 from tractexp.domain import domain_of
 from tractexp.errors import DATA, UserError
+from tractexp.inference.recorder_window import RecorderWindow
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context
-from tractexp.discrepancy.jumps import jumps
-from tractexp.identification.observed import Observed
+from tractexp.inference.context import Context
+from tractexp.inference.jumps import jumps
+from tractexp.inference.observed import Observed
 from tractexp.noise import Noise
 from tractexp.noise.random_walk import walk_of_load
 

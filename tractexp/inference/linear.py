@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.discrepancy.context import Context, finite
+from tractexp.inference.context import Context, finite
 from tractexp.noise import Noise
 
 STEP = 1e-4  # of a coordinate's range

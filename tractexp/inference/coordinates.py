@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.discrepancy.catalogue import Catalogue
-from tractexp.identification.problem import Problem
+from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.problem import Problem
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ residual remembers (`blocks`), counts as much as one row of the prior.
 
 import numpy as np
 
-from tractexp.identification.problem import Problem
+from tractexp.inference.problem import Problem
 
 
 def departures(problem: Problem, values: np.ndarray) -> np.ndarray:

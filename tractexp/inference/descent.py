@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.identification.separable import NOT_SEPARABLE, NormalMatrix, SeparableColumns
+from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, SeparableColumns
 
 # (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot be simulated
 Rows = Callable[[np.ndarray, np.ndarray], np.ndarray]
