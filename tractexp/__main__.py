@@ -122,6 +122,7 @@ def _run(arguments: list[str]) -> int:
     import hydra
 
     from tractexp.choices import CONF
+    from tractexp.compat.hydra_versions import behavior
     from tractexp.config import register
     from tractexp.overrides import overrides
     from tractexp.provenance import started
@@ -134,19 +135,23 @@ def _run(arguments: list[str]) -> int:
         sys.argv[1:] = overrides(arguments)  # where Hydra reads them
     ended: list[Exception] = []
 
-    @hydra.main(version_base="1.3", config_path=str(CONF), config_name="config")
-    def job(config: object) -> None:
+    @hydra.main(**behavior(), config_path=str(CONF), config_name="config")
+    def job(config: object) -> object:
         from hydra.core.hydra_config import HydraConfig
         from hydra.types import RunMode
 
         from tractexp.cli.run import run
         from tractexp.sweep.job import run_job
 
+        if HydraConfig.get().mode == RunMode.MULTIRUN:
+            with explained():
+                return run_job(config)
         try:
             with explained():
-                (run_job if HydraConfig.get().mode == RunMode.MULTIRUN else run)(config)
+                run(config)
         except Exception as error:  # raised again below, beyond what Hydra would print about it
             ended.append(error)
+        return None
 
     with explained():
         job()

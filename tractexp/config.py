@@ -8,10 +8,9 @@ from typing import Any
 from hydra.core.config_store import ConfigStore
 from hydra.core.plugins import Plugins
 from hydra.plugins.search_path_plugin import SearchPathPlugin
-from omegaconf import OmegaConf
 
 from tractexp import plugin
-from tractexp.compat import hydra_config_store, hydra_plugins
+from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
 from tractexp.schema import Config
 
 
@@ -41,8 +40,9 @@ def register() -> None:
     Plugins.instance().register(PluginSearchPath)
     for cls in (Grid, Cores):
         hydra_plugins.admit(cls)
-    OmegaConf.register_new_resolver("fingerprint", _fingerprint, replace=True)
-    OmegaConf.register_new_resolver("folder_name", _folder_name, replace=True)
+    register_resolver = hydra_versions.register_resolver()
+    register_resolver("fingerprint", _fingerprint, replace=True)
+    register_resolver("folder_name", _folder_name, replace=True)
 
 
 def _configured(group: str, name: str) -> bool:

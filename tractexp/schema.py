@@ -37,6 +37,13 @@ class TrackingConfig:
 
 
 @dataclass
+class SweepConfig:
+    """What a job of a sweep is to somebody who optimizes over jobs, such as Optuna."""
+
+    returns: list[str] | None = None  # metrics, as MLflow shows them; null: search_objective
+
+
+@dataclass
 class Config:
     """One run. The groups hold the chosen plugins' settings."""
 
@@ -50,11 +57,12 @@ class Config:
     time_limit: float | None = None  # s
     target: float | None = None  # objective at which the search may stop
     tracking: TrackingConfig = field(default_factory=TrackingConfig)
+    sweep: SweepConfig = field(default_factory=SweepConfig)
 
 
 def check(config: Mapping[str, Any]) -> None:
     """Raise `UserError` for a key nobody reads (as `+sede=3` makes one), one taken out, or a value out of range."""
-    sections = {"model.": ModelConfig, "tracking.": TrackingConfig}
+    sections = {"model.": ModelConfig, "tracking.": TrackingConfig, "sweep.": SweepConfig}
     for where, kind in {"": Config, **sections}.items():
         part = config.get(where[:-1]) if where else config
         keys = [item.name for item in dataclasses.fields(kind)]

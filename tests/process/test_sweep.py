@@ -469,15 +469,6 @@ def test_jobs_that_were_interrupted_are_counted_apart_from_those_that_failed(tmp
     assert metrics(jobs) == {"jobs": 4, "jobs_finished": 1, "jobs_failed": 1, "jobs_interrupted": 2}
 
 
-def test_the_objective_of_a_job_is_told_from_that_of_its_search(tmp_path):
-    from tractexp.sweep.status import objective
-
-    for told, ended in (({"objective": 1.0, "search": {"objective": 2.0}}, 2.0), ({"objective": 1.0}, 1.0)):
-        (tmp_path / "result.json").write_text(json.dumps(told))
-        assert (objective(tmp_path), objective(tmp_path, of_search=True)) == (1.0, ended)
-    assert objective(tmp_path / "nowhere", of_search=True) is None
-
-
 def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
     (tmp_path / "sweep").mkdir()
     for name in ("comparison.html", "comparison.json", "multirun.yaml", "notes.txt"):
@@ -492,7 +483,7 @@ def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
 
 def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(tmp_path):
     from tractexp.sweep.job import SweepJob
-    from tractexp.sweep.sweeper import place
+    from tractexp.sweep.placing import place
 
     jobs = [SweepJob({"seed": k}, {}, (), f"job {k}", "", Path()) for k in range(4)]
     (tmp_path / "0" / ".hydra").mkdir(parents=True)  # a kill before it said what it is

@@ -10,11 +10,14 @@ from pathlib import Path
 
 import pytest
 
+from tractexp.errors import UserError
 from tractexp.progress import FIRST_LINE
 from tractexp.sweep import launcher, progress
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.output import printing_to
-from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, read
+from tractexp.sweep.placing import place
+from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, objective, read, returned
+from tractexp.tracking.sweepfile import folder_of
 
 
 def job(folder: Path, *overrides: str, seed: int = 0) -> SweepJob:
@@ -24,10 +27,8 @@ def job(folder: Path, *overrides: str, seed: int = 0) -> SweepJob:
 
 def ended(job: SweepJob, status: str = FINISHED, value: float | None = None) -> Status:
     """The end of a job, as its worker leaves it."""
-    job.folder.mkdir(parents=True, exist_ok=True)
-    if value is not None:
-        (job.folder / "result.json").write_text(json.dumps({"objective": value}))
-    end = replace(job.status, status=status, seconds=2.0)
+    metrics = {} if value is None else {"search_objective": value}
+    end = replace(job.status, status=status, seconds=2.0, metrics=metrics)
     end.write(job.folder)
     return end
 
@@ -98,11 +99,11 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
     shown = Console(file=StringIO(), force_terminal=True, width=100)
     monkeypatch.setattr(progress, "console", lambda: shown)
     with progress.progress(jobs) as note:
-        for one, status in zip(jobs[:3], (FINISHED, FINISHED, FAILED), strict=True):
+        for one, status in zip(jobs[:3], (FINISHED, FAILED, FINISHED), strict=True):
             note(one, ended(one, status, 2.0 - one.config["seed"]))
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.file.getvalue())
     assert "3/4" in text
-    assert re.search(r"pso c1=1 +best 0\.0000e\+00 +1 jobs\s+pso c1=0 +best 1\.0000e\+00 +2 jobs", text)
+    assert re.search(r"pso c1=1 +best 0\.0000e\+00 +1 jobs\s+pso c1=0 +best 2\.0000e\+00 +2 jobs", text)
     assert "1 failed, about" in text
     assert "0 failed" not in text
 
@@ -137,3 +138,50 @@ def test_jobs_in_threads_print_into_their_own_files_and_what_is_beside_them_does
     assert [output.getvalue() for output in outputs] == ["in a\nerr a\n", "in b\nerr b\n"]
     print("after")
     assert capsys.readouterr() == ("beside\nafter\n", "")
+
+
+def test_a_job_returns_where_its_search_ended_or_what_is_named():
+    measured = {"search_objective": 2e-3, "objective": 3e-5, "search_simulations_to_floor": None}
+    assert returned(measured, None) == 2e-3
+    assert returned(measured, ["objective"]) == 3e-5
+    assert returned(measured, ["objective", "search_simulations_to_floor"]) == [3e-5, float("inf")]
+    assert returned({"probability": 0.5}, None) is None
+    with pytest.raises(UserError, match=r"sweep\.returns names objectiv, .*did you mean 'objective'\?"):
+        returned(measured, ["objectiv"])
+
+
+def test_what_a_job_measured_comes_back_and_of_one_that_failed_nothing_counts(jobs):
+    ended(jobs[0], value=3.0)
+    ended(jobs[1], FAILED, 2.0)
+    assert [objective(one.folder) for one in jobs[:3]] == [3.0, None, None]
+
+
+def test_jobs_have_the_folders_that_are_named_and_keep_them(tmp_path):
+    jobs = [replace(job(Path(), seed=k), subdir=f"pso/{k}") for k in range(3)]
+    placed = place(jobs, tmp_path)
+    assert [one.folder for one in placed] == [tmp_path / "pso" / str(k) for k in range(3)]
+    assert {one.sweep for one in placed} == {tmp_path}
+    ended(placed[1])
+    (tmp_path / "sweep.json").write_text('{"run": "7"}')
+    assert folder_of(placed[1].folder) == tmp_path
+    again = place([replace(jobs[1], subdir="elsewhere"), *jobs[:1]], tmp_path)  # it was done there
+    assert [one.name for one in again] == ["pso/1", "pso/0"]
+
+
+@pytest.mark.parametrize(
+    ("subdirs", "sentence"),
+    [
+        (("pso", "pso"), "hydra.sweep.subdir=pso is the folder of two jobs; name all that differs"),
+        (("pso", "pso/1"), "hydra.sweep.subdir=pso/1 is the folder of two jobs"),
+        (("pso/1", "pso"), "hydra.sweep.subdir=pso is the folder of two jobs"),
+        (("../pso",), "does not lie below the sweep's folder"),
+        ((".",), "does not lie below the sweep's folder"),
+        (("mine",), "holds files that are not this job's"),
+    ],
+)
+def test_a_folder_that_is_not_the_jobs_alone_is_refused(subdirs, sentence, tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "notes.txt").write_text("keep")
+    jobs = [replace(job(Path(), seed=k), subdir=name) for k, name in enumerate(subdirs)]
+    with pytest.raises(UserError, match=re.escape(sentence)):
+        place(jobs, tmp_path)

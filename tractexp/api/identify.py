@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
 FIXED = "fixed"
 FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
+FLOOR = 1.01  # times the estimate's objective: from there a search has found what the noise leaves
 MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 
@@ -462,6 +463,7 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
 
     result, of_search = fit.result, ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
     metrics = {key: getattr(result, key) for key in of_search} | {f"search_{k}": result.search[k] for k in of_search}
+    metrics["search_simulations_to_floor"] = _simulations_to_floor(fit)
     metrics["model_error"] = result.model_error["value"]
     if result.model_error["held_out"]:
         metrics["model_error_held_out"] = result.model_error["held_out"]["value"]
@@ -487,3 +489,10 @@ def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, 
         "metrics": metrics, "curves": curves, "seconds": result.seconds, "description": fit.headline,
         "records": result.records, "model": job.folder / "result.json" if predictor else None,
     }  # fmt: skip
+
+
+def _simulations_to_floor(fit: Identification) -> float:
+    """After how many simulations the search was within 1 % of the estimate's objective; infinite where it never was."""
+    history = fit.search_result.history
+    there = np.flatnonzero(history.objective <= FLOOR * fit.result.objective)
+    return float(history.simulations[there[0]]) if there.size else float("inf")

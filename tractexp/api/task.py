@@ -28,7 +28,7 @@ LOAD = (
 )  # fmt: skip
 # Arguments that the model's configuration holds
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")
-ALWAYS = ("task", "experiment", "seed", "tracking", "hydra")  # open to every task
+ALWAYS = ("task", "experiment", "seed", "tracking", "sweep", "hydra")  # open to every task
 LABEL = "load"  # the tag with station, load and dips
 NAMED = ("optimizer", "data")  # choices that a run is named after anyway
 OMITTED: Any = object()  # of an argument: its default stands
@@ -193,6 +193,7 @@ class Job:
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
     in_sweep: bool = False  # one of many: what only a person looks at may be left out
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
+    measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
     begin: Callable[[], None] = lambda: None  # before the first result is written: those of an earlier run go
 
     @functools.cached_property
@@ -311,6 +312,7 @@ class Job:
         `values` are identified parameters; `content` are further fields of `tractexp.tracking.TrackedRun`.
         """
         node = self.config["tracking"]
+        self.measured.update(content.get("metrics", {}))
         if not node["enabled"]:
             return
         from tractexp import tracking
@@ -347,7 +349,7 @@ class Job:
         entry = None
         try:
             entry = save(self.folder, run, self.store)
-            if self.in_sweep and sweepfile.waits(self.folder.parent):
+            if self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder)):
                 return
             run_id = self._logger.log(entry.run) if "_logger" in self.__dict__ else tracking.log(entry.run, self.store)
             entry.logged(run_id)

@@ -5,7 +5,7 @@ does not begin with `hydra_plugins.`, and then looks the class up by its `__modu
 admitted class says it lives in `hydra_plugins.tractexp`, and there is a module of that name that holds it.
 Why not as Hydra's manual has it: a `hydra_plugins` folder in our package would be searched and imported at the start of
 every Hydra program of the environment, not just ours.
-Since: Hydra 1.0; looked at in 1.3.2 to 1.3.8.
+Since: Hydra 1.0; looked at in 1.3.2 to 1.4.0rc3.
 Upstream: facebookresearch/hydra#1554, #3015; facebookresearch/hydra#3449 (merged for the version after 1.3) finds
 plugins by entry points instead of by namespace.
 When mended: drop this module, give `_target_` the classes' own paths, and call `Plugins.instance().register(cls)`.

@@ -6,10 +6,26 @@ composed one afterwards, which is what Hydra does with it too, in well under a h
 
 import copy
 import functools
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf, open_dict, read_write
+
+BY_NUMBER = "${hydra.job.num}"  # `hydra.sweep.subdir` as it is by default
+
+
+@dataclass(frozen=True)
+class Composed:
+    """One job of a sweep, resolved. `subdir` is "" where its number is its folder's name.
+
+    `hydra` is Hydra's own whole configuration of the job where something of the user's reads it: a callback, a logger.
+    """
+
+    config: Mapping[str, Any]
+    choices: Mapping[str, str]
+    subdir: str = ""
+    hydra: DictConfig | None = None
 
 
 class Composer:
@@ -22,19 +38,32 @@ class Composer:
         self._parser = OverridesParser.create(config_loader=loader)
         self._parsed = functools.cache(lambda text: self._parser.parse_override(text))
         self._is_group = functools.cache(lambda key: bool(loader.get_group_options(key)))
-        self._base = functools.cache(self._compose)
+        self._base = functools.cache(self._composed_base)
+        self._subdir = OmegaConf.to_container(master.hydra.sweep, resolve=False)["subdir"]  # type: ignore[index, call-overload]
+        self._reads_hydra = bool(master.hydra.callbacks) or master.hydra.job_logging.get("root") is not None
 
-    def __call__(self, overrides: Sequence[str]) -> tuple[dict[str, Any], dict[str, str]]:
-        """The plain, resolved configuration of the job with these overrides, and the choices made in its groups."""
-        values = [text for text in overrides if self._is_value(text)]
-        task, choices = self._base(tuple(text for text in overrides if text not in values))
+    def __call__(self, overrides: Sequence[str], number: int) -> Composed:
+        """The job of this number with these overrides."""
+        texts = tuple(overrides)
+        if self._reads_hydra or self._subdir != BY_NUMBER:
+            return self._as_hydra_composes(texts, number)
+        values = [text for text in texts if self._is_value(text)]
+        whole, task = self._base(tuple(text for text in texts if text not in values))
+        _number(whole, number)  # what ${hydra:job.num} refers to
         if values:
             task = copy.deepcopy(task)
         for text in values:
             override = self._parsed(text)
             OmegaConf.update(task, override.key_or_group, override.value(), merge=True)
-        plain: Any = OmegaConf.to_container(task, resolve=True)
-        return plain, choices
+        return Composed(_plain(task), dict(whole.hydra.runtime.choices))
+
+    def _as_hydra_composes(self, overrides: tuple[str, ...], number: int) -> Composed:
+        """The job whole, where its folder's name or somebody's callback may ask for any part of it."""
+        whole = self._composed(overrides)
+        _number(whole, number)
+        subdir = "" if self._subdir == BY_NUMBER else str(whole.hydra.sweep.subdir)
+        hydra = whole if self._reads_hydra else None
+        return Composed(_plain(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra)
 
     def _is_value(self, text: str) -> bool:
         """Whether an override changes one plain value that is there already."""
@@ -42,13 +71,31 @@ class Composer:
         added = override.is_add() or override.is_force_add() or override.is_delete()
         return not (added or self._is_group(override.key_or_group) or override.is_hydra_override())
 
-    def _compose(self, overrides: Iterable[str]) -> tuple[DictConfig, dict[str, str]]:
-        from hydra.core.hydra_config import HydraConfig
+    def _composed_base(self, overrides: tuple[str, ...]) -> tuple[DictConfig, DictConfig]:
+        whole = self._composed(overrides)
+        return whole, _without_hydra(whole)
 
-        whole = self.loader.load_sweep_config(self.master, list(overrides))
-        HydraConfig.instance().set_config(whole)  # what ${hydra:...} refers to
-        choices = dict(whole.hydra.runtime.choices)
-        task = copy.deepcopy(whole)
-        with read_write(task), open_dict(task):
-            del task["hydra"]
-        return task, choices
+    def _composed(self, overrides: Iterable[str]) -> DictConfig:
+        return self.loader.load_sweep_config(self.master, list(overrides))
+
+
+def _number(whole: DictConfig, number: int) -> None:
+    """Give a job its number, and let `${hydra:...}` refer to it."""
+    from hydra.core.hydra_config import HydraConfig
+
+    with open_dict(whole), read_write(whole):
+        whole.hydra.job.num = number
+        whole.hydra.job.id = f"{whole.hydra.job.name}_{number}"
+    HydraConfig.instance().set_config(whole)
+
+
+def _without_hydra(whole: DictConfig) -> DictConfig:
+    task = copy.deepcopy(whole)
+    with read_write(task), open_dict(task):
+        del task["hydra"]
+    return task
+
+
+def _plain(task: DictConfig) -> dict[str, Any]:
+    plain: Any = OmegaConf.to_container(task, resolve=True)
+    return plain

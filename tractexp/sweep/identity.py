@@ -14,8 +14,8 @@ from tractexp.files import located
 
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
-    """SHA-256 of a job's settings. Where it is logged does not belong to what it does."""
-    settings = {key: value for key, value in config.items() if key != "tracking"}
+    """SHA-256 of a job's settings. Where it is logged and what it returns do not belong to what it does."""
+    settings = {key: value for key, value in config.items() if key not in ("tracking", "sweep")}
     return _digest(json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode())
 
 

@@ -13,9 +13,10 @@ from tractexp.api.task import Job, variant
 from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
+from tractexp.sweep.compose import Composed
 from tractexp.sweep.output import printing_to
-from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
-from tractexp.tracking.sweepfile import parent_of
+from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, returned
+from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 
@@ -31,21 +32,44 @@ class SweepJob:
     inputs: str
     folder: Path
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}
+    subdir: str = ""  # the folder's name within the sweep's; "": the job's number
+    hydra: Any = None  # its whole configuration, where a callback or a logger of the user's reads that
 
     @classmethod
-    def of(cls, config: Mapping[str, Any], choices: Mapping[str, str], overrides: Any, folder: Path) -> "SweepJob":
-        """A job from its composed configuration; Hydra's own choices are left out. Raises `UserError` for passwords."""
+    def of(cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()) -> "SweepJob":
+        """A job as it was composed; Hydra's own choices are left out. Raises `UserError` for passwords."""
+        config, choices = composed.config, composed.choices
         credentials.check("", config)
         groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
-        digest = identity.configuration(config, groups)
-        chosen = given(overrides, choices)
-        return cls(config, groups, tuple(overrides), digest, identity.inputs(config), folder, chosen)
+        return cls(
+            config, groups, tuple(overrides), identity.configuration(config, groups), identity.inputs(config), folder,
+            given(overrides, choices), composed.subdir, composed.hydra,
+        )  # fmt: skip
+
+    @property
+    def sweep(self) -> Path:
+        """The folder of the sweep."""
+        return self.folder.parents[len(Path(self.subdir).parts) - 1] if self.subdir else self.folder.parent
+
+    @property
+    def name(self) -> str:
+        """What the job is called within its sweep."""
+        return self.subdir or self.folder.name
 
     def variant(self, common: Collection[str]) -> str:
         """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
         own = given((text for text in self.overrides if text not in common), self.choices)
         data = f" on {self.choices['data']}" if "data" in own else ""
         return variant(self.choices["optimizer"], own) + data
+
+    @property
+    def returns(self) -> Sequence[str] | None:
+        """The metrics that it gives back."""
+        return self.config.get("sweep", {}).get("returns")
+
+    def returned(self, end: Status) -> float | list[float] | None:
+        """What it gives back, having ended so."""
+        return returned(end.metrics, self.returns) if end.status == FINISHED else None
 
     @property
     def status(self) -> Status:
@@ -67,31 +91,44 @@ def work(job: SweepJob) -> Status:
     job.status.write(job.folder)
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
+    measured: dict[str, float] = {}
     with output, printing_to(output):
-        message = _run(job)
-    status = FAILED if message else FINISHED
-    ended = replace(job.status, status=status, message=message, seconds=time.perf_counter() - started)
+        message = _run(job, measured)
+    status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
+    ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
     ended.write(job.folder)
     return ended
 
 
-def run_job(config: Any) -> Status:
-    """Run a job that another launcher of Hydra's has composed and placed, as on a cluster."""
+def run_job(config: Any) -> float | list[float] | None:
+    """Run a job that another launcher of Hydra's has composed and placed, as on a cluster; returns what it is worth.
+
+    Raises `UserError` where it failed and the sweeper is not ours, which reads how jobs ended from their folders.
+    """
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
+
+    from tractexp.compat.hydra_plugins import NAMESPACE
 
     hydra = HydraConfig.get()
     plain: Any = OmegaConf.to_container(config, resolve=True)
     overrides: Any = OmegaConf.to_container(hydra.overrides.task)
-    return work(SweepJob.of(plain, dict(hydra.runtime.choices), overrides, Path(hydra.runtime.output_dir)))
+    composed = Composed(plain, dict(hydra.runtime.choices), str(hydra.sweep.subdir))
+    job = SweepJob.of(composed, overrides, Path(hydra.runtime.output_dir))
+    end = work(job)
+    if end.status == FAILED and not str(hydra.sweeper.get("_target_")).startswith(NAMESPACE):
+        raise UserError(f"job {job.name}: {end.message}")
+    return job.returned(end)
 
 
-def _run(job: SweepJob) -> str:
-    """Run the task; returns what went wrong, in one line, or ""."""
+def _run(job: SweepJob, measured: dict[str, float]) -> str:
+    """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 
     try:
-        perform(Job(job.config, job.choices, job.folder, parent_of(job.folder.parent), in_sweep=True, given=job.given))
+        parent = parent_of(folder_of(job.folder))
+        perform(Job(job.config, job.choices, job.folder, parent, True, job.given, measured))
+        returned(measured, job.returns)
     except UserError as error:
         return str(error)
     except (Exception, SystemExit) as error:

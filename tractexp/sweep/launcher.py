@@ -8,6 +8,7 @@ from typing import Any
 
 from hydra.core.utils import JobReturn, JobStatus
 from hydra.plugins.launcher import Launcher
+from omegaconf import OmegaConf
 
 from tractexp.api.task import Job
 from tractexp.compat.hydra_plugins import NAMESPACE
@@ -15,6 +16,8 @@ from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
+from tractexp.sweep.parent import parent_run
+from tractexp.sweep.placing import finished, place
 from tractexp.sweep.progress import progress
 from tractexp.sweep.status import FAILED, RUNNING, Status
 from tractexp.workers import Workers, backends
@@ -41,6 +44,7 @@ class Cores(Launcher):
 
     def __init__(self, backend: str, n_jobs: int, address: str | None, tries: int):
         self.workers, self.tries = Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True), tries
+        self.launched: dict[Path, SweepJob] = {}  # for a sweeper that is not ours
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.hydra_context, self.config = hydra_context, config
@@ -50,14 +54,19 @@ class Cores(Launcher):
         check_range("hydra.launcher.tries", self.tries, 1)
 
     def launch(self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int) -> Sequence[JobReturn]:
-        """As Hydra's other sweepers call it: the return value of a job is its objective."""
+        """As Hydra's other sweepers call it, batch by batch: what a job returns is what `sweep.returns` names.
+
+        A job that was done before, in this sweep or an earlier one in the same folder, is not run again.
+        """
         compose = Composer(self.hydra_context.config_loader, self.config)
         folder = Path(self.config.hydra.sweep.dir).absolute()
-        jobs = [
-            SweepJob.of(*compose(overrides), overrides, folder / str(initial_job_idx + k))
-            for k, overrides in enumerate(job_overrides)
-        ]
-        return [_returned(job, end) for job, end in zip(jobs, self.run(jobs), strict=True)]
+        numbered = enumerate(job_overrides, start=initial_job_idx)
+        jobs = place([SweepJob.of(compose(texts, k), texts) for k, texts in numbered], folder)
+        self.launched |= {job.folder: job for job in jobs}
+        asked = [*OmegaConf.to_container(self.config.hydra.overrides.task)]
+        with parent_run(folder, [*self.launched.values()], asked, afresh=False):
+            self.run([job for job in {job.folder: job for job in jobs}.values() if not finished(job)])
+        return [_returned(job, status.read(job.folder)) for job in jobs]
 
     def run(self, jobs: Sequence[SweepJob]) -> list[Status]:
         """Run all jobs and return how they ended, in their order."""
@@ -101,9 +110,13 @@ def warm(jobs: Sequence[SweepJob]) -> None:
             problem.residuals(middle)
 
 
-def _returned(job: SweepJob, end: Status) -> JobReturn:
-    failed = end.status == FAILED
-    value: Any = UserError(f"job {job.folder.name}: {end.message}") if failed else status.objective(job.folder)
-    outcome = JobReturn(overrides=job.overrides, status=JobStatus.FAILED if failed else JobStatus.COMPLETED)
-    outcome.return_value = value
+def _returned(job: SweepJob, end: Status | None) -> JobReturn:
+    """How a job ended, in Hydra's terms."""
+    outcome = JobReturn(overrides=job.overrides)
+    try:
+        if end is None or end.status == FAILED:
+            raise UserError(end.message if end else "its worker was killed or never started")
+        outcome.status, outcome.return_value = JobStatus.COMPLETED, job.returned(end)
+    except UserError as error:
+        outcome.status, outcome.return_value = JobStatus.FAILED, UserError(f"job {job.name}: {error}")
     return outcome

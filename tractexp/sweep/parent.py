@@ -11,7 +11,7 @@ from tractexp.api.task import Job
 from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
-from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, objective, read
+from tractexp.sweep.status import ESTIMATED, FAILED, FINISHED, INTERRUPTED, SEARCHED, read
 from tractexp.tracking.runfile import save
 from tractexp.tracking.sweepfile import FILE, parent_of
 
@@ -79,10 +79,12 @@ def _send(folder: Path, uri: str) -> None:
 
 
 def metrics(jobs: list[Any]) -> dict[str, float]:
-    ends = [(s.status, job.folder) for job in jobs if (s := read(job.folder)) is not None]
-    best = [f for _, folder in ends if (f := objective(folder)) is not None]
-    counts = {f"jobs_{kind}": sum(status == kind for status, _ in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
-    return {"jobs": len(jobs), **counts, **({"best_objective": min(best)} if best else {})}
+    """Figures of a sweep as a whole."""
+    ends = [s for job in jobs if (s := read(job.folder)) is not None]
+    counts = {f"jobs_{kind}": sum(s.status == kind for s in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
+    measured = {name: [f for s in ends if (f := s.metric(name)) is not None] for name in (ESTIMATED, SEARCHED)}
+    best = {f"best_{name}": min(values) for name, values in measured.items() if values}
+    return {"jobs": len(jobs), **counts, **best}
 
 
 def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import Any
 
 from tractexp.progress import Pace, console, say
 from tractexp.sweep.job import SweepJob, shared
-from tractexp.sweep.status import FAILED, Status, objective
+from tractexp.sweep.status import FAILED, SEARCHED, Status
 
 SHOWN = 3  # variants named in a line of a log file
 
@@ -29,7 +29,7 @@ class Tally:
             self.first = time.perf_counter()
         self.failed += end.status == FAILED
         self.jobs[variant] = self.jobs.get(variant, 0) + 1
-        value = objective(job.folder, of_search=True)
+        value = end.metric(SEARCHED)
         if value is not None:
             self.best[variant] = min(value, self.best.get(variant, value))
 

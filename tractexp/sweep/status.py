@@ -1,13 +1,16 @@
 """The state of a job of a sweep: `status.json` in its folder."""
 
 import json
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
+from tractexp.errors import UserError, among
 from tractexp.files import write_json
 
 FILE = "status.json"
+SEARCHED = "search_objective"  # the metric by which optimizers are compared
+ESTIMATED = "objective"
 RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
 
 
@@ -22,6 +25,12 @@ class Status:
     seconds: float
     choices: Mapping[str, str]
     seed: int
+    metrics: Mapping[str, float | None] = field(default_factory=dict)  # as logged; None: never reached
+
+    def metric(self, name: str) -> float | None:
+        """What was measured; None where the job has not ended well or its task measures no such thing."""
+        value = self.metrics.get(name)
+        return float(value) if value is not None and self.status == FINISHED else None
 
     def write(self, folder: Path) -> None:
         write_json(folder / FILE, asdict(self))
@@ -35,13 +44,22 @@ def read(folder: Path) -> Status | None:
         return None
 
 
-def objective(folder: Path, *, of_search: bool = False) -> float | None:
-    """The objective of the estimate in the job's `result.json`; None where its task writes none.
+def objective(folder: Path, name: str = SEARCHED) -> float | None:
+    """A metric of the job in `folder`, by default where its search ended; None where there is none."""
+    end = read(folder)
+    return end.metric(name) if end is not None else None
 
-    Of the search: where that ended, by which optimizers are compared.
+
+def returned(metrics: Mapping[str, float | None], names: Sequence[str] | None) -> float | list[float] | None:
+    """What a job gives back to whoever optimizes over jobs: the metrics of these names, one or a list.
+
+    Without names where its search ended; None where its task searches for nothing. What was never reached is infinite.
+    Raises `UserError` for a metric that the task does not measure.
     """
-    try:
-        result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
-        return float(((of_search and result.get("search")) or result)["objective"])
-    except (OSError, ValueError, TypeError, KeyError):
+    for name in names or ():
+        if name not in metrics:
+            raise UserError(f"sweep.returns names {name}, which this task does not measure{among(name, metrics)}")
+    if not names and SEARCHED not in metrics:
         return None
+    values = [float("inf") if (value := metrics[name]) is None else value for name in names or [SEARCHED]]
+    return values if len(values) > 1 else values[0]

@@ -6,7 +6,7 @@ import shutil
 import sys
 import webbrowser
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -30,10 +30,10 @@ from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.status import FAILED, FINISHED, INTERRUPTED, RUNNING
-from tractexp.tracking.sweepfile import PAGES
+from tractexp.sweep.placing import finished, place, placement, settle
+from tractexp.sweep.status import FAILED, INTERRUPTED
+from tractexp.tracking.sweepfile import MULTIRUN, PAGES
 
-SWEEP = "multirun.yaml"
 REPEAT = "repeat the command to go on with the jobs that are left"
 
 
@@ -79,10 +79,10 @@ class Grid(Sweeper):
         if done := len(jobs) - len(remaining):
             say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if remaining:
-            if (folder / SWEEP).exists():  # what an earlier sweep came to goes before its configuration does
+            if (folder / MULTIRUN).exists():  # what an earlier sweep came to goes before its configuration does
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
-            files.write(folder / SWEEP, OmegaConf.to_yaml(self.config))
+            files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
             with parent_run(folder, jobs, arguments, afresh=self.redo):
                 self._run(remaining)
         self._conclude(jobs, comparison)
@@ -93,9 +93,9 @@ class Grid(Sweeper):
         parsed = OverridesParser.create(self.loader).parse_overrides(arguments)
         choices = {override.get_key_element(): values_of(override) for override in parsed}
         jobs: dict[str, SweepJob] = {}
-        for combination in itertools.product(*choices.values()):
+        for number, combination in enumerate(itertools.product(*choices.values())):
             overrides = [f"{key}={value}" for key, value in zip(choices, combination, strict=True)]
-            job = SweepJob.of(*compose(overrides), overrides, Path())
+            job = SweepJob.of(compose(overrides, number), overrides)
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
             jobs.setdefault(job.configuration, job)
         return list(jobs.values())
@@ -111,7 +111,7 @@ class Grid(Sweeper):
         if comparison is None or not comparable(jobs):
             summary(jobs)
         else:
-            folder = jobs[0].folder.parent
+            folder = jobs[0].sweep
             say()
             comparison.run(Job(jobs[0].config, jobs[0].choices, folder))
             if self.open:
@@ -160,57 +160,13 @@ def values_of(override: Override) -> list[str]:
     return values
 
 
-def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
-    """Give each job its folder: that of the same configuration in an earlier sweep here, or the next free number.
-
-    Free is also a folder that holds nothing yet but what Hydra hides in it, as a full disk or a kill leaves it.
-    """
-    folders = {s.configuration: p for p in _numbered(folder) if (s := status.read(p)) is not None}
-    free = (k for k in itertools.count() if not _holds_something(folder / str(k)))
-    placed = []
-    for job in jobs:
-        if job.configuration not in folders:
-            folders[job.configuration] = folder / str(next(free))
-        placed.append(replace(job, folder=folders[job.configuration]))
-    return placed
-
-
-def placement(job: SweepJob) -> list[str]:
-    """The overrides by which any launcher of Hydra's puts a job into its folder."""
-    sweep = str(job.folder.parent).replace("\\", "\\\\").replace("'", "\\'")
-    return [f"hydra.sweep.dir='{sweep}'", f"hydra.sweep.subdir={job.folder.name}"]
-
-
-def _numbered(folder: Path) -> list[Path]:
-    return [p for p in folder.iterdir() if p.name.isdecimal()] if folder.is_dir() else []
-
-
-def _holds_something(folder: Path) -> bool:
-    return folder.exists() and not (folder.is_dir() and all(p.name.startswith(".") for p in folder.iterdir()))
-
-
-def finished(job: SweepJob) -> bool:
-    """Whether this job, with the same code and data, has been done in its folder."""
-    state = status.read(job.folder)
-    same = state is not None and (state.configuration, state.inputs) == (job.configuration, job.inputs)
-    return same and state.status == FINISHED  # type: ignore[union-attr]
-
-
-def settle(job: SweepJob, end: str, problem: str) -> None:
-    """Write the end of a job that has not written its own."""
-    state = status.read(job.folder)
-    if state is None or state.status == RUNNING:
-        job.folder.mkdir(parents=True, exist_ok=True)
-        replace(job.status, status=end, message=problem).write(job.folder)
-
-
 def comparable(jobs: Sequence[SweepJob]) -> bool:
     """Whether a sweep holds several variants under several seeds, of which more than one job has ended well."""
     common = shared(jobs)
     variants = {job.variant(common) for job in jobs}
     if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
         return False
-    ended = (job for job in jobs if status.objective(job.folder, of_search=True) is not None)
+    ended = (job for job in jobs if status.objective(job.folder) is not None)
     return len(list(itertools.islice(ended, 2))) > 1
 
 
@@ -226,7 +182,7 @@ def summary(jobs: Sequence[SweepJob]) -> None:
     common = shared(jobs)
     objectives: dict[str, list[float]] = {}
     for job in jobs:
-        value = status.objective(job.folder, of_search=True)
+        value = status.objective(job.folder)
         if value is not None:
             objectives.setdefault(job.variant(common), []).append(value)
     if objectives:
@@ -246,8 +202,8 @@ def failures(jobs: Sequence[SweepJob]) -> str:
     say()
     say("failed jobs")
     for job, why in failed:  # not in columns: they would cut the sentences
-        say(f"  {job.folder.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
+        say(f"  {job.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
     return (
         f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt of their folders in "
-        f"{jobs[0].folder.parent}, an unexpected error in traceback.txt; {REPEAT}"
+        f"{jobs[0].sweep}, an unexpected error in traceback.txt; {REPEAT}"
     )

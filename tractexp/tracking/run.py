@@ -7,6 +7,7 @@ opened next, which closes it (`owner`); its content is stored beside the results
 import contextlib
 import getpass
 import json
+import math
 import re
 import time
 from collections.abc import Mapping, Sequence
@@ -36,7 +37,8 @@ Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a c
 class TrackedRun:
     """What one job leaves in MLflow.
 
-    `parameters` is the flattened configuration with the identified values, `metrics` the figures of the result.
+    `parameters` is the flattened configuration, `metrics` the figures of the result. An infinite one, of what was never
+    reached, is left out: a database keeps the largest number there is in its place.
     `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by iteration. `artifacts` are
     files or folders to be copied. `parent` is the run id of the sweep. `seconds` is what the job took: MLflow shows
     it as the run's duration. `model` is a result file that `tractexp.identification.result.load` reads; with it the run
@@ -249,7 +251,7 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
     from mlflow.entities import Metric, Param
 
     now = _milliseconds(run.ended)
-    points = [(name, value, 0) for name, value in run.metrics.items()]
+    points = [(name, value, 0) for name, value in run.metrics.items() if not math.isinf(value)]
     for name, (steps, values) in run.curves.items():
         points += [(name, values[i], steps[i]) for i in thinned(len(steps))]
     metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]

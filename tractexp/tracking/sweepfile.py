@@ -5,7 +5,13 @@ from pathlib import Path
 from typing import Any
 
 FILE = "sweep.json"
+MULTIRUN = "multirun.yaml"  # the configuration that every sweeper leaves in a sweep's folder
 PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its jobs have ended
+
+
+def folder_of(job: Path) -> Path:
+    """The folder of the sweep that a job's folder is of: `hydra.sweep.subdir` may put it several levels deep."""
+    return next((f for f in job.parents if (f / FILE).is_file() or (f / MULTIRUN).is_file()), job.parent)
 
 
 def parent_of(folder: Path) -> str | None:

@@ -13,7 +13,7 @@ from tractexp.tracking import runfile
 from tractexp.tracking.run import KEY, TrackedRun, finish_parent, log, reopen_parent, run_of, start_parent
 from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
-from tractexp.tracking.sweepfile import FILE, PAGES, parent_of
+from tractexp.tracking.sweepfile import FILE, PAGES, folder_of, parent_of
 
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
@@ -80,7 +80,7 @@ def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> Track
 def _sent(one: RunFile, uri: str) -> str:
     """Send one run; what became of it."""
     client = open_store(uri)
-    parent = None if one.sweep else parent_of(one.folder.parent)
+    parent = None if one.sweep else parent_of(folder_of(one.folder))
     one = replace(one, run=replace(one.run, parent=parent or one.run.parent))
     run_there = run_of(client, uri, one.run_id)
     if run_there is not None and not _same(one, run_there):
