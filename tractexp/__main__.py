@@ -1,10 +1,15 @@
 """Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
 
+import os
+import sys
+
+# `python -m tractexp` would look for modules beside the records first. A clone that is run where it lies needs that.
+if __name__ == "__main__" and not sys.flags.safe_path and not __file__.startswith(os.path.join(sys.path[0], "")):
+    del sys.path[0]
+
 import gc
 import importlib
-import os
 import signal
-import sys
 from collections.abc import Sequence
 
 # The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy cores), and the
@@ -12,7 +17,7 @@ from collections.abc import Sequence
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tractexp import credentials  # noqa: E402
+from tractexp import credentials, interpreter  # noqa: E402
 from tractexp.errors import Stopped, UserError  # noqa: E402
 from tractexp.output import outlet  # noqa: E402
 from tractexp.wording import one_line  # noqa: E402
@@ -32,7 +37,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = sys.argv[1:] if argv is None else [*argv]
     gc.set_threshold(*SELDOM)
     try:
-        with outlet() as out:
+        with outlet() as out, interpreter.safe_path():
             code = _explained(arguments)
         if out and out.lost:
             return _refused(f"what was to be printed could not be written ({out.lost}); files are whole", code or 2)

@@ -19,6 +19,7 @@ from concurrent.futures import BrokenExecutor
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from tractexp import interpreter
 from tractexp.errors import UserError
 
 BARREN = 3  # times in a row that workers may be killed before they begin a call
@@ -120,6 +121,7 @@ class Workers:
         from joblib import parallel_config
 
         with contextlib.ExitStack() as stack:
+            stack.enter_context(interpreter.safe_path())
             if self.backend == "dask":
                 from tractexp.compat.joblib_dask import Dask
 

@@ -121,7 +121,7 @@ def respond(python, tables, settings):
         try:
             GENERATED.mkdir(exist_ok=True)
             stack.enter_context(held(GENERATED / "tractexp.lock", LONGEST))
-            command = [python, "-c", program, target]  # by its text: this module has ANDES's own name
+            command = [python, "-P", "-c", program, target]  # by its text: this module has ANDES's own name
             done = subprocess.run(command, input=case, capture_output=True, text=True, timeout=LONGEST, cwd=folder)
         except (OSError, subprocess.TimeoutExpired) as error:
             raise UserError(f"not played back in ANDES: {error}") from error

@@ -77,6 +77,21 @@ def test_plugins_of_ours_import_what_a_plugin_of_others_may():
     assert imports == set()
 
 
+def test_one_module_starts_another_python():
+    """`tractexp/interpreter.py`: with -P, so that a module beside the records is never imported."""
+    sources = [*PACKAGE.rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]
+    named = {
+        str(path.relative_to(ROOT))
+        for path in sources
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Attribute) and ast.unparse(node) == "sys.executable"
+    }
+    # a script that needs no other module of ours, and what may be another program's Python: both say -P themselves
+    assert named == {"tractexp/interpreter.py", "tractexp/filetypes/workbook.py", "plugins/formats/andes.py"}
+    for name in named:
+        assert '"-P"' in (ROOT / name).read_text(encoding="utf-8")
+
+
 def test_one_module_quotes():
     """`tractexp/quoting.py`: what quotes for a language elsewhere would be a second door."""
     sources = [*PACKAGE.rglob("*.py"), *(ROOT / "plugins").rglob("*.py")]

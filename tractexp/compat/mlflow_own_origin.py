@@ -12,6 +12,7 @@ When mended: drop this module, and start `mlflow server` by itself.
 import os
 import sys
 from collections.abc import Awaitable, Callable, MutableMapping
+from pathlib import Path
 from typing import Any, TypeAlias
 
 Message: TypeAlias = MutableMapping[str, Any]
@@ -59,6 +60,9 @@ def main() -> None:
     def command(*arguments: Any, **settings: Any) -> list[str]:
         words = build(*arguments, **settings)
         words[words.index(THEIRS)] = OURS  # where it is another, there is no server
+        # Uvicorn looks for modules in the folder of the application first: by default the current one, of records.
+        at = words.index("uvicorn") + 1
+        words[at:at] = ["--app-dir", str(Path(mlflow.server.__file__).parents[2])]
         return words
 
     server._build_uvicorn_command = command

@@ -17,6 +17,7 @@ from collections.abc import Iterable, Iterator
 from types import TracebackType
 from typing import Any
 
+from tractexp import interpreter
 from tractexp.errors import UserError
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, open_store
@@ -54,7 +55,7 @@ class Logger:
 
     def __init__(self, uri: str = ""):
         self._process = subprocess.Popen(
-            [sys.executable, "-c", f"from {__name__} import main; main()"],
+            interpreter.command("-c", f"from {__name__} import main; main()"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is the job's business: it ends this process by leaving the `with`

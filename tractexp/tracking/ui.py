@@ -13,6 +13,7 @@ import webbrowser
 from collections.abc import Callable
 from typing import IO
 
+from tractexp import interpreter
 from tractexp.errors import UserError
 from tractexp.tracking.store import database_of
 
@@ -32,11 +33,12 @@ def serve(
     address = f"http://{host}:{port}/"
     print(f"starting the MLflow UI on {address}, which takes about {USUAL} s; it shows {uri}", flush=True)
     started = time.monotonic()
-    command = [sys.executable, "-m", "tractexp.compat.mlflow_own_origin", "server"]
+    command = interpreter.command("-m", "tractexp.compat.mlflow_own_origin", "server")
     command += ["--backend-store-uri", uri, "--registry-store-uri", uri]
     command += ["--host", host, "--port", str(port), "--workers", "1", *_guard(host, port)]
     settings = {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"} | os.environ
     settings["MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE"] = "false"
+    settings[interpreter.SAFE_PATH] = "1"  # for the servers that MLflow starts
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(0))
     with tempfile.TemporaryFile() as output:
         server = subprocess.Popen(command, env=settings, stdout=output, stderr=output, start_new_session=True)
