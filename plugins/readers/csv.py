@@ -119,8 +119,15 @@ class CSV(Tabular, Reader):
         declared = sidecar.base.frequency if sidecar.base else self.frequency
         quantities = powers(table, mapping, declared, self.reverse_current, kilovolts=given is not None)
         window = sidecar.window or (self.estimator and estimator_of(self.estimator).window(quantities.frequency))
+        begun = {"time": quantities.start.isoformat()} if quantities.start else {}
         arrays: Any = {**quantities.columns, "more": table.numbers(sidecar.more), "window": window or None}
-        raw = Record(name=self._name(path, sidecar), source=path, notes=(*sidecar.notes, *quantities.notes), **arrays)
+        raw = Record(
+            name=self._name(path, sidecar),
+            source=path,
+            notes=(*sidecar.notes, *quantities.notes),
+            identity=begun,
+            **arrays,
+        )
         even = raw if sidecar.uniform else raw.uniform(table.place)
         base, note = self._base(even, quantities, sidecar, base)
         voltage, power = (

@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, fields
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
 
@@ -231,11 +232,16 @@ def series(shown: Sight) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
 
 
-def event_row(event: LoadEvent) -> dict[str, Any]:
-    """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before."""
+def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]:
+    """An event as plain data: times in s, powers in MW and Mvar, voltages as shares of that before.
+
+    `begun` is the moment of t = 0: then `when` is that of the event's start.
+    """
     what = event.what
     return {
-        "kind": what.kind, "start": what.start, "end": what.end, "duration": what.end - what.start,
+        "kind": what.kind, "start": what.start,
+        "when": begun and (begun + timedelta(seconds=what.start)).isoformat(),
+        "end": what.end, "duration": what.end - what.start,
         "depth": what.depth, "jump": what.jump, "U2": what.U2, "P_before": what.before[0], "Q_before": what.before[1],
         "P_after": what.after[0], "Q_after": what.after[1], "dip": event.dip, "worth": event.worth, "why": event.why,
     }  # fmt: skip
@@ -249,7 +255,8 @@ def _content(view: View) -> dict[str, Any]:
         record = view.sights[0].record
         assert record is not None
         content |= {
-            "station": "", "device": "", "start": None, "frequency": record.base.frequency,
+            "station": "", "device": "", "start": view.begun and view.begun.isoformat(),
+            "frequency": record.base.frequency,
             "rates": [record.rate], "seconds": float(record.t[-1] - record.t[0]),
             "segments": [{"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}],
             "notes": list(record.notes), "channels": [],
@@ -299,7 +306,7 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     return row | {
         "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
         "said": list(shown.said), "command": command(view, shown),
-        "events": [event_row(event) for event in shown.events],
+        "events": [event_row(event, view.begun) for event in shown.events],
     }  # fmt: skip
 
 

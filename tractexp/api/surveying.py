@@ -4,7 +4,6 @@ import contextlib
 import functools
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
-from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -64,13 +63,11 @@ def _common(view: View) -> dict[str, Any]:
 
 
 def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
-    fields = event_row(seen)
-    begun = view.recording.start if view.recording else None
+    fields = event_row(seen, view.begun)
     event = seen.event
     return {
         **_common(view), **{key: value for key, value in fields.items() if key in COLUMNS},
         "event": archive.event_name(file, number, seen), "load": shown.name, "unit": "pu" if shown.per_unit else "MW",
-        "when": (begun + timedelta(seconds=fields["start"])).isoformat() if begun else None,
         "noise": event and event.noise_share,
         "command": command(view, shown) if seen.worth else "", **_pictures(shown, seen),
     }  # fmt: skip

@@ -15,7 +15,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
     **{unit: ("t", 1.0) for unit in ("s", "sec", "second", "seconds", "sek", "秒", "с", "сек")},
     **{unit: ("t", 1e-3) for unit in ("ms", "msec", "millisecond", "milliseconds", "毫秒", "мс")},
     **{unit: ("t", 1e-6) for unit in ("us", "µs", "μs", "usec", "microseconds", "微秒", "мкс")},
-    "ns": ("t", 1e-9), "min": ("t", 60.0), "h": ("t", 3600.0),
+    "ns": ("t", 1e-9), "min": ("t", 60.0), "h": ("t", 3600.0), "day": ("t", 86400.0), "days": ("t", 86400.0),
     "mw": ("power", 1.0), "kw": ("power", 1e-3), "w": ("power", 1e-6), "gw": ("power", 1e3), "мвт": ("power", 1.0),
     "квт": ("power", 1e-3),
     "mvar": ("reactive", 1.0), "kvar": ("reactive", 1e-3), "var": ("reactive", 1e-6), "gvar": ("reactive", 1e3),
@@ -31,6 +31,7 @@ PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quanti
 FITTING: Mapping[str, tuple[str, ...]] = {
     "t": ("t",), "U": ("voltage", ""), "I": ("current", ""), "P": ("power", ""), "Q": ("reactive", ""),
     "f": ("frequency", ""), "dfdt": ("rocof", "frequency", ""), "angle": ("angle", ""), "day": ("t", ""),
+    "frac": ("t", ""), "soc": ("t", ""),
 }  # fmt: skip
 ALSO: Mapping[str, tuple[str, ...]] = {"P": ("reactive",), "Q": ("power",), "t": ("",)}  # as files write them
 BRACKETED = (
@@ -43,7 +44,8 @@ UNMISTAKABLE = frozenset((  # as units after a space or an underscore, where V a
 # {word: quantity}; longer ones match within a name too, in scripts that do not part words
 WORDS: Mapping[str, str] = {
     **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "zeitpunkt", "uhrzeit", "zeitstempel", "clock",
-                     "temps", "tiempo", "tempo", "tnow", "utc", "время", "时间", "时刻"), "t"),
+                     "temps", "tiempo", "tempo", "tnow", "utc", "unixtime", "epoch", "время", "时间", "时刻"), "t"),
+    **dict.fromkeys(("soc", "century"), "soc"),
     **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
     **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l", "ul",
                      "spannung", "напряжение", "电压", "tension", "tensión"), "U"),
@@ -56,6 +58,13 @@ WORDS: Mapping[str, str] = {
     **dict.fromkeys(("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"),
     **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
 }  # fmt: skip
+# {word of a column that holds the fractions of the seconds in another: their unit, "" where their size tells it}
+FRACTIONS: Mapping[str, str] = {
+    **dict.fromkeys(("fracsec", "frac", "fraction", "fractions", "fractional", "subsecond", "subseconds"), ""),
+    **dict.fromkeys(("ms", "msec", "millis", "millisec", "millisecond", "milliseconds", "毫秒"), "ms"),
+    **dict.fromkeys(("usec", "micros", "microsec", "microsecond", "microseconds", "微秒"), "us"),
+    **dict.fromkeys(("nsec", "nanosecond", "nanoseconds", "纳秒"), "ns"),
+}
 ANGLE = frozenset(("angle", "ang", "winkel", "arg", "phi", "theta", "угол", "相角", "角度", "deg"))
 POSITIVE = frozenset(("pos", "positive", "ps", "1", "正序", "mitsystem"))
 PHASES: Mapping[str, str] = {
@@ -82,14 +91,16 @@ COMPOUND = re.compile(
 class Role:
     """What a column is: `key` as in `data.columns`, the factor to the unit used inside, and what the unit says."""
 
-    key: str  # t, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in _angle
+    key: str  # t, frac, soc, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in _angle
     unit: str = ""
     line: bool | None = None  # of a voltage: line to line, phase to ground, unsaid
 
     @property
     def quantity(self) -> str:
         """What `data.units` calls it."""
-        return "angle" if self.key.endswith("_angle") else self.key if self.key in ("t", "f", "dfdt") else self.key[0]
+        if self.key.endswith("_angle"):
+            return "angle"
+        return self.key if self.key in ("t", "f", "dfdt", "frac", "soc", "day") else self.key[0]
 
 
 def split_unit(name: str) -> tuple[str, str]:
@@ -133,6 +144,9 @@ def role(name: str, unit: str = "") -> Role | None:
     words = _words(name)
     if not words:
         return None
+    fractions = [word for word in words if word in FRACTIONS and (not FRACTIONS[word] or len(words) == 1)]
+    for fraction in fractions:
+        return Role("frac", unit or FRACTIONS[fraction])
     said = next((pair for pair in (_compound(words), _worded(words)) if pair), None)
     if said is None:
         return None

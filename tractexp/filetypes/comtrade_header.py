@@ -16,6 +16,7 @@ from tractexp.wording import counted
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
+_SIXTEEN = re.compile(r"^\s*(?:16[ +]2/3|50/3|16,(?:7|67|667|6667))(?!\d)")  # Hz, as a third of 50 is written
 MOST_RATES = 10  # sampling rates of one file, where their number stands for the nominal frequency
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
@@ -238,6 +239,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     """The nominal frequency; returns the announced number of sampling rates."""
     line, text = rows.take("the nominal frequency")
     header.lines["frequency"] = line
+    text = _SIXTEEN.sub("16.6667", text)
     parsed = number(text.strip(", "))
     if parsed is not None and 0 < parsed < MOST_RATES and parsed == int(parsed) and _is_rate(rows.peek()):
         rows.rest.appendleft((line, text))  # the number of sampling rates: the line of the frequency is blank

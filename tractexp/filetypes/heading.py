@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import is_date, is_gap, is_number, is_time
+from tractexp.filetypes.cells import is_gap, is_grouped, is_number
+from tractexp.filetypes.clock import is_date, is_time
 from tractexp.filetypes.columns import is_unit, split_unit
 
 ALIKE = 3  # rows of numbers of one length make sure that a table has begun
@@ -50,7 +51,7 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
 
 def is_value(cell: Any) -> bool:
     """Whether a cell may stand below a heading: a number in any spelling, a time, or a gap."""
-    return is_number(cell) or is_number(cell, ",") or is_time(cell)
+    return is_number(cell) or is_number(cell, ",") or is_grouped(cell) or is_time(cell)
 
 
 def _text(cell: Any) -> str:

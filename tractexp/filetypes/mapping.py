@@ -1,5 +1,6 @@
 """Which columns of a table are time, voltage, power, ...: as the user says, else by their names."""
 
+import datetime as dt
 import itertools
 import re
 from collections.abc import Collection, Iterable, Mapping, Sequence
@@ -7,7 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from tractexp.errors import DATA, UserError, among, nearest, setting
-from tractexp.filetypes.cells import is_number, is_time
+from tractexp.filetypes.cells import is_number
+from tractexp.filetypes.clock import first_day, is_time
 from tractexp.filetypes.columns import Role, fits, is_unit, role
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
@@ -16,7 +18,7 @@ CONTRACT = ("t", "U", "P", "Q", "f", "U2")
 PHASES = ("a", "b", "c")
 LINES = ("ab", "bc", "ca")
 KEYS = (
-    *CONTRACT, "dfdt", "I", *(x + p for x in "UI" for p in (*PHASES, *LINES, "1", "2", "0") if x + p != "U2"),
+    *CONTRACT, "dfdt", "frac", "I", *(x + p for x in "UI" for p in (*PHASES, *LINES, "1", "2", "0") if x + p != "U2"),
     *(x + p for x in "PQ" for p in PHASES),
 )  # fmt: skip
 ANGLES = tuple(f"{key}_angle" for key in KEYS if key[0] in "UI")
@@ -47,6 +49,7 @@ class Mapped:
     kind: str  # powers, phasors, waves
     columns: Mapping[str, MappedColumn]
     notes: tuple[str, ...]
+    day: dt.date | None = None  # of the first row, where dates stand in a column of their own
 
 
 def mapped(
@@ -78,7 +81,8 @@ def mapped(
             chosen[key] = replace(one, role=replace(one.role, unit=str(units[quantity])))
     for one in chosen.values():
         _check_unit(table, one)
-    return Mapped(kind, chosen, tuple(_notes(table, chosen, other_columns)))
+    days = [one for one in options.get("day", []) if one.number != chosen["t"].number][:1]
+    return Mapped(kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days))
 
 
 def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
@@ -193,11 +197,27 @@ def _numbered(roles: Mapping[int, Role]) -> dict[str, str]:
 
 
 def _timed(table: TableFile, options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
-    """Time from a column of dates with times, where there is no other; of a date and a time, the time."""
-    days = [one for one in options.pop("day", []) if any(is_time(row[one.number]) for row in table.sample[:1])]
-    if "t" not in options and days:
-        options["t"] = [replace(one, role=replace(one.role, key="t")) for one in days]
+    """Time from a column of dates with times, or of whole seconds beside fractions, where there is no other.
+
+    Of a date and a time, the time; fractions alone are none of a known second.
+    """
+    days = [one for one in options.get("day", []) if any(is_time(row[one.number]) for row in table.sample[:1])]
+    seconds = options.pop("soc", [])
+    if seconds and ("t" not in options or "frac" in options):
+        options["t"] = seconds
+    elif "t" not in options and days:
+        options["t"] = days
+        del options["day"]
+    if "t" not in options:
+        options.pop("frac", None)
+        return options
+    options["t"] = [replace(one, role=replace(one.role, key="t")) for one in options["t"]]
     return options
+
+
+def _first_day(table: TableFile, days: Sequence[MappedColumn]) -> dt.date | None:
+    """The date of the first row in a column of dates."""
+    return next((first_day([row[one.number] for row in table.sample]) for one in days), None)
 
 
 def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -> tuple[str, list[str]]:
@@ -216,14 +236,14 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
         order.remove("powers")
         order.insert(0, "powers")
     for kind in order:
-        if wanted <= {"t", *kinds[kind]} and "t" in keys:
+        if wanted <= {"t", "frac", *kinds[kind]} and "t" in keys:
             if kind == "waves" and not _oscillates(table, options, wave):
                 named = ", ".join(options[key][0].label for key in wave)
                 raise UserError(
                     f"{table.source}: the columns {named} hold magnitudes without angles, and "
                     "there are none of P and Q: the load's power does not follow from them; add P and Q, or the angles"
                 )
-            return kind, ["t", *kinds[kind]]
+            return kind, ["t", *(key for key in ("frac",) if key in keys), *kinds[kind]]
     raise UserError(_lacking(table, options, kinds))
 
 
@@ -328,9 +348,11 @@ def _check_unit(table: TableFile, one: MappedColumn) -> None:
         )
 
 
-def _notes(table: TableFile, chosen: Mapping[str, MappedColumn], other_columns: Collection[str]) -> list[str]:
+def _notes(
+    table: TableFile, chosen: Mapping[str, MappedColumn], days: Sequence[MappedColumn], other_columns: Collection[str]
+) -> list[str]:
     """Notes on the role of each column, where names alone do not say it, and on unused columns."""
-    notes, used = [], {one.number for one in chosen.values()}
+    notes, used = [], {one.number for one in (*chosen.values(), *days)}
     if any(key != one.name or table.heading.units[one.number] for key, one in chosen.items()):
         notes.append("columns: " + ", ".join(f"{key} = {one.label}" for key, one in chosen.items()))
     spare = [name for k, name in enumerate(table.heading.names) if name and k not in used and name not in other_columns]

@@ -146,7 +146,8 @@ def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tupl
     data = files.read(path)
     if not data.startswith(SIGNATURE):
         raise UserError(f"{path}: this is no PQDIF file: it does not begin with the signature of a PQDIF record")
-    at, count, compressed, room, reached = 0, 0, False, LARGEST, dict[int, int]()
+    at, count, compressed, room, following = 0, 0, False, LARGEST, 0
+    reached: dict[int, int] = {}
     while count < MOST_RECORDS:
         count += 1
         where = f"{path}: record {count}"

@@ -13,7 +13,8 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import DATA, UserError, among, check_choice, nearest
 from tractexp.files import located
-from tractexp.filetypes.cells import BadCell, is_number, is_time, numbers, times
+from tractexp.filetypes.cells import BadCell, grouping, is_number, numbers
+from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.workbook import BadWorkbook, Workbook
@@ -51,6 +52,8 @@ class TableColumn:
     values: np.ndarray
     start: datetime | None = None
     clock: bool = False  # times of day or dates, not seconds
+    begin: float = 0.0  # of a clock's times: the second of the day of the first
+    remarks: tuple[tuple[int, str], ...] = ()  # (row from 0, words) of what was mended in a clock's times
 
 
 class TableFile(ABC):
@@ -60,6 +63,7 @@ class TableFile(ABC):
     heading: TableHeading
     sample: Sequence[Sequence[Any]]  # the first rows of cells
     notes: tuple[str, ...] = ()
+    start: datetime | None = None  # of t = 0, where the file says it beside its columns
 
     @abstractmethod
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
@@ -114,19 +118,20 @@ class Rows(TableFile):
         columns = {}
         for number, kind in wanted.items():
             try:
-                columns[number] = column(self.columns(number), kind, ".")
+                columns[number] = column(self.columns(number), kind, ".", grouping(self.sample, "."))
             except BadCell as bad:
                 raise self.refuse(bad.row, number, bad.why) from None
         return columns
 
 
-def column(cells: Sequence[Any], kind: str, decimal: str) -> TableColumn:
+def column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> TableColumn:
     """Cells as what is wanted of them; raises `BadCell`."""
     if isinstance(cells, np.ndarray) and cells.dtype.kind == "f":
         return TableColumn(cells)
     if kind == "time" and any(is_time(cell) and not is_number(cell, decimal) for cell in cells[:1]):
-        return TableColumn(*times(cells), clock=True)
-    return TableColumn(numbers(cells, decimal, gaps=kind == "gaps"))
+        read = times(cells)
+        return TableColumn(read.values, read.start, True, read.begin, read.remarks)
+    return TableColumn(numbers(cells, decimal, kind == "gaps", group))
 
 
 def instrument_of(path: Path | str) -> ModuleType | None:

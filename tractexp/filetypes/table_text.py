@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import BadCell, is_number, is_time
+from tractexp.filetypes.cells import BadCell, group_mark, grouping, is_grouped, is_number
+from tractexp.filetypes.clock import is_time
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
@@ -45,10 +46,12 @@ class TextTable(TableFile):
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
         self.decimal = form.decimal or _decimal(self.sample)
+        self.group = grouping(self.sample, self.decimal)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
-        self.notes = tuple(notes)
+        grouped = [f"digits are taken as grouped by '{self.group}', decimals marked by '{self.decimal}'"]
+        self.notes = (*notes, *(grouped if self.group else []))
         self._check_width()
 
     def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> TableHeading:
@@ -85,7 +88,7 @@ class TextTable(TableFile):
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         texts = [n for n, kind in wanted.items() if kind == "time" and self._is_clock(n)]
-        columns = None if texts else self._at_once(list(wanted))
+        columns = None if texts or self.group else self._at_once(list(wanted))
         return self._cell_by_cell(wanted) if columns is None else columns
 
     def _is_clock(self, number: int) -> bool:
@@ -135,7 +138,7 @@ class TextTable(TableFile):
                     times[number] += cells
                     continue
                 try:
-                    done[number].append(column(cells, kind, self.decimal).values)
+                    done[number].append(column(cells, kind, self.decimal, self.group).values)
                 except BadCell as one:
                     bad.append((before + one.row, number, one.why))
             if bad:
@@ -214,18 +217,22 @@ def _delimiter(lines: Sequence[str]) -> str:
         rows = [_cells(line, mark) for line in tail]
         width = max(set(map(len, rows)), key=[len(row) for row in rows].count)
         share = sum(len(row) == width for row in rows) / len(rows) if width > 1 else 0.0
-        valued = any(sum(is_number(c) or is_number(c, ",") or is_time(c) for c in row) >= 2 for row in rows)
+        valued = any(sum(_is_value(cell) for cell in row) >= 2 for row in rows)
         return (share if valued else share / 10), -DELIMITERS.index(mark)
 
     best = max(DELIMITERS, key=alike)
     return best if alike(best)[0] > 0 else ","
 
 
+def _is_value(cell: str) -> bool:
+    return is_number(cell) or is_number(cell, ",") or is_grouped(cell) or is_time(cell)
+
+
 def _decimal(sample: Sequence[Sequence[str]]) -> str:
     """The decimal mark: a comma where more cells have one than a point."""
     cells = [cell for row in sample for cell in row]
-    commas = sum(is_number(cell, ",") and "," in cell for cell in cells)
-    points = sum(is_number(cell) and "." in cell for cell in cells)
+    commas = sum((is_number(cell, ",") and "," in cell) or group_mark(cell, ",") == "." for cell in cells)
+    points = sum((is_number(cell) and "." in cell) or group_mark(cell, ".") == "," for cell in cells)
     return "," if commas > points else "."
 
 

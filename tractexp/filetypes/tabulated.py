@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ from tractexp.errors import DATA, UserError
 from tractexp.files import located
 from tractexp.filetypes.columns import PER_UNIT, factor
 from tractexp.filetypes.mapping import LINES, Mapped, MappedColumn, check_mapping, mapped
+from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.sidecar import Sidecar, beside
-from tractexp.filetypes.table import TableColumn, TableFile, TableForm, instrument_of, open_table
+from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 
@@ -25,9 +27,6 @@ NOMINAL_VOLTAGES = (
     0.23, 0.4, 0.48, 0.69, 1.0, 3.0, 3.3, 6.0, 6.6, 10.0, 11.0, 13.8, 15.0, 20.0, 22.0, 25.0, 27.5, 33.0, 35.0, 66.0,
     69.0, 110.0, 115.0, 132.0, 138.0, 150.0, 161.0, 220.0, 230.0, 275.0, 330.0, 345.0, 380.0, 400.0, 500.0, 765.0,
 )  # fmt: skip
-EPOCH = 1e6  # s: times beyond it are counted from the first
-LATEST = 2.6e9  # s since 1970, of a record: 2052
-SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}  # {unit of times: how many times larger than s they are at least}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,6 +75,7 @@ class Powers:
     absolute: dict[str, bool | None]  # of U and of P; None where no unit says
     notes: tuple[str, ...]
     frequency: float = 50.0  # Hz, nominal: as f shows it, else as declared
+    start: datetime | None = None  # the moment of t = 0, where the file says it
 
 
 def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
@@ -121,8 +121,8 @@ def _tuned(result: Powers, declared: float, source: MappedColumn | None) -> Powe
 
 def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     _check_power_units(table, mapping)
-    values, start = _read(table, mapping)
-    columns, notes = {"t": values["t"]}, [*mapping.notes, *start]
+    values, start, said = _read(table, mapping)
+    columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
     for letter in "UPQ":
         keys = [key for key in values if key[0] == letter and key != "U2"]
         columns[letter] = values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
@@ -135,7 +135,7 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
     if absolute["U"] or (absolute["U"] is None and kilovolts):
         notes += _to_lines(columns, mapping.columns[first].role.line, first)
-    return Powers(columns, absolute, (*table.notes, *notes))
+    return Powers(columns, absolute, (*table.notes, *notes), start=start)
 
 
 def _check_power_units(table: TableFile, mapping: Mapped) -> None:
@@ -164,43 +164,24 @@ def _absolute(mapping: Mapped, key: str) -> bool | None:
     return None if not unit else unit not in PER_UNIT
 
 
-def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], list[str]]:
-    """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; a note on what the time was counted from."""
+def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], datetime | None, tuple[str, ...]]:
+    """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; the moment of t = 0, and notes on the times."""
     kinds = {"t": "time", **{key: "gaps" for key in mapping.columns if key[0] in "PQ"}}
     cells = table.read({one.number: kinds.get(key, "number") for key, one in mapping.columns.items()})
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
         key: values[key] * by
         for key, one in mapping.columns.items()
-        if not key.endswith("_angle") and key != "t" and (by := factor(one.role.unit)) != 1
+        if not key.endswith("_angle") and key not in ("t", "frac") and (by := factor(one.role.unit)) != 1
     }
-    values["t"], note = seconds(cells[mapping.columns["t"].number], mapping.columns["t"].role.unit)
-    return values, note
-
-
-def seconds(time: TableColumn, unit: str) -> tuple[np.ndarray, list[str]]:
-    """Times [s], from the first row on where they have a date or are counted from long ago; a note on it.
-
-    Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds.
-    """
-    t = time.values
-    if time.start is not None:
-        return t, [f"t counted from {time.start.isoformat()}, the first row"]
-    if time.clock or not len(t):
-        return t, []
-    first = float(t[0])
-    since = next((u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), "")
-    if not unit and since:
-        note = f"t is in {since} since 1970 by its size: counted from {first:.0f} {since}, the first row"
-        return (t - first) * factor(since), [note]
-    t = t * factor(unit)
-    if abs(t[0]) > EPOCH:
-        return t - t[0], [f"t counted from {t[0]:.6f} s, the first row"]
-    return t, []
+    values.pop("frac", None)
+    read = times_of(table, mapping, cells)
+    values["t"] = read.t
+    return values, read.start, read.notes
 
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
-    values, note = _read(table, mapping)
+    values, start, note = _read(table, mapping)
     values, absolute = _in_units(table, mapping, values)
     keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
     scale, angle_notes = _radians(table, mapping, values)
@@ -219,7 +200,7 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     else:
         columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
-    return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes))
+    return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes), start=start)
 
 
 def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:

@@ -2,7 +2,6 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -11,8 +10,8 @@ from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.columns import role
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped
+from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
-from tractexp.filetypes.tabulated import seconds
 from tractexp.record.record import JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
 from tractexp.recording.unit import in_units
@@ -29,12 +28,12 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
         raise UserError(
             f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
         )
-    t = mapping.columns["t"]
-    named = [k for k, name in enumerate(table.heading.names) if name and k != t.number]
+    times = {mapping.columns[key].number for key in ("t", "frac") if key in mapping.columns}
+    named = [k for k, name in enumerate(table.heading.names) if name and k not in times]
     numbers = {k: "number" for k in named if all(_numbers_of(table, k))}
-    others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, t.number)]
+    others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, *times)]
     _refuse_other_rates(table, others)
-    cells = table.read({t.number: "time", **numbers})
+    cells = table.read({**dict.fromkeys(times, "number"), mapping.columns["t"].number: "time", **numbers})
     for k in numbers:
         wild = ~(np.abs(cells[k].values) <= HUGE)
         if wild.any():
@@ -42,12 +41,12 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
             raise table.refuse(
                 i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
             )
-    time, note = seconds(replace(cells[t.number], start=None), t.role.unit)
-    segments, odd = _segments(table, time)
+    read = times_of(table, mapping, cells)
+    segments, odd = _segments(table, read.t)
     named = {one.number: key for key, one in mapping.columns.items()}
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
-    start, notes = cells[t.number].start, [*table.notes, *note, *odd]
-    return in_units(Recording(table.source, channels, segments, nominal, start=start, notes=notes), {}, {})
+    notes = [*table.notes, *read.notes, *odd]
+    return in_units(Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {})
 
 
 def _numbers_of(table: TableFile, number: int) -> list[bool]:

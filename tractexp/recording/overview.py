@@ -3,6 +3,7 @@
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -116,6 +117,14 @@ class View:
     node: Mapping[str, Any]  # the choice of `data` that reads it; {} for a record
     sights: Sequence[Sight]
     recording: Recording | None = None
+
+    @property
+    def begun(self) -> datetime | None:
+        """The moment of t = 0, where the file says it."""
+        if self.recording is not None:
+            return self.recording.start
+        said = (shown.record.identity.get("time") for shown in self.sights if shown.record is not None)
+        return next((datetime.fromisoformat(moment) for moment in said if moment), None)
 
     @functools.cached_property
     def quality(self) -> list[Quality]:

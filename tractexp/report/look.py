@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from tractexp.report.look_charts import charts, unassigned
 from tractexp.wording import as_sentence, change, counted, degrees, figure, share
 
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
+LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
 NO_LOAD = "no load here: what happens to the voltage is listed with the loads of its bus"
@@ -152,10 +154,19 @@ def quiet(entry: Mapping[str, Any]) -> str:
     return NOTHING if entry["loaded"] else NO_LOAD
 
 
+def starts(event: Mapping[str, Any], unit: str = "") -> str:
+    """When an event starts: seconds of the file, and late in a long one the clock's time too, where it is known."""
+    seconds = f"{event['start']:.3f}{unit}"
+    if not event.get("when") or event["start"] < LATE:
+        return seconds
+    moment = datetime.fromisoformat(event["when"])
+    return f"{seconds}, {moment.isoformat(' ', 'milliseconds')}"
+
+
 def event_row(e: Mapping[str, Any]) -> list[str]:
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
-        "" if e["dip"] is None else str(e["dip"]), e["kind"], f"{e['start']:.3f}", f"{1000 * e['duration']:.0f}",
+        "" if e["dip"] is None else str(e["dip"]), e["kind"], starts(e), f"{1000 * e['duration']:.0f}",
         f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]), *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
     ]  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.report import unfitted
-from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size
+from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size, starts
 from tractexp.wording import counted, figure, joined
 
 NOTES = 3  # of a file that have room
@@ -86,7 +86,7 @@ def _label(event: Entry) -> str:
 
 
 def _event(event: Entry) -> str:
-    return f"{_label(event)} at {event['start']:.3f} s ({event['depth']:.1%}, {1000 * event['duration']:.0f} ms)"
+    return f"{_label(event)} at {starts(event, ' s')} ({event['depth']:.1%}, {1000 * event['duration']:.0f} ms)"
 
 
 def _reservation(why: str) -> str:
@@ -152,7 +152,7 @@ def _own(feeder: Entry, common: Sequence[Entry]) -> str:
     """What happened to a load and not to its bus."""
     shared = {_same(event) for event in common}
     own = (event for event in feeder["events"] if _same(event) not in shared)
-    return ", ".join(f"{_label(event)} at {event['start']:.3f} s" for event in own)
+    return ", ".join(f"{_label(event)} at {starts(event, ' s')}" for event in own)
 
 
 def _fit(feeder: Entry) -> str:
