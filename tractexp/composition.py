@@ -11,20 +11,27 @@ from typing import Any
 from tractexp import plugin
 from tractexp.choices import elsewhere
 from tractexp.errors import UserError, among
+from tractexp.model_file import is_model_path, read_model_file
+
+MODEL = "model"  # the group
 
 
 def read_choice(group: str, name: str) -> dict[str, Any]:
     """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's, else of a plugin.
 
+    A model may be the path of a file of one.
+
     Raises `UserError` for a name that is none, and for a file that cannot be read.
     """
-    file = Path(name) if name.endswith((".yaml", ".yml")) else _file(group, name, folders())
-    if file is None:
-        if name in plugin.discover().get(group, {}):
-            return {"name": name}
+    if group == MODEL and is_model_path(name):
+        content = read_model_file(name)
+    elif (file := _file(group, name, folders())) is not None:
+        content = _content(group, file)
+    elif name in plugin.discover().get(group, {}):
+        return {"name": name}
+    else:
         where = elsewhere(group, name) or among(name, choices(group))
         raise UserError(f"{group}={name}: there is no such choice{where}")
-    content = _content(group, file)
     composed: dict[str, Any] = {}
     for item in content.pop("defaults", []):
         if isinstance(item, dict):

@@ -6,11 +6,16 @@ from pathlib import Path
 from typing import Any
 
 from hydra.core.config_store import ConfigStore
+from hydra.core.object_type import ObjectType
 from hydra.core.plugins import Plugins
+from hydra.plugins.config_source import ConfigResult, ConfigSource
 from hydra.plugins.search_path_plugin import SearchPathPlugin
+from omegaconf import OmegaConf
 
 from tractexp import plugin
 from tractexp.compat import hydra_config_store, hydra_plugins, hydra_versions
+from tractexp.composition import MODEL
+from tractexp.model_file import is_model_path, read_model_file
 from tractexp.schema import Config
 
 
@@ -20,6 +25,32 @@ class PluginSearchPath(SearchPathPlugin):
     def manipulate_search_path(self, search_path: Any) -> None:
         for folder in plugin.configuration_folders():
             search_path.prepend("tractexp", f"file://{folder}", "main")
+        search_path.prepend("tractexp", f"{ModelFiles.scheme()}://", "main")
+
+
+class ModelFiles(ConfigSource):
+    """The models that are chosen by the path of a file, `model=/path/extended.yaml`; read as `model_file` says."""
+
+    @staticmethod
+    def scheme() -> str:
+        return "tractexp-model"
+
+    def load_config(self, config_path: str) -> ConfigResult:
+        content = OmegaConf.create(read_model_file(config_path.removeprefix(f"{MODEL}/")))
+        return ConfigResult(self.provider, self.full_path(), content, {"package": None})
+
+    def is_config(self, config_path: str) -> bool:
+        group, _, name = config_path.partition("/")
+        return group == MODEL and is_model_path(name) and Path(name).is_absolute()
+
+    def is_group(self, config_path: str) -> bool:
+        return False
+
+    def available(self) -> bool:
+        return True
+
+    def list(self, config_path: str, results_filter: ObjectType | None) -> list[str]:
+        return []
 
 
 def register() -> None:
@@ -38,6 +69,7 @@ def register() -> None:
     store.store(group="hydra/sweeper", name="grid", node=GridConfig)
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
     Plugins.instance().register(PluginSearchPath)
+    Plugins.instance().register(ModelFiles)
     for cls in (Grid, Cores):
         hydra_plugins.admit(cls)
     register_resolver = hydra_versions.register_resolver()

@@ -6,8 +6,9 @@ import re
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from tractexp import quoting
+from tractexp import files, quoting
 from tractexp.errors import UserError
+from tractexp.model_file import is_model_path
 
 # settings that take names of their own
 OPEN = (
@@ -16,6 +17,8 @@ OPEN = (
 )  # fmt: skip
 NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
 MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
+MODEL = "model"  # the group
+CONFIG_FOLDER = ("--config-dir", "-cd")
 DEEPEST = 20  # brackets within one another
 NEEDED = ("seed", "budget", "time_limit", "target", "task", "model", "optimizer", "data", "objective", "tracking")
 NO_NAME = re.compile(r"(?!\[.*\],\[)\[.*\]|[-+.]?[\d_]+[\d_.e+-]*|[-+]?(nan|inf)|null|true|false", re.IGNORECASE)
@@ -30,7 +33,7 @@ def overrides(arguments: Iterable[str]) -> list[str]:
     `model/motor=[a,b]` is several motors, for which Hydra would merge the settings of both.
     """
     result = []
-    for argument in arguments:
+    for argument in _name_model_file([*arguments]):
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
             result += _several(group, value)
@@ -54,6 +57,42 @@ def _check(argument: str, key: str, value: str) -> None:
     group = key.lstrip("+").partition("@")[0].replace("model.", "model/")
     if NO_NAME.fullmatch(value) and group in groups():
         raise UserError(f"{group}={value:.80}: what is chosen there has a name; tractexp --help shows the names")
+
+
+def _name_model_file(arguments: list[str]) -> list[str]:
+    """The arguments with a model of a folder, `--config-dir CONF model=NAME`, as the path of its file.
+
+    A folder that holds models only is then left out: nothing else in it is looked at. A name that is a shipped
+    choice's stays that one.
+    """
+    flag, folder, rest = _take_config_folder(arguments)
+    if folder is None:
+        return arguments
+    found = False
+    for k, argument in enumerate(rest):
+        key, _, name = argument.partition("=")
+        if key == MODEL and (file := folder / MODEL / f"{name}.yaml").is_file() and not _is_shipped(name):
+            rest[k], found = f"{MODEL}={file}", True
+    only_models = found and all(path.parent == folder / MODEL for path in folder.rglob("*.y*ml"))
+    return rest if only_models else [*flag, *rest]
+
+
+def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, list[str]]:
+    """Hydra's option for a further folder of configurations as it was given, that folder, and the other arguments."""
+    for k, argument in enumerate(arguments):
+        option, equals, value = argument.partition("=")
+        if option not in CONFIG_FOLDER:
+            continue
+        end = k + 1 if equals else k + 2
+        folder = value if equals else "".join(arguments[k + 1 : end])
+        return arguments[k:end], Path(folder) if folder else None, [*arguments[:k], *arguments[end:]]
+    return [], None, arguments
+
+
+def _is_shipped(name: str) -> bool:
+    from tractexp.choices import choices
+
+    return name in choices()[MODEL]
 
 
 @functools.cache
@@ -87,9 +126,21 @@ def override(argument: str) -> str:
     channels with spaces, brackets or letters of any script are quoted, for which Hydra would ask inner quotes.
     """
     key, equals, value = argument.partition("=")
+    if equals and key == MODEL:
+        chosen = [value] if _names_a_file(value) else _parts(value)  # a sweep has several
+        return f"{key}={','.join(map(_model_choice, chosen))}"
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
         argument = f"{key}={_quoted(value)}"
     return f"++{argument}" if argument.startswith(OPEN) else argument
+
+
+def _model_choice(name: str) -> str:
+    """A choice of a model as Hydra reads it: the path of a file whole and in quotes, another name as it stands."""
+    if not is_model_path(name):
+        return name
+    file = Path(name).absolute()
+    files.check_there(file)
+    return quoting.hydra(str(file))
 
 
 def typed(data: Mapping[str, object], *more: str) -> str:

@@ -140,15 +140,31 @@ def test_a_quick_command_runs(arguments, desk):
 
 
 def test_the_command_of_the_extended_model_runs_as_a_page_tells_it(desk):
-    """--config-dir is Hydra's: the file lies where an investigation puts it."""
+    """The file lies where an investigation puts it; it may be named, too."""
     (told,) = [c.arguments for c in ALL if "--config-dir" in (c.arguments or [])]
     (desk / "CONF" / "model").mkdir(parents=True)
     (desk / "CONF" / "model" / "extended.yaml").write_text(
         "defaults:\n  - third_order_exponential\n  - _self_\neffects: [stator_resistance]\n"
     )
-    done = run_command(*told, "--cfg", "job", "--package", "model", cwd=desk)
-    assert done.returncode == 0, done.stderr
-    assert "stator_resistance" in done.stdout
+    for arguments in (told, ["model=CONF/model/extended.yaml"]):
+        done = run_command(*arguments, "--cfg", "job", "--package", "model", cwd=desk)
+        assert done.returncode == 0, done.stderr
+        assert "stator_resistance" in done.stdout
+
+
+def test_a_models_file_reaches_nothing_but_the_model(tmp_path):
+    """What a stranger's file says of Hydra, or refers to, ends in a sentence."""
+    (tmp_path / "conf" / "model").mkdir(parents=True)
+    file = tmp_path / "conf" / "model" / "extended.yaml"
+    for text in (
+        "# @package _global_\nhydra: {callbacks: {x: {_target_: os.getcwd}}}\n",
+        "defaults: [third_order_exponential, _self_]\nfixed: {C: '${oc.env:HOME}'}\n",
+    ):
+        file.write_text(text, encoding="utf-8")
+        for chosen in (["--config-dir", "conf", "model=extended"], [f"model={file}"]):
+            done = run_command(*chosen, "--cfg", "job", cwd=tmp_path)
+            assert done.returncode == 2
+            assert re.search("is no key of a model|no references to others", done.stderr)
 
 
 def test_completion_is_a_line_that_a_shell_takes(desk):

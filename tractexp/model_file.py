@@ -1,0 +1,122 @@
+"""A file of a load model, whoever wrote it: its values are read, and nothing in it is obeyed.
+
+Hydra does as the files that it composes say: `@package` in a first line, `defaults` that reach any group, references
+that a resolver fills in. A model's file may come from a stranger. So it is read here for both the command line
+(`tractexp.config`) and Python (`tractexp.composition`): keys of a model, names of its parts, and values.
+"""
+
+import functools
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from tractexp import files
+from tractexp.errors import UserError, among
+from tractexp.schema import ModelConfig
+
+ENDINGS = (".yaml", ".yml")
+LARGEST = 1 << 20  # bytes
+DEEPEST = 20  # levels of values within one another
+DEFAULTS, SELF = "defaults", "_self_"
+PARTS = ("motor", "static")
+NAME = re.compile(r"[^\W_]\w*(-\w+)*")  # of a choice: no path, no package, no other group
+REFERENCES = ("${", "???")  # what Hydra would fill in, and what it takes for missing
+
+
+def is_model_path(name: str) -> bool:
+    """Whether what was chosen as a model is the path of a file, not the name of a choice."""
+    return name.endswith(ENDINGS)
+
+
+def read_model_file(path: Path | str) -> dict[str, Any]:
+    """The content of a model's file: keys of a model, and `defaults` that name its parts or a choice it begins with.
+
+    Raises `UserError` where the file is missing, too large, not YAML, or holds anything else than values of a model.
+    """
+    content = _parse(path, _read_text(path))
+    keys = [DEFAULTS, *(field.name for field in fields(ModelConfig))]
+    for key in content:
+        if key not in keys:
+            raise UserError(f"{path}: '{key}' is no key of a model{among(key, keys, 'Keys')}")
+    if DEFAULTS in content:
+        content[DEFAULTS] = _check_defaults(path, content[DEFAULTS])
+    _check_values(path, "model", {key: value for key, value in content.items() if key != DEFAULTS})
+    return content
+
+
+def _read_text(path: Path | str) -> str:
+    try:
+        if files.there(path) and os.stat(path).st_size > LARGEST:
+            raise UserError(f"{path} has more than {LARGEST >> 20} MB: it is no file of a model")
+        return files.read(path, LARGEST).decode("utf-8-sig")
+    except FileNotFoundError:
+        raise UserError(f"model={path}: there is no such file") from None
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; a model's file is YAML in UTF-8") from error
+
+
+def _parse(path: Path | str, text: str) -> dict[str, Any]:
+    import yaml
+
+    try:
+        content = yaml.load(text, Loader=_loader()) or {}
+    except yaml.YAMLError as error:
+        raise UserError(f"{path} is not the YAML of a model: {' '.join(str(error).split()):.200}") from error
+    except ValueError as error:  # what Python's reader of numbers and dates refuses
+        raise UserError(f"{path}: it holds a value that cannot be read ({error})") from error
+    if not isinstance(content, dict):
+        raise UserError(f"{path} must hold keys and values of a model")
+    return content
+
+
+@functools.cache
+def _loader() -> Any:
+    """YAML's safe loader, for values that stand where they are written, few levels deep; 1e-3 is a number."""
+    import yaml
+
+    class Loader(yaml.SafeLoader):
+        level = 0
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            if self.check_event(yaml.AliasEvent):
+                raise yaml.YAMLError("it has an alias (*name); write the value itself")
+            if self.level > DEEPEST:
+                raise yaml.YAMLError(f"its values lie more than {DEEPEST} levels within one another")
+            self.level += 1
+            node = super().compose_node(parent, index)
+            self.level -= 1
+            return node
+
+    number = re.compile(r"[-+]?\d[\d_]*[eE][-+]?\d+$")
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", number, list("-+0123456789"))
+    return Loader
+
+
+def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:
+    """The list as it stands: a choice to begin with, the names of a motor and of a static load, and `_self_`."""
+    for item in defaults if isinstance(defaults, list) else [defaults]:
+        (group, name) = next(iter(item.items())) if isinstance(item, Mapping) and len(item) == 1 else ("", item)
+        named = isinstance(name, str) and (name == SELF or NAME.fullmatch(name))
+        if not named or (isinstance(item, Mapping) and group not in PARTS):
+            raise UserError(
+                f"{path}: its defaults have {item!s:.80}; they may name a choice of a model, {SELF},"
+                " or a part: motor: NAME, static: NAME"
+            )
+    return list(defaults) if isinstance(defaults, list) else [defaults]
+
+
+def _check_values(path: Path | str, key: str, value: Any) -> None:
+    """Raise `UserError` for a key that is no text, and for a text that refers to something else."""
+    if isinstance(value, Mapping):
+        for name, inner in value.items():
+            if not isinstance(name, str):
+                raise UserError(f"{path}: {key} has the key {name!r:.40}; keys are names")
+            _check_values(path, f"{key}.{name}", inner)
+    elif isinstance(value, list):
+        for inner in value:
+            _check_values(path, key, inner)
+    elif isinstance(value, str) and any(mark in value for mark in REFERENCES):
+        raise UserError(f"{path}: {key} is {value:.60}; a model's file holds values, and no references to others")
