@@ -24,7 +24,9 @@ from tractexp.errors import UserError
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".tractexp.part"  # ends the name of a file that is being written
 OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)  # that name: nobody else gives a file such a one
-LARGEST = 2 << 30  # bytes of a file that is read at once
+LARGEST = 2 << 30  # bytes of a file that is read at once: a record
+CONFIGURATION, RESULT = 4 << 20, 128 << 20  # bytes of what a run reads, and leaves
+MOST_NODES, DEEPEST = 100_000, 50  # values of a configuration, and how deep within one another
 ODD = {stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
@@ -72,18 +74,23 @@ def check_there(path: Path) -> None:
         raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
 
 
-def read(path: Path | str, limit: int | None = None) -> bytes:
+def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) -> bytes:
     """The content of an ordinary file, or its first bytes to a limit.
 
-    Raises `UserError` for what is none, is larger than `LARGEST` or cannot be read, `FileNotFoundError` where it is
-    missing.
+    Raises `UserError` for what is none, has more bytes than `largest` or cannot be read, `FileNotFoundError` where it
+    is missing.
     """
     try:
-        if there(path) and limit is None and (size := os.stat(path).st_size) > LARGEST:
-            raise UserError(
-                f"{path} has {size / 1e9:.3g} GB; what is read at once has at most {LARGEST / 1e9:.2g} GB: give a part"
-            )
-        with open(path, "rb") as file:
+        there(path)
+        with open(path, "rb", opener=_opened) as file:
+            state = os.fstat(file.fileno())
+            if stat.S_IFMT(state.st_mode) in ODD:  # put in the place of a file meanwhile
+                raise UserError(f"{path} is {ODD[stat.S_IFMT(state.st_mode)]}, no ordinary file")
+            if limit is None and state.st_size > largest:
+                raise UserError(
+                    f"{path} has {state.st_size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB:"
+                    " give a part"
+                )
             return file.read(-1 if limit is None else limit)
     except FileNotFoundError:
         raise
@@ -91,10 +98,23 @@ def read(path: Path | str, limit: int | None = None) -> bytes:
         raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
 
 
-def read_json(path: Path | str) -> Any:
+def _opened(path: str, flags: int) -> int:
+    """Open without waiting for the other end of a named pipe."""
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
+
+
+def read_text(path: Path | str, largest: int = LARGEST) -> str:
+    """The text of an ordinary file in UTF-8. Raises `UserError` for what is none, and as `read`."""
+    try:
+        return read(path, largest=largest).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text") from error
+
+
+def read_json(path: Path | str, largest: int = RESULT) -> Any:
     """What a JSON file holds. Raises `UserError` for what is none, and as `read`."""
     try:
-        return json.loads(read(path).decode("utf-8-sig"))
+        return json.loads(read(path, largest=largest).decode("utf-8-sig"))
     except json.JSONDecodeError as error:
         raise UserError(f"{path}: line {error.lineno}: not valid JSON ({error.msg})") from error
     except UnicodeDecodeError as error:
@@ -103,6 +123,49 @@ def read_json(path: Path | str) -> Any:
         raise UserError(f"{path}: its brackets lie deeper within one another than can be read") from error
     except ValueError as error:  # what Python's reader of whole numbers refuses
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
+
+
+def read_yaml(path: Path | str) -> Any:
+    """What a configuration in YAML holds: plain data. Raises `UserError` for what is none, and as `read`.
+
+    An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory. What they come to
+    is counted before anything is made of it.
+    """
+    import yaml
+
+    text = read_text(path, CONFIGURATION)
+    try:
+        _count_nodes(text, path)
+        return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    except yaml.MarkedYAMLError as error:
+        line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
+        raise UserError(f"{path}: {line}not valid YAML ({error.problem or error.context})") from error
+    except (yaml.YAMLError, ValueError) as error:  # a sign that YAML has not, a date that the calendar has not
+        raise UserError(f"{path}: not valid YAML ({str(error).splitlines()[0]:.200})") from error
+
+
+def _count_nodes(text: str, path: Path | str) -> None:
+    """Raise `UserError` where YAML holds more, or nests deeper, than any configuration, its aliases written out."""
+    import yaml
+
+    sizes: dict[str, int] = {}
+    within: list[tuple[str | None, int]] = [(None, 0)]  # collections that are open: anchor, nodes so far
+    for event in yaml.parse(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
+        if isinstance(event, yaml.CollectionStartEvent):
+            within.append((event.anchor, 1))
+        elif isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
+            if isinstance(event, yaml.AliasEvent):
+                anchor, size = None, sizes.get(event.anchor, MOST_NODES + 1)  # one that is open: it holds itself
+            else:
+                anchor, size = within.pop() if isinstance(event, yaml.CollectionEndEvent) else (event.anchor, 1)
+            if anchor is not None:
+                sizes[anchor] = size
+            within[-1] = within[-1][0], within[-1][1] + size
+        if len(within) > DEEPEST or within[-1][1] > MOST_NODES:
+            raise UserError(
+                f"{path} holds more than {MOST_NODES} values, aliases written out, or nests them more than {DEEPEST}"
+                " deep, which no configuration does"
+            )
 
 
 def write(path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False) -> Path:

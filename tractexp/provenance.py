@@ -8,7 +8,7 @@ from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
-from tractexp import quoting
+from tractexp import quoting, repeatable
 
 PACKAGE = Path(__file__).parent
 
@@ -100,8 +100,16 @@ def again(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     its jobs repeat none.
     """
     whole = _repeated(settings, of)
-    by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if of == OF_LOAD]
+    possible = of == OF_LOAD and not any(map(_not_taken_over, _started[1:]))
+    by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible]
     return min(whole, *by_folder, key=len) if by_folder else whole
+
+
+def _not_taken_over(argument: str) -> bool:
+    """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
+    if group_of(argument) == "hydra" or "=" not in argument:  # which is none of the settings that a folder keeps
+        return argument.startswith("--config-dir")
+    return bool(repeatable.refusal(argument))
 
 
 def _repeated(settings: Collection[str], of: Collection[str]) -> str:

@@ -7,8 +7,12 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
+from command_line import free_port, run_command
 
 import tractexp.data
+from tractexp.cli.again import again
+from tractexp.errors import UserError
 
 DATA = Path(tractexp.data.__file__).parent
 QUICK = ("optimizer=random_search", "budget=10", "hydra.run.dir=run")
@@ -48,8 +52,6 @@ def test_no_module_beside_the_records_is_imported(start, arguments, trapped):
 
 
 def test_the_server_of_the_pages_imports_none_either(trapped, uri):
-    from command_line import free_port
-
     command = [str(Path(sys.executable).with_name("tractexp")), "ui", "--uri", uri, "--port", str(free_port())]
     with subprocess.Popen(command, cwd=trapped, stdout=subprocess.PIPE, text=True, env=os.environ) as server:
         assert server.stdout is not None
@@ -57,3 +59,97 @@ def test_the_server_of_the_pages_imports_none_either(trapped, uri):
         server.terminate()
     assert "ready" in said[1]
     assert not (trapped / "trapped").exists()
+
+
+# A run's folder that is done again
+
+
+def given(folder: Path, *settings: str, cwd: str = ".", searched: str = "") -> Path:
+    """The folder of a run that somebody else wrote."""
+    (folder / ".hydra").mkdir(parents=True)
+    sources = [{"provider": "main", "path": "pkg://x"}]
+    sources += [{"provider": "command-line", "path": searched}] if searched else []
+    runtime = {"hydra": {"runtime": {"cwd": cwd, "config_sources": sources}}}
+    (folder / ".hydra" / "hydra.yaml").write_text(yaml.safe_dump(runtime))
+    (folder / ".hydra" / "overrides.yaml").write_text(yaml.safe_dump(list(settings)))
+    return folder
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        "+hydra.callbacks.x._target_=numpy.testing.measure", "hydra.run.dir=mine", "hydra.sweep.dir=mine",
+        "hydra/launcher=basic", "hydra.launcher.address=tcp://1.2.3.4:5", "hydra.job.env_set={A: b}",
+        "hydra.searchpath=[file:///tmp]", "tracking.uri=http://1.2.3.4", "tracking.experiment=theirs",
+        "++tracking.uri=x", "~tracking", "optimizer@hydra.callbacks=pso", "optimizer=../../evil", "data=/tmp/evil",
+        "seed=${oc.env:HOME}", "data.path=${oc.env:HOME}", "task.docs=/home", "task.sweep=../mine", "hydra=x", "=5",
+        "experiment=../evil", "--config-dir=x", "unknown=1", "model=../evil", "model/motor=[../a]", "-m",
+    ],
+)  # fmt: skip
+def test_what_the_folder_of_a_run_may_not_say_is_refused_by_its_name(setting, tmp_path):
+    folder = given(tmp_path / "given", "optimizer=pso", setting)
+    done = run_command("again", str(folder), cwd=tmp_path)
+    assert done.returncode == 2
+    name = setting.partition("=")[0]
+    assert f"{name[:80]} is not taken over from the folder of a run" in done.stderr
+    assert done.stderr.count("\n") == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["given"]
+
+
+def test_what_is_refused_may_be_said_by_the_user(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = given(tmp_path / "given", "optimizer=pso", "tracking.uri=http://1.2.3.4")
+    assert again([str(folder), "tracking.uri=null"]) == ["optimizer=pso", "tracking.uri=null"]
+
+
+def test_configurations_of_others_are_looked_for_where_the_user_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = given(tmp_path / "given", "optimizer=pso", searched="/theirs")
+    with pytest.raises(UserError, match="used configurations in /theirs, which only you can name"):
+        again([str(folder)])
+    assert again([str(folder), "--config-dir", "mine"]) == ["--config-dir", str(tmp_path / "mine"), "optimizer=pso"]
+
+
+def test_a_run_is_repeated_above_its_folder_or_here_and_nowhere_else(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "elsewhere").mkdir()
+    again([str(given(tmp_path / "given", "seed=1", cwd=str(tmp_path / "elsewhere")))])
+    assert Path.cwd() == tmp_path
+    (tmp_path / "place").mkdir()
+    again([str(given(tmp_path / "place" / "runs" / "own", "seed=1", cwd=str(tmp_path / "place")))])
+    assert Path.cwd() == tmp_path / "place"
+
+
+LAUGHS = "- &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"- &a{k + 1} [{', '.join(10 * [f'*a{k}'])}]\n" for k in range(9)
+)
+
+
+@pytest.mark.parametrize(
+    ("content", "sentence"),
+    [
+        (LAUGHS, "holds more than 100000 values, aliases written out"),
+        ("- &a [*a]\n", "holds more than 100000 values"),
+        ("[" * 5000, "nests them more than 50 deep"),
+        ("- !!python/object/apply:os.mkdir [x]\n", "not valid YAML"),
+        ("- 2001-99-99\n", "not valid YAML"),
+        ("- a: [", "line 2: not valid YAML"),
+        ("- \0\n", "not valid YAML"),
+        (b"- \xff\n", "is not UTF-8"),
+        ("5", "holds no run"),
+        ("", "holds no run"),
+        (b" " * (4 << 20) + b"x", "a file of its kind at most"),
+        (None, "is a named pipe"),
+    ],
+    ids=["laughs", "cycle", "deep", "object", "date", "cut", "zero", "bytes", "number", "empty", "giant", "pipe"],
+)
+def test_a_damaged_configuration_is_a_sentence_and_takes_no_time(content, sentence, tmp_path):
+    folder = given(tmp_path / "given", "optimizer=pso")
+    path = folder / ".hydra" / "overrides.yaml"
+    path.unlink()
+    if content is None:
+        os.mkfifo(path)
+    else:
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(UserError, match=sentence):
+        again([str(folder)])

@@ -2,49 +2,64 @@
 
 import argparse
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
-from tractexp import quoting
+from tractexp import files, quoting
 from tractexp.cli.chosen import reads
 from tractexp.cli.configuration import FOLDER
 from tractexp.errors import UserError
 from tractexp.plugin import get
 from tractexp.progress import say
 from tractexp.provenance import group_of
+from tractexp.repeatable import refusal
 
 RESULT = "result.json"
+SEARCHED = "--config-dir"
 
 
 def again(arguments: list[str]) -> list[str]:
     """The arguments of `tractexp` that repeat a run with other settings, in the folder where that ran.
 
     What the task does not read is left out, and a setting of a group goes with the choice of another there. A task that
-    takes a result (`task.parameters`) is given that of the run. Raises `UserError` where the folder holds no run.
+    takes a result (`task.parameters`) is given that of the run. The folder may be somebody else's: what it may say is
+    in `repeatable`. Raises `UserError` where it holds no run, or says more.
     """
     parser = argparse.ArgumentParser(prog="tractexp again", description=(again.__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", metavar="RUN_FOLDER", help="the folder of an earlier run")
     parser.add_argument("settings", metavar="KEY=VALUE", nargs="*", help="what is to be different, as task=discrepancy")
+    parser.add_argument(SEARCHED, help="a folder of configurations of your own that the run used")
     chosen = parser.parse_args(arguments)
     folder = Path(chosen.folder).absolute()
     if odd := [text for text in chosen.settings if "=" not in text]:
         raise UserError(f"{odd[0]} is no setting; give KEY=VALUE, as task=discrepancy")
-    whole, lines = _stored(folder)
-    _enter(Path(whole["runtime"]["cwd"]))
-    search = [s["path"] for s in whole["runtime"]["config_sources"] if s["provider"] == "command-line"]
-    result = [*(part for path in search for part in ("--config-dir", path)), *repeated(lines, chosen.settings, folder)]
+    lines, cwd, searched = _stored(folder)
+    if searched and chosen.config_dir is None:
+        raise UserError(
+            f"{folder} used configurations in {searched[0]}, which only you can name: where they are yours, give"
+            f" {SEARCHED} {quoting.shell(searched[0])} too"
+        )
+    given = [SEARCHED, str(Path(chosen.config_dir).absolute())] if chosen.config_dir else []
+    _enter(cwd, folder)
+    result = [*given, *repeated(lines, chosen.settings, folder)]
     say(f"that is: {quoting.shell('tractexp', *result)}")
     return result
 
 
 def repeated(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
-    """Earlier settings that still count beside newer ones, and these."""
+    """Earlier settings that still count beside newer ones, and these. Raises `UserError` for one not taken over."""
     settings = list(settings)
     keys = {_key(text) for text in settings}
     groups = {key for key in keys if key == group_of(key)}
     stay = [text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups]
+    for text in stay:
+        if why := refusal(text):
+            key = text.partition("=")[0]
+            raise UserError(
+                f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it is meant, say so:"
+                f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
+            )
     names = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
     task = get("task", names[-1] if names else "identify")
     stay = [text for text in stay if reads(task, _key(text).replace("/", "."))]
@@ -57,20 +72,23 @@ def _key(text: str) -> str:
     return text.partition("=")[0].lstrip("+~").partition("@")[0]
 
 
-def _stored(folder: Path) -> tuple[Mapping[str, Any], list[str]]:
-    """Hydra's own part of a run's configuration, and the settings that were chosen."""
-    import yaml
-
+def _stored(folder: Path) -> tuple[list[str], Path, list[str]]:
+    """The settings that were chosen for a run, where it ran, and the folders that it read configurations from."""
     try:
-        files = [(folder / FOLDER / name).read_text(encoding="utf-8") for name in ("hydra.yaml", "overrides.yaml")]
-        whole, arguments = (yaml.safe_load(text) for text in files)
-        return whole["hydra"], [str(text) for text in arguments]
-    except (OSError, UnicodeDecodeError, yaml.YAMLError, LookupError, TypeError) as error:
+        whole, arguments = (files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml"))
+        runtime = whole["hydra"]["runtime"]
+        sources = [s["path"] for s in runtime["config_sources"] if s["provider"] == "command-line"]
+        return [str(text) for text in arguments], Path(runtime["cwd"]), [str(path) for path in sources]
+    except (FileNotFoundError, LookupError, TypeError) as error:
         raise UserError(f"{folder} holds no run ({FOLDER} is missing or damaged); give the folder of one") from error
 
 
-def _enter(cwd: Path) -> None:
-    """Go where the run was: its settings name files from there."""
-    if cwd.is_dir() and cwd != Path.cwd():
+def _enter(cwd: Path, folder: Path) -> None:
+    """Go where the run was, since its settings name files from there: to a folder that holds its own, to no other."""
+    if not cwd.is_dir() or cwd.resolve() == Path.cwd().resolve():
+        return
+    if folder.resolve().is_relative_to(cwd.resolve()):
         os.chdir(cwd)
         say(f"in {cwd}, where that run was")
+    else:
+        say(f"here, though that run was in {cwd}: files that it names from there may be missing")
