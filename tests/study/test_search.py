@@ -275,6 +275,23 @@ def test_polish_follows_a_search_that_ends_by_itself():
     assert found.status.startswith("finished")
 
 
+class Yieldless(Optimizer):
+    """Evaluates at the call of `search`, as one does who forgets the `yield`."""
+
+    name = "yieldless"
+
+    def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator):
+        for _ in range(3):
+            evaluate(box.uniform(rng, 10))
+
+
+@pytest.mark.parametrize("limits", [Limits(), Limits(simulations=20), Limits(target=1e9)])
+@pytest.mark.parametrize("polish", [False, True])
+def test_an_optimizer_that_never_yields_is_refused(limits, polish):
+    with pytest.raises(UserError, match="optimizer 'yieldless': its search never yields"):
+        search(Watched(), Yieldless(polish=polish), 0, limits)
+
+
 def test_polish_leaves_a_reached_target_alone():
     optimizer = build("optimizer", {"name": "random_search", "polish": True})
     found = search(Watched(), optimizer, 3, Limits(target=0.1))

@@ -148,15 +148,34 @@ def _before_polish(limits: Limits, dimension: int) -> Limits:
     return Limits(simulations, None if seconds is None else seconds * (1 - POLISH_SHARE), limits.target)
 
 
+def _begin_search(counter: _Counter, optimizer: Optimizer, rng: np.random.Generator) -> Iterator[None]:
+    """Return the optimizer's iterations, none of which has begun.
+
+    Raises `UserError` where `search` runs at its call, as it does without a `yield`: there would
+    be no iterations, and no budget would end it.
+    """
+    why = (
+        f"optimizer '{optimizer.name}': its search never yields; write `yield` at the end of each"
+        " iteration, the first population being the first"
+    )
+    try:
+        iterations = optimizer.search(counter, counter.box, rng)
+    except _Stop:
+        raise UserError(why) from None
+    if counter.simulations or not isinstance(iterations, Iterator):
+        raise UserError(why)
+    return iterations
+
+
 def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generator) -> Iterator[None]:
     """The optimizer's iterations, then, where asked for, the polish in what the limits have kept back for it."""
     if not optimizer.polish:
-        yield from optimizer.search(counter, counter.box, rng)
+        yield from _begin_search(counter, optimizer, rng)
         return
     limits, counter.elite = counter.limits, Elite(counter.box)
     counter.limits = _before_polish(limits, counter.box.dimension)
     try:
-        yield from optimizer.search(counter, counter.box, rng)
+        yield from _begin_search(counter, optimizer, rng)
     except _Reached:
         raise
     except _Stop:
