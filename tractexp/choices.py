@@ -12,11 +12,14 @@ import importlib.util
 import pkgutil
 import re
 from collections import defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from tractexp.errors import nearest
+
 ENTRY_POINTS = "tractexp.plugins"
+FEWEST_VARIANTS = 3  # of a plugin that are told as a number
 HERE = Path(__file__).resolve().parent
 CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())  # in a wheel, in a clone
 
@@ -81,6 +84,40 @@ def set_holding(sources: tuple[str, ...]) -> str:
         if content.get("validate") and set(sources) <= set(content.get("train") or ()):
             return file.stem
     return ""
+
+
+def find_varied(name: str, plugins: Collection[str]) -> str:
+    """Return the plugin that a configuration varies, by its name: `issa` of `issa_no_levy`."""
+    stems = [plugin for plugin in plugins if name.startswith(f"{plugin}_")]
+    return name if name in plugins or not stems else max(stems, key=len)
+
+
+def group_variants(names: Mapping[str, Option]) -> dict[str, list[str]]:
+    """Return {name: what varies it, in order} of the names of a group.
+
+    Fewer than `FEWEST_VARIANTS` stand for themselves.
+    """
+    plugins = {name for name, option in names.items() if option.module}
+    families: dict[str, list[str]] = {}
+    for name in names:
+        families.setdefault(find_varied(name, plugins), []).append(name)
+    grouped: dict[str, list[str]] = {}
+    for base, members in families.items():
+        varied = [name for name in members if name != base]
+        if len(varied) >= FEWEST_VARIANTS:
+            grouped[base] = varied
+        else:
+            grouped |= {name: [] for name in members}
+    return grouped
+
+
+def describe_available(group: str, name: str, names: Iterable[str]) -> str:
+    """Return the end of a sentence on an unknown choice: the nearest, and all but variants."""
+    names = sorted(names)
+    plugins = choices().get(group, {})
+    grouped = group_variants({name: plugins.get(name, Option(name, "")) for name in names})
+    parts = [f"{base} and {len(varied)} variants" if varied else base for base, varied in sorted(grouped.items())]
+    return f"{nearest(name, names) or '.'} Available: {', '.join(parts) or 'none'}"
 
 
 def entry_points() -> list[importlib.metadata.EntryPoint]:

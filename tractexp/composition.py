@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import plugin
-from tractexp.choices import elsewhere
-from tractexp.errors import UserError, among
+from tractexp.choices import describe_available, elsewhere
+from tractexp.errors import UserError
 from tractexp.model_file import is_model_path, read_model_file
 
 MODEL = "model"  # the group
@@ -30,7 +30,7 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
     elif name in plugin.discover().get(group, {}):
         return {"name": name}
     else:
-        where = elsewhere(group, name) or among(name, choices(group))
+        where = elsewhere(group, name) or describe_available(group, name, choices(group))
         raise UserError(f"{group}={name}: there is no such choice{where}")
     composed: dict[str, Any] = {}
     for item in content.pop("defaults", []):

@@ -8,6 +8,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass
 from typing import Any
 
+LEAST_LIKENESS = 0.5  # of a name that an error proposes
+
 _spelling: ContextVar[Callable[[str], str]] = ContextVar("spelling", default=str)
 
 
@@ -85,8 +87,22 @@ class Unknown(UserError, AttributeError):
 
 def nearest(name: str, allowed: Iterable[str]) -> str:
     """Return "; did you mean 'x'?" for the closest allowed name, or "" when nothing is close."""
-    close = difflib.get_close_matches(str(name), list(allowed), n=1, cutoff=0.5)
-    return f"; did you mean '{close[0]}'?" if close else ""
+    ratios = {other: _measure_likeness(str(name), other) for other in allowed}
+    closest = max(ratios, key=lambda other: (ratios[other], other), default="")
+    return f"; did you mean '{closest}'?" if ratios.get(closest, 0.0) >= LEAST_LIKENESS else ""
+
+
+def _measure_likeness(name: str, other: str) -> float:
+    """Return how alike two names are, from 0 to 1, letter by letter or with their words in order.
+
+    `torque_of_load` is `load_torque` by its words, and like `motor_voltage` by its letters only.
+    """
+    pairs = ((name, other), (_sort_words(name), _sort_words(other)))
+    return max(difflib.SequenceMatcher(None, one, two).ratio() for one, two in pairs)
+
+
+def _sort_words(name: str) -> str:
+    return "_".join(sorted(name.split("_")))
 
 
 def among(name: object, allowed: Iterable[str], label: str = "Available") -> str:

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from tractexp.choices import elsewhere
+from tractexp.choices import describe_available, elsewhere
 from tractexp.errors import UserError, among
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
@@ -80,7 +80,7 @@ def _missing(error: Any) -> str:
     if not group or not options:
         return _first_line(error)
     where = elsewhere(group, choice)
-    return f"{group}={choice}: there is no such choice{where or among(choice, options)}"
+    return f"{group}={choice}: there is no such choice{where or describe_available(group, choice, options)}"
 
 
 def _sentence(error: BaseException) -> str:

@@ -6,7 +6,7 @@ import shutil
 import textwrap
 from collections.abc import Collection, Mapping
 
-from tractexp.choices import Option, choices, defaults, sentence
+from tractexp.choices import Option, choices, defaults, group_variants, sentence
 from tractexp.errors import UserError, among
 
 WIDTH = 100  # columns
@@ -73,9 +73,9 @@ def usage() -> str:
 
 
 def listed(arguments: list[str]) -> int:
-    """`tractexp list [GROUP ...]`: print every name with a sentence on each; returns the exit code.
+    """`tractexp list [GROUP or NAME ...]`: print every name with a sentence on each; returns the exit code.
 
-    Raises `UserError` for a group that is none.
+    Of a NAME that has variants these are printed. Raises `UserError` for what is neither.
     """
     about = "Show what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
     parser = argparse.ArgumentParser(prog="tractexp list", description=about)
@@ -84,19 +84,38 @@ def listed(arguments: list[str]) -> int:
     short = {group.rpartition("/")[2]: group for group in options}  # `static`, as `tractexp new static` has it
     names: list[str] = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
     chosen = [short.get(name) or name for name in names]
-    for group in chosen:
-        if group not in options:
-            holders = [f"'tractexp list {holder}'" for holder in _ordered(options) if group in options[holder]]
-            hint = (
-                f", but there is such a name in {' and '.join(holders)}" if holders else among(group, options, "Groups")
-            )
-            raise UserError(f"there is no group '{group}'{hint}")
+    for name in chosen:
+        if name not in options and not _find_group_of_variants(name, options):
+            raise UserError(f"there is no group '{name}'{_describe_holders(name, options)}")
     options, refused = _imported(options)
     width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
-    print("\n\n".join(_described(group, options[group], width) for group in chosen or _ordered(options)))
+    print("\n\n".join(_describe(name, options, width) for name in chosen or _ordered(options)))
     for why in refused:
         print(f"\nleft out: {why}")
     return 0
+
+
+def _describe(name: str, options: Mapping[str, Mapping[str, Option]], width: int) -> str:
+    """Return what there is of a group, or of a name that has variants."""
+    if name in options:
+        return _described(name, options[name], width)
+    return _describe_variants(name, options[_find_group_of_variants(name, options)], width)
+
+
+def _find_group_of_variants(name: str, options: Mapping[str, Mapping[str, Option]]) -> str:
+    """Return the group in which a name has variants; "" where there is none."""
+    for group in _ordered(options):
+        if group_variants(options[group]).get(name):
+            return group
+    return ""
+
+
+def _describe_holders(name: str, options: Mapping[str, Mapping[str, Option]]) -> str:
+    """Return the end of a sentence on a name that is no group: the groups that hold it, or all groups."""
+    holders = [f"'tractexp list {group}'" for group in _ordered(options) if name in options[group]]
+    if holders:
+        return f", but there is such a name in {' and '.join(holders)}"
+    return among(name, options, "Groups")
 
 
 def _imported(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, dict[str, Option]], list[str]]:
@@ -122,25 +141,26 @@ def _described(group: str, names: Mapping[str, Option], width: int) -> str:
     head = f"{group}: {GROUPS[group]}" if group in GROUPS else group
     if chosen := defaults().get(group):
         head += f"; {chosen} by default"
-    return f"{head}\n{_columns({name: names[name].about for name in _sorted(group, names)}, width)}"
+    grouped = group_variants({name: names[name] for name in _sorted(group, names)})
+    rows = {base: names[base].about for base in grouped}
+    for base, varied in grouped.items():
+        if varied:
+            rows[base] += f" {len(varied)} variants: tractexp list {base}"
+    return f"{head}\n{_columns(rows, width)}"
+
+
+def _describe_variants(base: str, names: Mapping[str, Option], width: int) -> str:
+    """Return a plugin and its variants, each with its sentence."""
+    varied = sorted(group_variants(names)[base])
+    return _columns({name: names[name].about for name in [base, *varied]}, width)
 
 
 def _summary(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
-    plugins = {name for name, choice in names.items() if choice.module}
-    families: dict[str, list[str]] = {name: [] for name in _sorted(group, names) if _of(name, plugins) == name}
-    for name in _sorted(group, names):
-        families[_of(name, plugins)].append(name)
-    parts = [f"{name} and {len(own) - 1} variants" if len(own) > 2 else ", ".join(own)
-             for name, own in families.items()]  # fmt: skip
+    grouped = group_variants({name: names[name] for name in _sorted(group, names)})
+    parts = [f"{base} and {len(varied)} variants" if varied else base for base, varied in grouped.items()]
     more = f" and {len(parts) - FEW + 1} others" if len(parts) > FEW else ""
     return ", ".join(parts[: FEW - 1] if more else parts) + more
-
-
-def _of(name: str, plugins: Collection[str]) -> str:
-    """The plugin that a configuration varies, as its name says: `issa` of `issa_no_levy`; else the name itself."""
-    stems = [plugin for plugin in plugins if name.startswith(f"{plugin}_")]
-    return name if name in plugins or not stems else max(stems, key=len)
 
 
 def _ordered(options: Mapping[str, object]) -> list[str]:

@@ -289,7 +289,11 @@ def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
         head, *lines = block.splitlines()
         rows = [line.split(maxsplit=1) for line in lines if line[2] != " "]
         assert all(len(row) == 2 for row in rows), rows  # each has a line that says what it is
-        told[head.partition(":")[0]] = {name for name, _ in rows}
+        group = head.partition(":")[0]
+        told[group] = {name for name, _ in rows}
+        for base in re.findall(r"\d+ variants: tractexp list (\w+)", " ".join(block.split())):
+            variants = run_command("list", base, cwd=tmp_path).stdout.splitlines()
+            told[group] |= {line.split()[0] for line in variants if line[2] != " "}
     files = {f"{p.parent.relative_to(CONF)}/{p.stem}" for p in CONF.glob("[!_]*/**/*.yaml")}
     classes = {f"{group}/{name}" for group, names in discover().items() for name in names}
     assert {f"{group}/{name}" for group, names in told.items() for name in names} == files | classes
@@ -302,7 +306,9 @@ def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
 def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp_path):
     done = run_command("list", "optimizer", "experiment", cwd=tmp_path)
     assert "optimizer: how the parameters are searched; issa by default\n  issa  " in done.stdout
-    assert "ISSA without the Lévy flight of Eq. (16).\n" in done.stdout
+    assert "issa_no_levy" not in done.stdout  # the ablation's variants do not hide what there is
+    assert "12 variants: tractexp list issa\n" in done.stdout
+    assert "ISSA without the Lévy flight of Eq. (16).\n" in run_command("list", "issa", cwd=tmp_path).stdout
     assert done.stdout.index("figure3 ") < done.stdout.index("figure10 ")
     assert "model/motor" not in done.stdout
 
