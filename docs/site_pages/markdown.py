@@ -68,13 +68,13 @@ def _comments(cls: type) -> Iterator[tuple[str, str]]:
     if call := getattr(cls, "function", None):
         lines, node = _parsed(call)
         for item in (*node.args.args, *node.args.kwonlyargs):
-            yield from _beside(lines, item.end_lineno, item.arg)
+            yield from _beside(lines, item, item.arg)
     for base in reversed(cls.__mro__):
         if dataclasses.is_dataclass(base):
             lines, node = _parsed(base)
             for item in node.body:
                 if isinstance(item, ast.AnnAssign):
-                    yield from _beside(lines, item.end_lineno, item.target.id)
+                    yield from _beside(lines, item, item.target.id)
 
 
 def _parsed(thing: Any) -> tuple[list[str], Any]:
@@ -84,6 +84,15 @@ def _parsed(thing: Any) -> tuple[list[str], Any]:
     return source.splitlines(), node
 
 
-def _beside(lines: list[str], number: int, name: str) -> Iterator[tuple[str, str]]:
-    if comment := re.search(r"#\s*(.+)$", lines[number - 1]):
+def _beside(lines: list[str], item: ast.AST, name: str) -> Iterator[tuple[str, str]]:
+    """(name, the comment at the end of a declaration, or else on the lines above it)."""
+    if comment := re.search(r"#\s*(.+)$", lines[item.end_lineno - 1]):
         yield name, comment[1]
+        return
+    above: list[str] = []
+    for line in reversed(lines[: item.lineno - 1]):
+        if not line.lstrip().startswith("#"):
+            break
+        above.insert(0, line.lstrip("# "))
+    if above:
+        yield name, " ".join(above)
