@@ -99,7 +99,13 @@ def test_the_main_job_is_logged_as_contracted(main_job):
         tags = dict(ask("select key, value from tags"))
         curves = dict(ask("select key, count(*) from metrics group by key"))
     assert parameters["optimizer.population"] == "50"
-    assert float(parameters["T_prime"]) == result["parameters"]["T_prime"]
+    assert not set(result["parameters"]) & set(parameters), "what was found is a number, and no setting"
+    low, high = result["intervals"]["T_prime"]
+    assert (metrics["T_prime"], metrics["T_prime_low"], metrics["T_prime_high"]) == (
+        result["parameters"]["T_prime"], low, high,
+    )  # fmt: skip
+    assert metrics["search_T_prime"] == result["search"]["parameters"]["T_prime"]
+    assert (tags["grade"], metrics["grade"]) == ("effect_missing", 1)
     assert metrics["objective"] == result["objective"]
     assert metrics["search_objective"] == result["search"]["objective"]
     assert metrics["train_1_epsilon_p"] == result["epsilon_p"]

@@ -1,5 +1,6 @@
 """What a run leaves in MLflow, read back through MLflow's own public client."""
 
+import base64
 import importlib
 import json
 import logging
@@ -13,6 +14,7 @@ import subprocess
 import sys
 import time
 import urllib.request
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +73,22 @@ def test_a_run_comes_back_as_it_was_logged(tmp_path, uri):
     assert "mlflow.parentRunId" not in found.data.tags
     assert client(uri).get_experiment(found.info.experiment_id).name == "identify tibet_50pct"
     assert [a.path for a in client(uri).list_artifacts(found.info.run_id)] == ["result.json"]
+
+
+def test_what_was_never_reached_is_no_number_of_a_chart(uri):
+    metrics = {"search_simulations_to_floor": float("inf"), "objective": 1.0}
+    run_id = tracking.log(TrackedRun("e", "r", metrics=metrics), uri)
+    assert client(uri).get_run(run_id).data.metrics == {"objective": 1.0}
+
+
+def test_a_new_experiment_leads_to_the_columns_that_matter_from_any_page_of_mlflows(uri):
+    found = client(uri).get_run(tracking.log(TrackedRun("e", "r"), uri))
+    experiment = client(uri).get_experiment(found.info.experiment_id)
+    address = f"#/experiments/{experiment.experiment_id}/runs?viewStateShareKey=tractexp&compareRunsMode=TABLE"
+    assert f"]({address})" in experiment.tags["mlflow.note.content"]
+    packed = experiment.tags["mlflow.sharedViewState.tractexp"].removeprefix("deflate;")
+    columns = json.loads(zlib.decompress(base64.b64decode(packed)))["selectedColumns"]
+    assert {"metrics.`search_objective`", "metrics.`model_error`", "metrics.`grade`"} <= set(columns)
 
 
 def test_curves_keep_their_steps_and_every_point(uri):

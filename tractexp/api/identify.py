@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 FIXED = "fixed"
 FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
-FLOOR = 1.01  # times the estimate's objective: from there a search has found what the noise leaves
 MOVED = 2.0  # standard errors from which a rival structure's move is told
 
 
@@ -453,46 +452,7 @@ class Identify(Task, call=identify):
         return not job.in_sweep if self.figures is None else self.figures
 
     def logged(self, job: Job, result: Identification) -> dict[str, Any]:
+        from tractexp.api.logged import logged_fit
+
         predictor = not job.in_sweep if self.predictor is None else self.predictor
-        return logged(job, result, predictor)
-
-
-def logged(job: Job, fit: Identification, predictor: bool = False) -> dict[str, Any]:
-    """What is logged of an identification: metrics, the fitness curve and, as a predictor, the model."""
-    from tractexp.tracking import at_common_steps
-
-    result, of_search = fit.result, ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
-    metrics = {key: getattr(result, key) for key in of_search} | {f"search_{k}": result.search[k] for k in of_search}
-    metrics["search_simulations_to_floor"] = _simulations_to_floor(fit)
-    metrics["model_error"] = result.model_error["value"]
-    if result.model_error["held_out"]:
-        metrics["model_error_held_out"] = result.model_error["held_out"]["value"]
-    if (ratio := result.linear_network.get("ratio")) is not None:
-        metrics["model_error_over_linear_network"] = ratio
-    for k, event in enumerate(result.events, start=1):
-        metrics |= {f"{event['role']}_{k}_{e}": event[e] for e in result.epsilons}
-    if "epsilon_i" in result.epsilons:
-        metrics["epsilon_i"] = max(e["epsilon_i"] for e in result.events if e["role"] == "train")
-    history = fit.search_result.history
-    valid = history.objective < REFUSED
-    best = history.objective[valid]
-    curves = {
-        "fitness": (np.flatnonzero(valid), best),
-        "fitness_by_simulations": at_common_steps(history.simulations[valid], best),
-    }
-    searched = f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
-    if job.label:
-        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.in_sweep])
-    return {
-        "name": searched,
-        "values": result.parameters | {f"given_base.{n}": v for n, v in result.parameters_on_given_base.items()},
-        "metrics": metrics, "curves": curves, "seconds": result.seconds, "description": fit.headline,
-        "records": result.records, "model": job.folder / "result.json" if predictor else None,
-    }  # fmt: skip
-
-
-def _simulations_to_floor(fit: Identification) -> float:
-    """After how many simulations the search was within 1 % of the estimate's objective; infinite where it never was."""
-    history = fit.search_result.history
-    there = np.flatnonzero(history.objective <= FLOOR * fit.result.objective)
-    return float(history.simulations[there[0]]) if there.size else float("inf")
+        return logged_fit(job, result, predictor)

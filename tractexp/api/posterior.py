@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification, logged
+from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import check_range
@@ -116,4 +116,6 @@ class Posterior(Task, call=posterior):
     """Identify, then sample the posterior under a flat prior within the bounds: posterior.html, .json and .npz."""
 
     def logged(self, job: Job, result: Sampled) -> dict[str, Any]:
-        return logged(job, result.fit)
+        from tractexp.api.logged import logged_fit
+
+        return logged_fit(job, result.fit)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.identify import Identification, logged
+from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import check_range
@@ -135,4 +135,6 @@ class Profile(Task, call=profile):
     """Identify, then find the best fit for each value of each parameter in turn: profile.html and profile.json."""
 
     def logged(self, job: Job, result: Profiled) -> dict[str, Any]:
-        return logged(job, result.identification)
+        from tractexp.api.logged import logged_fit
+
+        return logged_fit(job, result.identification)

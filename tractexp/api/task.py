@@ -139,11 +139,11 @@ class Task(Plugin):
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
-        content = {"name": self.name, "values": {}, "artifacts": [*paths, job.folder / ".hydra"]}
+        content = {"name": self.name, "artifacts": [*paths, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))
 
     def logged(self, job: "Job", result: Any) -> dict[str, Any]:
-        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` of parameters."""
+        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that were given."""
         return {}
 
 
@@ -306,10 +306,14 @@ class Job:
         if self.config["tracking"]["enabled"] and not self.in_sweep:
             _ = self._logger
 
-    def log(self, name: str, values: Mapping[str, float], **content: Any) -> None:
+    def log(
+        self, name: str, values: Mapping[str, float] | None = None, tags: Mapping[str, str] | None = None,
+        **content: Any,
+    ) -> None:  # fmt: skip
         """Log this job in MLflow with its configuration and tags, and say how to look at it.
 
-        `values` are identified parameters; `content` are further fields of `tractexp.tracking.TrackedRun`.
+        `values` are numbers that were given beside the configuration, `tags` are added to the job's own; `content` are
+        further fields of `tractexp.tracking.TrackedRun`.
         """
         node = self.config["tracking"]
         self.measured.update(content.get("metrics", {}))
@@ -318,11 +322,11 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
-        parts |= {"variant": self.variant, "seed": str(self.seed), LABEL: self.label}
+        parts |= {"variant": self.variant, "seed": str(self.seed), LABEL: self.label, **(tags or {})}
         run = tracking.TrackedRun(
             experiment=self.experiment,
             name=", ".join(filter(None, (self.label, name))),
-            parameters={**tracking.flatten(self.config), **values},
+            parameters={**tracking.flatten(self.config), **(values or {})},
             tags={key: text for key, text in parts.items() if text} | {"git_commit": provenance.commit()},
             parent=self.sweep,
             **content,

@@ -63,7 +63,7 @@ class Cores(Launcher):
         numbered = enumerate(job_overrides, start=initial_job_idx)
         jobs = place([SweepJob.of(compose(texts, k), texts) for k, texts in numbered], folder)
         self.launched |= {job.folder: job for job in jobs}
-        asked = [*OmegaConf.to_container(self.config.hydra.overrides.task)]
+        asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
         with parent_run(folder, [*self.launched.values()], asked, afresh=False):
             self.run([job for job in {job.folder: job for job in jobs}.values() if not finished(job)])
         return [_returned(job, status.read(job.folder)) for job in jobs]

@@ -302,7 +302,7 @@ def _experiment(client: Any, name: str, uri: str) -> str:
         folder = re.sub(r"[^\w.-]+|^\.+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
-            return client.create_experiment(name, artifact_location=location)
+            return _created(client, name, location)
         except MlflowException:  # another process created it first; if not, the next line raises
             experiment = client.get_experiment_by_name(name)
             if experiment is None:
@@ -313,6 +313,16 @@ def _experiment(client: Any, name: str, uri: str) -> str:
             f"'mlflow experiments restore --experiment-id {experiment.experiment_id}' or log under another name"
         )
     return experiment.experiment_id
+
+
+def _created(client: Any, name: str, location: str | None) -> str:
+    """The id of a new experiment, which opens on the columns that matter."""
+    from tractexp.tracking.view import tags_of_new
+
+    experiment_id = client.create_experiment(name, artifact_location=location)
+    for key, value in tags_of_new(experiment_id).items():
+        client.set_experiment_tag(experiment_id, key, value)
+    return experiment_id
 
 
 def _milliseconds(time_of: float | None = None) -> int:

@@ -20,6 +20,11 @@ RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run 
 LOAD = "load"  # a tag of runs on the records of a station: these are compared load by load, not by optimizer
 ERRORS = ("model_error", "model_error_held_out", "model_error_over_linear_network")  # the first columns
 GROUPS = ("variant", "optimizer")  # tags to group by: early runs have only the second
+METRICS = (
+    "search_objective", "search_epsilon_p", "search_epsilon_q", "search_simulations", *ERRORS, "grade", "objective",
+    "epsilon_p", "epsilon_q",
+)  # fmt: skip
+COLUMNS = [*(f"metrics.`{name}`" for name in METRICS), "tags.`variant`", "tags.`seed`"]
 STATE = {
     "searchFilter": RUNS,
     "orderByKey": "metrics.`search_objective`",
@@ -34,6 +39,12 @@ AXES = {
     "xAxisKey": "step", "xAxisScaleType": "linear", "yAxisKey": "metric", "lineSmoothness": 0, "range": {},
     "useGlobalXaxisKey": True, "useGlobalLineSmoothing": True, "yAxisExpressions": [],
 }  # fmt: skip
+
+
+def _compared(metric_x: str, metric_y: str) -> dict[str, Any]:
+    """What one metric cost in terms of another, a point a run."""
+    axes = {axis: {"key": key, "type": "METRIC"} for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))}
+    return _chart("SCATTER", f"{metric_y} by {metric_x}", **axes)
 
 
 def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
@@ -61,15 +72,13 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
         for metric in ("search_objective", "objective", "epsilon_p", "epsilon_q")
     ]
     bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
+    bars.insert(0, _compared("search_simulations", "search_objective"))
     section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
-    columns = (
-        *ERRORS, "objective", "epsilon_p", "epsilon_q", "search_objective", "search_simulations",
-    )  # fmt: skip
     return STATE | {
         "groupBy": {
             "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": key} for key in keys],
         },
-        "selectedColumns": [*(f"metrics.`{name}`" for name in columns), "tags.`variant`", "tags.`seed`"],
+        "selectedColumns": COLUMNS,
         "groupsExpanded": {f"tag.{group}": False for group in groups},
         "compareRunCharts": [*curves, *points, *bars],
         "compareRunSections": [section | {"isReordered": False}],
@@ -87,6 +96,18 @@ def _of_loads() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def page(experiment_id: str, mode: str) -> str:
+    """The address of the view within MLflow's page."""
+    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode={mode}"
+
+
+def tags_of_new(experiment_id: str) -> dict[str, str]:
+    """The tags by which a new experiment has the view as a table, and its description leads there from any page."""
+    table = STATE | {"groupBy": None, "compareRunsMode": "TABLE", "selectedColumns": COLUMNS}
+    note = f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
+    return {TAG: _packed(table), "mlflow.note.content": note}
+
+
 def comparison_view(uri: str) -> str:
     """Store the view in the experiment that has the newest identification, and return its page for `serve`.
 
@@ -101,7 +122,10 @@ def comparison_view(uri: str) -> str:
         experiment_id = newest[0].info.experiment_id
         runs = client.search_runs([experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"])
     state = _state([run.data.tags for run in runs])
-    packed = base64.b64encode(zlib.compress(json.dumps(state).encode())).decode()
-    tag_experiment(names[experiment_id], {TAG: f"deflate;{packed}"}, uri)
-    mode = state["compareRunsMode"]
-    return f"#/experiments/{experiment_id}/runs?viewStateShareKey={KEY}&compareRunsMode={mode}"
+    tag_experiment(names[experiment_id], {TAG: _packed(state)}, uri)
+    return page(experiment_id, state["compareRunsMode"])
+
+
+def _packed(state: Mapping[str, Any]) -> str:
+    """A view as MLflow keeps it in a tag."""
+    return "deflate;" + base64.b64encode(zlib.compress(json.dumps(state).encode())).decode()

@@ -196,4 +196,4 @@ class Paper(Task, call=paper):
         if self.docs is not None:
             listed(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
         metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
-        job.log(name="the paper", values={}, metrics=metrics, artifacts=paths)
+        job.log(name="the paper", metrics=metrics, artifacts=paths)
