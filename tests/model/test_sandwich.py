@@ -6,8 +6,9 @@ import uncertainty as study
 from written_out import dense
 
 from tractexp.identification.uncertainty import conclude, threshold
-from tractexp.inference.blocks import LENGTH, blocks_of, quantile
+from tractexp.inference.blocks import LENGTH, blocks_of
 from tractexp.inference.descent import descend
+from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import scatter
@@ -139,8 +140,8 @@ def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
 
 
 def test_students_t_of_few_blocks_is_wide():
-    assert quantile(5) == pytest.approx(2.776, abs=1e-3)
-    assert quantile(1000) == pytest.approx(1.96, abs=5e-3)
+    assert interval_factor(4) == pytest.approx(2.776, abs=1e-3)
+    assert interval_factor(999) == pytest.approx(1.96, abs=5e-3)
 
 
 def test_a_parameter_on_a_bound_that_changes_nothing_is_not_known_and_ruins_nothing():

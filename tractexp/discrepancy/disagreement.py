@@ -7,6 +7,7 @@ import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.inference.base_fit import BaseFit
+from tractexp.inference.blocks import blocks_of
 from tractexp.inference.chance import Chance, chance_at, is_noise_exact, scales
 from tractexp.inference.context import Context
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
@@ -36,6 +37,14 @@ class Disagreement:
     def root(self) -> np.ndarray:
         """Rows (k, d) whose inverse products are the covariance of all that is free, in its coordinates."""
         return self.projection.R if self.robust is None else self.robust
+
+    @property
+    def freedom(self) -> float:
+        """What standard errors stand on: samples, or blocks of them where what is left is no noise."""
+        fitted = self.root.shape[1]
+        if self.robust is None:
+            return self.context.samples - fitted
+        return len(blocks_of(self.context.events, self.context.drive, fitted)) - 1
 
     @property
     def context(self) -> Context:

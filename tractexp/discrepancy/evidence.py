@@ -6,10 +6,11 @@ import numpy as np
 
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
+from tractexp.discrepancy.precision import effect_sizes
 from tractexp.discrepancy.survivors import Rival
 from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
 from tractexp.inference.chance import by_draws
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.wording import joined
 
 CHOSEN = "added"

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.precision import WIDE, covariance
+from tractexp.discrepancy.precision import covariance
+from tractexp.inference.interval import interval_factor
 from tractexp.model.parts import Curve, Effect
 
 CATALOGUE, OTHER = "catalogue", "other"
@@ -77,7 +78,7 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
     names, spread = covariance(tests, list(values))
     free = [k for k in range(len(names)) if spread[k, k] > 0]
     J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in free]).reshape(-1, len(curve.y))
-    half = WIDE * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J))
+    half = interval_factor(tests.freedom) * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J))
     return FittedLaw(curve, np.stack([curve.y - half, curve.y + half]), _textbook(findings, effect, values, curve))
 
 

@@ -15,7 +15,7 @@ from tractexp.discrepancy.incomplete import incomplete
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
-from tractexp.discrepancy.precision import ParameterEstimate, estimates
+from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.survivors import Survivors, survivors
@@ -27,6 +27,7 @@ from tractexp.inference.catalogue import Catalogue, catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event

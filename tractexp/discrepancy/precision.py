@@ -1,53 +1,15 @@
 """How well each parameter is known at a fit: its standard error, its 95 % interval, and the verdict in words."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from scipy.special import ndtri
 
-from tractexp import files
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.identification.uncertainty import LEVEL
 from tractexp.identification.verdict import BOUND, judge
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
-from tractexp.inference.information import Information
-from tractexp.parameter import Parameter
-from tractexp.wording import with_error
-
-BLIND = 1e-6  # ranges: what even by itself is not known to a million of them changes nothing
-WIDE = float(ndtri((1 + LEVEL) / 2))  # standard errors in half of an interval: the samples are many
-
-
-@dataclass(frozen=True, eq=False)
-class ParameterEstimate:
-    """One parameter at a fit: `error` is its standard error, nan where it rests on a bound or is not computed."""
-
-    parameter: Parameter
-    value: float
-    error: float
-    verdict: str = ""
-
-    def __str__(self) -> str:
-        unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
-        return f"{self.parameter.name} {with_error(self.value, self.error)}{unit}"
-
-    @property
-    def half(self) -> float:
-        """Half of the 95 % interval; nan without a standard error."""
-        return WIDE * self.error
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """95 %, inside the bounds; nan without a standard error."""
-        ends = np.clip(self.value + self.half * np.array([-1.0, 1.0]), *self.parameter.bounds)
-        return float(ends[0]), float(ends[1])
-
-    def plain(self) -> dict[str, Any]:
-        """As `discrepancy.json` has it."""
-        return files.plain({"value": self.value, "standard_error": self.error, "interval": self.interval})
+from tractexp.inference.information import Information, free_standard_errors
+from tractexp.inference.interval import ParameterEstimate, interval_factor
 
 
 def standard_errors(tests: Disagreement) -> dict[str, float]:
@@ -58,9 +20,7 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     at = tests.context.coordinates
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
     columns = at.nuisances(tests.fit.names)
-    seen = np.where(np.linalg.norm(tests.root, axis=0) > BLIND, tests.root, 0.0)
-    ranges = np.ones(len(columns))
-    spread = Information(tuple(map(str, columns)), 0 * ranges, ranges, seen).standard_errors
+    spread = free_standard_errors(tests.root)
     return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
 
 
@@ -68,9 +28,15 @@ def effect_sizes(
     context: Context, fit: Refit, names: Sequence[str], tests: Disagreement | None
 ) -> list[ParameterEstimate]:
     """How large the named effects are in a fit; with standard errors where its `tests` were made."""
-    errors = {} if tests is None else standard_errors(tests)
     at, own = context.coordinates, context.catalogue.sizes(names)
-    return [ParameterEstimate(p, at.value(p.name, fit.unit), errors.get(p.name, np.nan)) for p in own]
+    values = [at.value(p.name, fit.unit) for p in own]
+    if tests is None:
+        return [ParameterEstimate(p, value, np.nan) for p, value in zip(own, values, strict=True)]
+    errors = standard_errors(tests)
+    return [
+        ParameterEstimate(p, value, errors.get(p.name, np.nan), freedom=tests.freedom)
+        for p, value in zip(own, values, strict=True)
+    ]
 
 
 def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np.ndarray]:
@@ -99,7 +65,10 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     words = _words(tests, seen, [values[n] for n in seen], [errors[n] for n in seen])
     held = {n for n in names if at.column[n] in tests.tangent.held}
     words |= {n: f"{BOUND}: better values lie beyond it" for n in held}
-    return [ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged")) for n in names]
+    return [
+        ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged"), tests.freedom)
+        for n in names
+    ]
 
 
 def _words(
@@ -112,5 +81,6 @@ def _words(
     others = [i for i in range(len(columns)) if i not in own]
     lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))
     information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
-    assessment = judge(information, lower, upper, WIDE * np.array(errors), np.full(len(errors), WIDE))
+    factors = np.full(len(errors), interval_factor(tests.freedom))
+    assessment = judge(information, lower, upper, factors * np.array(errors), factors)
     return {name: str(verdict) for name, verdict in assessment.items()}

@@ -11,8 +11,8 @@ import numpy as np
 
 from tractexp.domain import PHASORS, Domain, domain_of
 from tractexp.errors import TASK, UserError, among, check_range
-from tractexp.identification.uncertainty import LEVEL
 from tractexp.inference.information import Information
+from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood, before_the_event
 from tractexp.inference.problem import Problem
 from tractexp.noise import Autoregression, Noise
@@ -102,12 +102,6 @@ class Forecast:
         return self.half / np.maximum(np.abs(self.values), 1e-12)
 
 
-def normal_quantile() -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri((1 + LEVEL) / 2))
-
-
 def like(problem: Problem, events: Sequence[Event]) -> Problem:
     """The same free parameters, bounds and fixed values on other events."""
     bounds = {p.name: p.bounds for p in problem.parameters}
@@ -136,7 +130,7 @@ def forecast(
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or shape.noise)
     total = combined([*([earlier] if earlier else []), *informations])
-    return Forecast(shape, total.names, total.values, normal_quantile() * total.standard_errors)
+    return Forecast(shape, total.names, total.values, interval_factor() * total.standard_errors)
 
 
 def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> list[Information]:
@@ -247,7 +241,7 @@ def best_of(
         if chosen and gain < least:
             break
         chosen.append(best)
-        half = normal_quantile() * combined([informations[e] for e in chosen]).standard_errors
+        half = interval_factor() * combined([informations[e] for e in chosen]).standard_errors
         choices.append(ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
 

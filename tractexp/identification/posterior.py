@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import TASK, UserError, setting
-from tractexp.identification.uncertainty import LEVEL, Uncertainty
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.inference.interval import LEVEL
 from tractexp.progress import Counting, uncounted
 
 BURN = 0.3  # of the steps are thrown away

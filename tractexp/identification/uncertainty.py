@@ -13,9 +13,9 @@ import numpy as np
 
 from tractexp import files
 from tractexp.identification.verdict import ParameterVerdict, judge
-from tractexp.inference.blocks import LEVEL
 from tractexp.inference.descent import CENTRAL
 from tractexp.inference.information import Information
+from tractexp.inference.interval import LEVEL, interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.residual_tests import jarque_bera, ljung_box
 from tractexp.inference.sandwich import scatter
@@ -226,13 +226,11 @@ Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]  # with d
 
 def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
     """How far the maximum of a likelihood spreads, by its curvature."""
-    from scipy.special import stdtrit
-
     problem, free = likelihood.problem, likelihood.free
     rows, J = likelihood.jacobian(unit)
     width = problem.upper - problem.lower
     information = Information(problem.space.names, likelihood.values(unit), width, J.without_own)
-    factor = float(stdtrit(max(likelihood.samples - len(unit), 1), (1 + LEVEL) / 2))
+    factor = interval_factor(likelihood.samples - len(unit))
     return likelihood, float(rows @ rows), information, np.full(free, factor), np.full(free, threshold())
 
 

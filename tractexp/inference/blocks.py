@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from tractexp.inference.interval import interval_factor
 from tractexp.model.drive import Drive
 from tractexp.record import Event
 
 LENGTH = 0.1  # s, longer than the memory of what third-order motors leave
 FEWEST = 3  # blocks for each parameter: of records with fewer, blocks are shorter
 ALIKE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
-LEVEL = 0.95
 
 
 def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False) -> list[slice]:
@@ -54,11 +54,4 @@ def reach(without: np.ndarray, whole: float) -> float:
     count = len(without)
     if count < 2:
         return np.inf
-    return quantile(count) * float(np.sqrt((count - 1) / count * np.sum((without - whole) ** 2)))
-
-
-def quantile(blocks: int) -> float:
-    """Student's t at 97.5 % of a jackknife over so many blocks."""
-    from scipy.special import stdtrit
-
-    return float(stdtrit(max(blocks - 1, 1), (1 + LEVEL) / 2))
+    return interval_factor(count - 1) * float(np.sqrt((count - 1) / count * np.sum((without - whole) ** 2)))

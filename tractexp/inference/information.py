@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 STRUCTURAL = 1e-6  # of the largest singular value: below it a direction changes nothing, whatever the noise
+BLIND = 1e-6  # standard deviations per range: what is not known even to a million ranges changes nothing
 SHARE = 0.02  # of a direction's largest component: smaller ones do not take part in it
 
 
@@ -88,6 +89,17 @@ class Information:
         """Standard error of log(prod value^exponent), i.e. relative, for `exponents` (d,)."""
         slope = exponents / np.where(self.values == 0, 1.0, self.values)
         return float(np.sqrt(slope @ self.covariance @ slope))
+
+
+def free_standard_errors(root: np.ndarray) -> np.ndarray:
+    """Return the standard error (d,) of each coordinate, all others free: in ranges, inf of one that changes nothing.
+
+    `root` (R, d) are rows whose inverse products are the covariance: whitened sensitivities, or what stands for them.
+    """
+    seen = np.where(np.linalg.norm(root, axis=0) > BLIND, root, 0.0)
+    ranges = np.ones(root.shape[1])
+    names = tuple(str(k) for k in range(len(ranges)))
+    return Information(names, 0 * ranges, ranges, seen).standard_errors
 
 
 def _echelon(rows: np.ndarray) -> np.ndarray:

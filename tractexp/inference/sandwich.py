@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.inference.blocks import blocks_of, quantile
+from tractexp.inference.blocks import blocks_of
 from tractexp.inference.descent import central_differences
 from tractexp.inference.information import STRUCTURAL, Information
+from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
 
@@ -72,7 +73,7 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     information = Information(
         problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
     )
-    return Scatter(information, quantile(len(blocks)), ratio, spread)
+    return Scatter(information, interval_factor(len(blocks) - 1), ratio, spread)
 
 
 def off_walls(unit: np.ndarray) -> np.ndarray:

@@ -7,9 +7,9 @@ from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.recommended import held
 from tractexp.identification.verdict import brief
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
 from tractexp.wording import alternatives, joined, with_error

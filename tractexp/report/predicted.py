@@ -8,8 +8,9 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.precision import ParameterEstimate, effect_sizes
+from tractexp.discrepancy.precision import effect_sizes
 from tractexp.discrepancy.prediction import ErrorPredictions, PredictedTerm, PredictionError
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import in_percent
 from tractexp.wording import joined
 

@@ -8,7 +8,6 @@ import numpy as np
 from tractexp.discrepancy.disagreement import Disagreement
 from tractexp.discrepancy.held_out import Assessment
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
-from tractexp.discrepancy.precision import ParameterEstimate
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
 from tractexp.discrepancy.proposal.judge import TermAssessment, term_assessments, tied
@@ -17,6 +16,7 @@ from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.fitting import Refit
+from tractexp.inference.interval import ParameterEstimate
 from tractexp.noise import Noise
 from tractexp.record import Event
 from tractexp.wording import joined

@@ -16,6 +16,7 @@ from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
+from tractexp.inference.information import free_standard_errors
 from tractexp.inference.linear import linearised
 from tractexp.noise import Noise
 
@@ -199,8 +200,5 @@ def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     at = context.coordinates
     own = at.parameters(fit.names)
     _, rows = linearised(context, fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
-    covariance = np.linalg.pinv(rows[1:] @ rows[1:].T, rcond=1e-14, hermitian=True)
-    spread = np.sqrt(np.diag(covariance))[-len(own) :] * [at.width(at.names[k]) for k in own]
-    determined = np.linalg.norm(rows[1:], axis=1)[-len(own) :] > 0
-    names = values_of(at, fit.unit, chosen)
-    return {n: float(s) if seen else float("inf") for n, s, seen in zip(names, spread, determined, strict=True)}
+    spread = free_standard_errors(rows[1:].T)[-len(own) :] * [at.width(at.names[k]) for k in own]
+    return dict(zip(values_of(at, fit.unit, chosen), spread.tolist(), strict=True))

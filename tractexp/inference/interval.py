@@ -1,0 +1,56 @@
+"""The 95 % interval of an estimate: one rule for identifications, investigations and plans."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp import files
+from tractexp.parameter import Parameter
+from tractexp.wording import with_error
+
+LEVEL = 0.95
+
+
+def interval_factor(freedom: float = np.inf) -> float:
+    """Return half of a 95 % interval over the standard error: Student's t at 97.5 %.
+
+    `freedom` counts what the error stands on: samples less what was fitted, or blocks less one. By default the error is
+    known, as that of a forecast.
+    """
+    from scipy.special import stdtrit
+
+    return float(stdtrit(max(freedom, 1), (1 + LEVEL) / 2))
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterEstimate:
+    """One parameter at a fit.
+
+    `error` is its standard error: nan where it rests on a bound or is not computed. `freedom` is that of the error.
+    """
+
+    parameter: Parameter
+    value: float
+    error: float
+    verdict: str = ""
+    freedom: float = np.inf
+
+    def __str__(self) -> str:
+        unit = "" if self.parameter.unit == "1" else f" {self.parameter.unit}"
+        return f"{self.parameter.name} {with_error(self.value, self.error)}{unit}"
+
+    @property
+    def half(self) -> float:
+        """Half of the 95 % interval; nan without a standard error."""
+        return interval_factor(self.freedom) * self.error
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 %, inside the bounds; nan without a standard error."""
+        ends = np.clip([self.value - self.half, self.value + self.half], *self.parameter.bounds)
+        return float(ends[0]), float(ends[1])
+
+    def plain(self) -> dict[str, Any]:
+        """As `discrepancy.json` has it."""
+        return files.plain({"value": self.value, "standard_error": self.error, "interval": self.interval})
