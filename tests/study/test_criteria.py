@@ -22,10 +22,11 @@ from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.errors import UserError
 from tractexp.inference.catalogue import candidate, missing_channel
 from tractexp.inference.chance import Chance
-from tractexp.inference.coordinates import Coordinates
 from tractexp.inference.fitting import Refit
+from tractexp.inference.free_set import FreeSet
 from tractexp.inference.score_test import Score
 from tractexp.noise.random_walk import Rest, find
+from tractexp.parameter import Box
 from tractexp.plugin import get
 
 
@@ -101,7 +102,8 @@ def prior_of_skew(c):
     known = {"of_measurement": ("time_skew",), "members": (), "__getitem__": lambda self, name: skew}
     catalogue = type("One", (), known)()
     one = np.array([0.0])
-    at = Coordinates(("skew",), one - 0.01, one + 0.01, catalogue, one, one, one, c.measurement_prior)
+    box = Box(one - 0.01, one + 0.01, ("skew",))
+    at = FreeSet(box, one, one, one, 1, catalogue, c.measurement_prior)
     return at.prior_deviation[0] * at.width("skew")
 
 

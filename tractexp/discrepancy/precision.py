@@ -79,7 +79,7 @@ def _words(
     columns = at.nuisances(tests.fit.names)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]
-    lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.lower, at.upper))
+    lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.box.lower, at.box.upper))
     information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
     factors = np.full(len(errors), interval_factor(tests.freedom))
     assessment = judge(information, lower, upper, factors * np.array(errors), factors)

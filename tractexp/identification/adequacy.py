@@ -159,7 +159,7 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
     wrong = np.zeros((len(drawn), problem.drive.events, 2))
     for e, steady in enumerate(problem.steady):
         wrong[:, e] = drawn[:, :, steady].mean(axis=2)
-    return -wrong.reshape(len(drawn), -1) / plain.width[plain.free :]
+    return -wrong.reshape(len(drawn), -1) / plain.free_set.box.width[plain.free :]
 
 
 def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:

@@ -106,6 +106,9 @@ class Catalogue:
         return tuple(c.name for c in self.candidates if c.measurement)
 
 
+NOTHING = Catalogue((), {})  # of a model that is fitted as it is
+
+
 def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = (), swing: float = 0.05) -> Catalogue:
     """The registered effects that the model lacks. `only` restricts it; faults of the measurement always stay.
     `swing` [Hz] is the change of the frequency that shows an effect of it.

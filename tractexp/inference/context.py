@@ -10,8 +10,8 @@ import numpy as np
 from tractexp import store
 from tractexp.domain import Domain, domain_of
 from tractexp.inference.catalogue import Catalogue
-from tractexp.inference.coordinates import Coordinates
 from tractexp.inference.effort import Effort
+from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Kernels, Key
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records
@@ -38,7 +38,7 @@ class Context:
     catalogue: Catalogue
     records: Records
     kernels: Kernels
-    coordinates: Coordinates
+    coordinates: FreeSet
     criteria: "Criteria"
     effort: Effort
 
@@ -50,7 +50,7 @@ class Context:
     ) -> "Context":  # fmt: skip
         """A context for these records; the load is simulated behind the recorder's window, where there is one."""
         kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
-        coordinates = Coordinates.of(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
+        coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def on(self, records: Records) -> "Context":
@@ -78,8 +78,8 @@ class Context:
         if not all(map(store.installed, parts)):
             return ""
         content = (
-            self.kernels.bare.digest(), self.kernels.substeps, self.criteria, at.lower, at.upper, at.null, at.before,
-            at.prior_deviation, sorted(self.kernels.fixed.items()),
+            self.kernels.bare.digest(), self.kernels.substeps, self.criteria, at.box.lower, at.box.upper,
+            at.null, at.before, at.prior_deviation, sorted(self.kernels.fixed.items()),
         )  # fmt: skip
         return store.key(store.environment(), repr(parts), self.records.window, *content)
 

@@ -13,14 +13,13 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.inference.descent import Descent, central_differences, descend
+from tractexp.inference.free_set import FreeSet
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities, SeparableColumns
 from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
-
-POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
 
 
 def before_the_event(event: Event) -> Pair:
@@ -88,19 +87,10 @@ class Likelihood:
         """Whether a sample does not count."""
         return not self.valid.all()
 
-    @property
-    def lower(self) -> np.ndarray:
-        before = (self.problem.drive.before - self._reach()).ravel() if self.initial_power else []
-        return np.concatenate((self.problem.lower, before))
-
-    @property
-    def width(self) -> np.ndarray:
-        """Range of each coordinate, (D,)."""
-        reach = np.repeat(2 * self._reach(), 2, axis=1).ravel() if self.initial_power else []
-        return np.concatenate((self.problem.upper - self.problem.lower, reach))
-
-    def _reach(self) -> np.ndarray:
-        return POWER_RANGE * np.maximum(np.linalg.norm(self.problem.drive.before, axis=1, keepdims=True), 0.1)
+    @functools.cached_property
+    def free_set(self) -> FreeSet:
+        """What its coordinates are."""
+        return FreeSet.of_problem(self.problem, self.initial_power)
 
     def to_unit(self, values: np.ndarray) -> np.ndarray:
         """Free values (n, free), at the measured power before each event, as coordinates (n, D)."""
@@ -111,8 +101,7 @@ class Likelihood:
 
         Whatever power the given ones have is left out.
         """
-        before = np.full((len(unit), 2 * self.problem.drive.events * self.initial_power), 0.5)
-        return np.concatenate((unit[:, : self.free], before), axis=1)
+        return self.free_set.at_measured_power(unit)
 
     def values(self, unit: np.ndarray) -> np.ndarray:
         """Free values (..., free) of coordinates (..., D)."""
@@ -123,7 +112,8 @@ class Likelihood:
         problem, drive = self.problem, self.problem.drive
         before = None
         if self.initial_power:
-            before = (self.lower + self.width * unit)[:, self.free :].reshape(len(unit), drive.events, 2).swapaxes(0, 1)
+            power = self.free_set.box.from_unit(unit)[:, self.free_set.before]
+            before = power.reshape(len(unit), drive.events, 2).swapaxes(0, 1)
         response = problem.model.simulate(drive, problem.candidates(self.values(unit)), problem.step.substeps, before)
         rows = response.by_candidate
         rows -= drive.measured

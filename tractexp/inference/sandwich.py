@@ -91,7 +91,7 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
     """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is left out of their
     means."""
     drive, changes = likelihood.problem.drive, list[tuple[int, np.ndarray]]()
-    width = likelihood.width[likelihood.free :].reshape(drive.events, 2)
+    width = likelihood.free_set.box.width[likelihood.free :].reshape(drive.events, 2)
     means = likelihood.problem.steady or [slice(0, 0)] * drive.events  # of waves there are none
     for block in blocks:
         e = int(np.searchsorted(drive.first, block.start, "right")) - 1

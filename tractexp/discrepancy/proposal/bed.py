@@ -12,7 +12,7 @@ from tractexp.discrepancy.proposal.effect import Library
 from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, pick_of, shape_of, size_of
 from tractexp.inference.catalogue import Candidate, Catalogue
 from tractexp.inference.context import Context
-from tractexp.inference.coordinates import Coordinates
+from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Key
 from tractexp.model.model import Model
 from tractexp.model.parts import Effect
@@ -86,7 +86,7 @@ class _Part(Effect):
         """The library's kernel has it."""
 
 
-def place(at: Coordinates, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]) -> np.ndarray:
+def place(at: FreeSet, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]) -> np.ndarray:
     """Coordinates (D,) with a term of these sizes and this setting."""
     moved = unit.copy()
     for picked in (chosen.signal, chosen.clock) if chosen.clock else (chosen.signal,):
@@ -99,7 +99,7 @@ def place(at: Coordinates, unit: np.ndarray, chosen: Term, setting: Setting, siz
     return moved
 
 
-def values_of(at: Coordinates, unit: np.ndarray, chosen: Term) -> dict[str, float]:
+def values_of(at: FreeSet, unit: np.ndarray, chosen: Term) -> dict[str, float]:
     """Sizes and setting of a term at coordinates (D,), by their own names."""
     sizes = {size.name: at.value(label, unit) for size, label in sizes_of(chosen)}
     return sizes | {name: at.value(label, unit) for name, label in shapes_of(chosen).items()}

@@ -1,7 +1,7 @@
-"""One set of coordinates for the base model and every candidate.
+"""The numbers that a fit may move: parameters, power before each event, sizes of effects, faults of the measurement.
 
 Base and extended models are points of the same coordinates with the other candidates at their nulls, nested by
-construction.
+construction. An identification has those of its model alone.
 """
 
 import functools
@@ -10,45 +10,59 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.catalogue import NOTHING, Catalogue
 from tractexp.inference.problem import Problem
+from tractexp.parameter import Box
+
+POWER_RANGE = 0.2  # of the apparent power before the event: how far P0 and Q0 may move
+LEAST_POWER = 0.1  # pu: a load that drew less may move as far as one that drew this
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinates:
-    """Coordinates (D,) lie in the unit cube: parameters `names` with these bounds, then P0 and Q0 of each event.
+class FreeSet:
+    """Coordinates (D,) of the unit cube: parameters with their bounds, then P0 and Q0 of each event.
 
     The parameters are the base model's free ones, in columns `base`, those of all candidates, the pushes', and those of
     the members of families.
     """
 
-    names: tuple[str, ...]  # (d,)
-    lower: np.ndarray  # (d,)
-    upper: np.ndarray  # (d,)
-    catalogue: Catalogue
+    box: Box  # (D,), named
     base: np.ndarray  # columns
     before: np.ndarray  # (2 E,) columns of P0 and Q0, or none where the powers measured before the events are taken
-    null: np.ndarray  # (D,) every candidate at its null, the base parameters at their defaults
-    prior: float  # standard deviation of a fault of the measurement, in its relevant sizes
+    null: np.ndarray  # (D,) every candidate at its null, the base parameters at their defaults, P0 and Q0 as measured
+    parameter_count: int  # coordinates before the first P0
+    catalogue: Catalogue = NOTHING
+    prior: float = 1.0  # standard deviation of a fault of the measurement, in its relevant sizes
 
     @classmethod
-    def of(cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float) -> "Coordinates":
-        """Those of the problem of everything, `whole`, in which the problem of the base model is `bare`."""
-        members = [p for member in catalogue.members for p in member.effect.parameters]
-        names, events = (*whole.space.names, *(p.name for p in members)), whole.drive.events
-        d = len(names)
-        own = np.array([p.bounds for p in members], dtype=float).reshape(-1, 2)
-        lower, upper = np.r_[whole.lower, own[:, 0]], np.r_[whole.upper, own[:, 1]]
-        chosen = {p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)}
-        values = np.array([chosen[name] for name in names])
+    def of_problem(cls, problem: Problem, initial_power: bool = True) -> "FreeSet":
+        """Return the free parameters of one problem, with P0 and Q0 of each event where `initial_power` frees them."""
+        base, null = np.arange(problem.space.dimension), problem.space.to_unit(problem.defaults)
+        if not initial_power:
+            return cls(problem.space, base, np.array([], dtype=int), null, len(base))
+        power = power_before(problem)
         return cls(
-            names=names,
-            lower=lower,
-            upper=upper,
+            box=join_boxes(problem.space, power),
+            base=base,
+            before=len(base) + np.arange(power.dimension),
+            null=np.r_[null, np.full(power.dimension, 0.5)],
+            parameter_count=len(base),
+        )
+
+    @classmethod
+    def of_effects(cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float) -> "FreeSet":
+        """Return those of the problem of everything, `whole`, in which the problem of the base model is `bare`."""
+        members = tuple(p for member in catalogue.members for p in member.effect.parameters)
+        parameters, power = join_boxes(whole.space, Box.of(members)), power_before(whole)
+        nulls = {p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)}
+        null = parameters.to_unit(np.array([nulls[name] for name in parameters.names]))
+        return cls(
+            box=join_boxes(parameters, power),
+            base=np.array([parameters.names.index(name) for name in bare.space.names]),
+            before=parameters.dimension + np.arange(power.dimension),
+            null=np.r_[null, np.full(power.dimension, 0.5)],
+            parameter_count=parameters.dimension,
             catalogue=catalogue,
-            base=np.array([names.index(name) for name in bare.space.names]),
-            before=np.arange(d, d + 2 * events),
-            null=np.r_[(values - lower) / (upper - lower), np.full(2 * events, 0.5)],
             prior=prior,
         )
 
@@ -56,24 +70,26 @@ class Coordinates:
     def dimension(self) -> int:
         return len(self.null)
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of all coordinates, (D,)."""
+        return self.box.names
+
     @functools.cached_property
     def column(self) -> dict[str, int]:
         """Where each parameter stands."""
         return {name: k for k, name in enumerate(self.names)}
 
     def width(self, name: str) -> float:
-        k = self.column[name]
-        return float(self.upper[k] - self.lower[k])
+        return float(self.box.width[self.column[name]])
 
     def to_unit(self, name: str, value: float) -> float:
         k = self.column[name]
-        return float((value - self.lower[k]) / (self.upper[k] - self.lower[k]))
+        return float((value - self.box.lower[k]) / self.box.width[k])
 
     def value(self, name: str, unit: np.ndarray) -> float:
         """A parameter's value at coordinates (D,), never outside its bounds by rounding."""
-        k = self.column[name]
-        inside = self.lower[k] + unit[k] * (self.upper[k] - self.lower[k])
-        return float(np.clip(inside, self.lower[k], self.upper[k]))
+        return float(self.box.from_unit(unit)[self.column[name]])
 
     def sizes(self, effects: Sequence[str]) -> list[int]:
         """Columns of the effects' sizes."""
@@ -127,8 +143,10 @@ class Coordinates:
         return moved
 
     def at_measured_power(self, unit: np.ndarray) -> np.ndarray:
-        """Coordinates (D,) from those of these or other events, with P0 and Q0 of each of these as measured."""
-        return np.r_[unit[: len(self.names)], self.null[len(self.names) :]]
+        """Coordinates (..., D) from those of these or other events, with P0 and Q0 of each of these as measured."""
+        measured = self.null[self.parameter_count :]
+        parameters = unit[..., : self.parameter_count]
+        return np.concatenate([parameters, np.broadcast_to(measured, (*unit.shape[:-1], len(measured)))], axis=-1)
 
     def widened(self, unit: np.ndarray) -> np.ndarray:
         """Coordinates (D,) from those of the first of these events, the others as before any fit.
@@ -140,3 +158,17 @@ class Coordinates:
     def without_faults(self, unit: np.ndarray, free: Sequence[str]) -> np.ndarray:
         """Coordinates (D,) with the faults of the measurement that are not `free` back at their nulls."""
         return self.without(unit, [name for name in self.catalogue.of_measurement if name not in free])
+
+
+def power_before(problem: Problem) -> Box:
+    """Return the box of P0 and Q0 of each event, (2 E,): around what was measured before it."""
+    measured = problem.drive.before
+    drawn = np.linalg.norm(measured, axis=1, keepdims=True)
+    reach = POWER_RANGE * np.maximum(drawn, LEAST_POWER)
+    names = tuple(f"{what}[{e}]" for e in range(1, len(measured) + 1) for what in ("P0", "Q0"))
+    return Box((measured - reach).ravel(), (measured + reach).ravel(), names)
+
+
+def join_boxes(one: Box, other: Box) -> Box:
+    """Return the box of the coordinates of both, those of the first before those of the other."""
+    return Box(np.r_[one.lower, other.lower], np.r_[one.upper, other.upper], one.names + other.names)
