@@ -85,6 +85,11 @@ def _literal(content: Any) -> Any:
     return omegaconf(content) if isinstance(content, str) else content
 
 
+def comment(text: str) -> str:
+    """Text in a comment of one line, in YAML: nothing in it ends the line."""
+    return "".join(c if c.isprintable() else " " for c in text)
+
+
 def shell(*words: str) -> str:
     """A command as a shell takes it."""
     return shlex.join(words)

@@ -23,6 +23,7 @@ class ModelConfig:
     integration: str = "classical"  # or printed: Eq. (4) of the paper as it stands, one step per sample
     per_event: list[str] = field(default_factory=list)  # parameters with a value of their own in each event
     domain: str = "phasors"  # or waves; chosen by domain=
+    window: Any = None  # over which the recorder averages phasors: seconds, an estimator's name, or recorded
     priors: bool = False  # hold the motor to what machines usually are, where the records do not tell
     shown_effects: bool = False  # add the effects that the records show, such as a current of zero sequence
 

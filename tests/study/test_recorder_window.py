@@ -7,9 +7,13 @@ import pytest
 from scipy.integrate import quad
 from test_discrepancy import FAST, base, events
 
+import tractexp
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
+from tractexp.domain.excitation import phasors
+from tractexp.errors import UserError
 from tractexp.inference.recorder_window import RecorderWindow, windows_of
+from tractexp.model.drive import Drive
 from tractexp.plugin import chosen
 from tractexp.record.window import average
 
@@ -102,7 +106,72 @@ def test_no_window_is_found_where_there_is_none():
         assert found.names == ((effect,) if effect else ())
 
 
-def test_an_effect_is_found_behind_a_window():
-    made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 2.0),))
-    found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW)
-    assert "stator_resistance" in found.names
+@pytest.mark.parametrize("window", [0.02, 0.035, "p_class", "m_class"])
+def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
+    """`model.window`: driven by the voltage reckoned back, its power averaged; the same as behind the recorder."""
+    (event,) = events(count=1)
+    load = tractexp.compose().model
+    shape = chosen("estimator", window).window(50.0) if isinstance(window, str) else None
+    recorder = RecorderWindow(shape.length if shape else window, shape)
+    assert recorder.setting == window
+    behind = Drive.of([phasors(recorder.sharpened(event), load.behind(recorder))])
+    through = tractexp.compose(window=window).model
+    drive = Drive.of([phasors(event, through)])
+    values = np.array([[p.default for p in load.parameters]])
+    assert drive.inputs == pytest.approx(behind.inputs, nan_ok=True)
+    expected = load.behind(recorder).simulate(behind, values).outputs
+    assert through.simulate(drive, values).outputs == pytest.approx(expected, abs=1e-12)
+    plain = load.simulate(Drive.of([phasors(event, load)]), values).outputs
+    assert np.abs(expected - plain).max() > 1e-3
+
+
+def test_a_window_that_the_records_say_is_theirs():
+    (event,) = events(count=1)
+    shape = chosen("estimator", "p_class").window(50.0)
+    said = replace(event, record=replace(event.record, window=shape))
+    model = tractexp.compose(window="recorded").model
+    assert np.array_equal(phasors(said, model).window, phasors(event, tractexp.compose(window="p_class").model).window)
+    assert phasors(event, model).window is None
+    assert RecorderWindow(shape.length, shape, said=True).setting == "recorded"
+
+
+@pytest.mark.parametrize(
+    ("window", "sentence"),
+    [
+        (0.0, "is no window: give its length"),
+        (-0.02, "is no window: give its length"),
+        (20.0, "at most 10 s"),
+        (float("nan"), "is no window"),
+        ("two_cycles", "there is no such window"),
+    ],
+)
+def test_what_is_no_window_is_refused(window, sentence):
+    with pytest.raises(UserError, match=sentence):
+        tractexp.compose(window=window)
+
+
+def test_waveforms_have_no_window():
+    with pytest.raises(UserError, match="no meaning on waveforms"):
+        tractexp.compose(domain="waves", window=0.02)
+
+
+def test_the_extended_model_has_the_window_that_was_taken_into_account(tmp_path):
+    """As a file and as a call's, so that the next step sees the records as the investigation did."""
+    made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 3.0),))
+    train, held = made[:2], made[2:]
+    model = tractexp.compose(window=0.06)
+    found = tractexp.investigate(train, model, validate=held, effects=["stator_resistance"], progress=False)
+    assert found.names == ("stator_resistance",)
+    assert found.content["recorder_window"] == pytest.approx(0.06)
+    assert found.extended.window == pytest.approx(0.06)
+    assert found.fit.result.model["window"] == pytest.approx(0.06)
+    found.write_results(tmp_path)
+    file = tmp_path / "conf" / "model" / "extended.yaml"
+    assert tractexp.compose(file).window == pytest.approx(0.06)
+    first, second, third = file.read_text(encoding="utf-8").splitlines()[:3]
+    assert first.startswith("# tractexp ")
+    assert str(file) in first
+    assert "found missing: stator_resistance" in second
+    assert third == "# window: as in the base model."
+    again = tractexp.identify(train, file, optimizer="multistart_least_squares", check_intervals=False, progress=False)
+    assert again.grade == found.content["adequacy"]["grade"]

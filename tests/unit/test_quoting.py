@@ -55,6 +55,11 @@ def test_a_shell_reads_the_name_back(name):
     assert shlex.split(quoting.shell("echo", name)) == ["echo", name]
 
 
+@pytest.mark.parametrize("name", NASTY)
+def test_a_comment_of_yaml_ends_where_its_line_ends(name):
+    assert yaml.safe_load(f"# {quoting.comment(name)}\na: 1\n") == {"a": 1}
+
+
 def test_a_real_shell_runs_nothing_of_any_name(tmp_path):
     names = [name for name in NASTY if "\0" not in name]
     command = quoting.shell("printf", "%s\\0", *names)

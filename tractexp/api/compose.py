@@ -43,23 +43,26 @@ class LoadModel(Portable, Plain, Tabulated):
     per_event: Sequence[str] = ()
     integration: str = "classical"
     domain: str = "phasors"
+    window: float | str | None = None
     priors: bool = False
     shown_effects: bool = False
     shown: Mapping[str, str] = field(default_factory=dict)  # {effect that the records show: how they do}
 
     @property
     def node(self) -> dict[str, Any]:
-        """The parts, as `result.json` keeps them; integration and domain where they are not the usual ones."""
+        """The parts, as `result.json` keeps them; integration, domain and window where they are not the usual ones."""
         parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
-        usual = {"integration": "classical", "domain": "phasors"}
+        usual = {"integration": "classical", "domain": "phasors", "window": None}
         return parts | {key: value for key, plain in usual.items() if (value := getattr(self, key)) != plain}
 
     @functools.cached_property
     def model(self) -> "Model":
         """What simulates."""
+        from tractexp.domain.averaging import check_window
         from tractexp.identification.result import parts
         from tractexp.model.model import compose
 
+        check_window(self.window, self.domain)
         return compose(*parts(self.node))
 
     @functools.cached_property
@@ -112,6 +115,7 @@ def compose(
     per_event: Sequence[str] | None = None,
     integration: str | None = None,
     domain: str | None = None,
+    window: float | str | None = None,
     priors: bool | None = None,
     shown_effects: bool | None = None,
 ) -> LoadModel:
@@ -123,8 +127,9 @@ def compose(
     upper]} and `fixed` {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
     parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample, as many as needed
     by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain` "waves" the same equations
-    draw sampled currents, and what phasors neglect is kept. With `priors` a fit holds the motor to what machines
-    usually are, where its records do not tell; with `shown_effects` it has the effects that its records show.
+    draw sampled currents, and what phasors neglect is kept. `window` is that over which the recorder averages phasors:
+    seconds, the name of an estimator, or "recorded", as the records say. With `priors` a fit holds the motor to what
+    machines usually are, where its records do not tell; with `shown_effects` it has the effects that its records show.
 
     Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
     the model is used.
@@ -136,7 +141,7 @@ def compose(
     }
     settings = {
         "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
-        "priors": priors, "shown_effects": shown_effects,
+        "window": window, "priors": priors, "shown_effects": shown_effects,
     }  # fmt: skip
     composed = composed.with_(bounds=bounds, fixed=fixed, **settings, **parts)
     _ = composed.parameters
@@ -192,7 +197,7 @@ def _node(model: Any) -> dict[str, Any]:
     try:
         motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
         parts = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
-        return parts | {"integration": model.integration, "domain": model.domain}
+        return parts | {"integration": model.integration, "domain": model.domain, "window": model.window}
     except AttributeError:
         kind = type(model).__name__
         raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None

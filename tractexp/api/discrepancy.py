@@ -198,7 +198,8 @@ class Investigation(Written):
                 f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"])
+        window = self.content.get("recorder_window", self.content["phasor_window"])  # the latter of earlier versions
+        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"], window=window)
 
     @functools.cached_property
     def fit(self) -> Identification:
@@ -242,7 +243,9 @@ class Investigation(Written):
         """
         from tractexp.discrepancy import discrepancy_json
 
-        base = {**self.question.model.node, "bounds": self.question.model.bounds, "fixed": self.question.model.fixed}
+        model = self.question.model
+        known = {"bounds": model.bounds, "fixed": model.fixed, "substeps": model.substeps, "priors": model.priors}
+        base = {**model.node, **known}
         paths = [
             files.write_json(folder / "discrepancy.json", self.content),
             self.result.write(folder / "result.json"),
@@ -329,10 +332,11 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The extended model's parameters as a result, which predicts and is logged as a model."""
+    from tractexp.discrepancy.discrepancy_json import recorder_window
     from tractexp.discrepancy.recommended import adequacy
 
     base, bench, unit = question.model, steps.context, steps.extended.unit
-    model = base.with_(effects=sorted({*base.effects, *steps.names}))
+    model = base.with_(effects=sorted({*base.effects, *steps.names}), window=recorder_window(steps))
     problem = Problem(model.model, question.train, base.bounds, base.fixed, int(bench.problem.step.substeps.max()))
     values = np.array([bench.coordinates.value(name, unit) for name in problem.space.names])
     objective = float(problem.objective(values[None])[0])
@@ -371,8 +375,8 @@ class Discrepancy(Task, call=investigate):
         say(f"beside it: {', '.join(beside)}")
         conf = job.folder / "conf"
         if model := paths.get("extended.yaml"):
-            which = f", which has {joined(result.names)}" * (result.verdict == "tied")
-            say(f"use the extended model{which}: {use_of(result.question.model.domain, str(conf))}")
+            which = f", which has {joined(result.names)}" if result.verdict == "tied" else ""
+            say(f"use the extended model{which}: {use_of(result.question.model.domain, model)}")
         artifacts = [*(p for p in paths.values() if conf not in p.parents), *([conf] if model else [])]
         content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))

@@ -24,7 +24,7 @@ SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the set
 # The equations of a model, without what is known of its parameters but that they may be held to what machines are
 LOAD = (
     "model.motor", "model.static", "model.effects", "model.shown_effects", "model.integration", "model.domain",
-    "model.priors",
+    "model.priors", "model.window",
 )  # fmt: skip
 # Arguments that the model's configuration holds
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")

@@ -1,5 +1,6 @@
 """`discrepancy.json`: the investigation for machines, as the design fixes it, and the extended model for Hydra."""
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -57,6 +58,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "extended": "conf/model/extended.yaml" if investigation.names else None,
         "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
+        "recorder_window": recorder_window(investigation),
         "false_alarm_rate": investigation.context.criteria.false_alarms,
         "parameters": parameters(investigation),
         "simulations": investigation.context.effort.simulations,
@@ -208,24 +210,54 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def use_of(domain: str, conf: str) -> str:
-    """The command that fits the extended model, to be found in the folder `conf`, to the records of this run."""
-    return again("--config-dir", conf, *DOMAINS[domain].setting.split(), "model=extended", of=("data",))
+def use_of(domain: str, model: Path | str) -> str:
+    """The command that fits the model of a file to the records of this run."""
+    return again(*DOMAINS[domain].setting.split(), f"model={model}", of=("data",))
 
 
-def write_model(investigation: Findings, node: dict[str, Any], path: Path) -> Path:
-    """Write the extended model as a choice of the group `model`, usable at once through `--config-dir`."""
+def write_model(investigation: Findings, node: Mapping[str, Any], path: Path) -> Path:
+    """Write the extended model with all that the investigation took into account, as a file that is a model by itself.
+
+    `node` is the base model: parts, bounds, fixed values and what else is not as usual.
+    """
     effects = sorted({*node.get("effects", ()), *investigation.names})
     settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
+    held, window = recommended.held(investigation), recorder_window(investigation)
     extended: dict[str, Any] = {
         "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],
         "effects": effects,
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
-        "fixed": {**node["fixed"], **recommended.held(investigation)},
-    } | {part: chosen for part, chosen in settings.items() if chosen}
-    command = use_of(investigation.context.load.domain, "<this conf>")
-    head = f"# The base model and what was found missing: {command}\n"
+        "fixed": {**node["fixed"], **held},
+    }
+    extended |= {part: chosen for part, chosen in settings.items() if chosen}
+    extended |= {key: node[key] for key in ("integration", "domain", "substeps", "priors") if node.get(key)}
+    if window is not None:
+        extended["window"] = window
+    lines = [use_of(investigation.context.load.domain, path.absolute()), *_explain_model(investigation, node, held)]
+    comments = "".join(f"# {quoting.comment(line)}\n" for line in lines)
+    return files.write(path, comments + quoting.yaml(extended))
+
+
+def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mapping[str, float]) -> list[str]:
+    """What the extended model is, and why it holds what it holds, a sentence each."""
+    lines = [f"The base model with what was found missing: {joined(investigation.names)}."]
     if not investigation.verdict.complete:
         after = (investigation.validate or investigation.train).after.error
-        head += f"# Something is missing still: it misses {in_percent(after.value)} of the load's response.\n"
-    return files.write(path, head + quoting.yaml(extended))
+        lines.append(f"Something is missing still: it misses {in_percent(after.value)} of the load's response.")
+    if (window := investigation.context.records.window) is not None:
+        lines.append(f"window: {window.describe()}.")
+    elif investigation.context.load.window is not None:
+        lines.append("window: as in the base model.")
+    if given := [name for name in node["fixed"] if name not in held]:
+        lines.append(f"fixed {joined(given)}: as in the base model.")
+    if held:
+        lines.append(
+            f"fixed {joined(list(held))}: the events of the investigation cannot tell; leave out what yours can tell."
+        )
+    return lines
+
+
+def recorder_window(investigation: Findings) -> float | str | None:
+    """The recorder's window that was taken into account, as `model.window` names it."""
+    window, load = investigation.context.records.window, investigation.context.load
+    return load.window if window is None else window.setting

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from tractexp.domain.averaging import find_averaging
 from tractexp.model.drive import Excitation, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.record import Event, WaveEvent
@@ -13,14 +14,12 @@ WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the obj
 def phasors(event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)) -> Excitation:
     """The voltage and the power of an event; squared errors of P and of Q count by `weights`.
 
-    A recorded frequency sets the synchronous speed. A model that follows what happens within a cycle is driven by the
-    voltage that the load saw, computed back through the record's window where that is known, and looked at through it.
+    A recorded frequency sets the synchronous speed. A model that is looked at through the recorder's window is driven
+    by the voltage that the load saw, computed back through it.
     """
-    window = event.record.window if model is not None and model.motor.within_a_cycle else None
-    average = None
-    if window is not None:
-        average = window.on(event.record.step)
-        event = sharpened(event, average, window.length)
+    averaging = find_averaging(event, model)
+    if averaging is not None:
+        event = sharpened(event, *averaging)
     record, nominal = event.record, 2 * np.pi * event.record.base.frequency
     return Excitation(
         step=record.step,
@@ -37,7 +36,7 @@ def phasors(event: Event, model: Model | None = None, weights: tuple[float, floa
         U20=float("nan") if record.U2 is None else float(record.U2[event.steady].mean()),
         weight_P=weights[0],
         weight_Q=weights[1],
-        window=average,
+        window=averaging and averaging.weights,
     )
 
 

@@ -35,7 +35,7 @@ class Identified:
     @cached_property
     def model(self) -> Model:
         """In phasors, which every format is written for: there what carries the network alone is static load."""
-        motor, static, effects, integration, _ = parts(self.result.model)
+        motor, static, effects, integration, *_ = parts(self.result.model)
         own = [e for e in effects if not (e.waves_only or e.name in self.result.shown_effects)]
         return compose(motor, static, own, integration)
 

@@ -32,11 +32,11 @@ BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady 
 SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
 
 
-def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str]:
-    """The motor, static load and effects a model configuration names, built; how they are integrated; the domain."""
+def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float | str | None]:
+    """The motor, static load and effects a model configuration names, built; integration, domain, recorder's window."""
     effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
     motor, static = build("model/motor", node["motor"]), build("model/static", node["static"])
-    return motor, static, effects, node.get("integration", CLASSICAL), node.get("domain", PHASORS)
+    return motor, static, effects, node.get("integration", CLASSICAL), node.get("domain", PHASORS), node.get("window")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

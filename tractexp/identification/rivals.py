@@ -68,13 +68,14 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
     for name in sorted(registered.get("model/static", {})):
         cls = get("model/static", name)
         if cls.rival and type(model.static).rival and name != model.static.name:
-            other = compose(model.motor, cls(), model.effects, model.integration, model.domain)
+            other = compose(model.motor, cls(), model.effects, model.integration, model.domain, model.window)
             if _composes(other):
                 yield name, other
     for name in sorted(registered.get("effect", {})):
         cls = get("effect", name)
         if cls.rival and name not in {e.name for e in model.effects} and model.acceptance(cls()).refusal is None:
-            yield name, compose(model.motor, model.static, [*model.effects, cls()], model.integration, model.domain)
+            effects = [*model.effects, cls()]
+            yield name, compose(model.motor, model.static, effects, model.integration, model.domain, model.window)
 
 
 def _composes(model: Model) -> bool:

@@ -41,7 +41,7 @@ class Family:
         """The model with these load effects, every fault of the measurement and, where they are named, the pushes."""
         effects = [self._effect(name) for name in {*names, *self.catalogue.of_measurement}]
         base = self.model
-        model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain)
+        model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain, base.window)
         return model.behind(base.recorder)
 
     def _effect(self, name: str) -> Effect:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.domain.averaging import RECORDED
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
-from tractexp.record.window import averaged_power, sharpened
+from tractexp.record.window import averaged_power, mean_weights, sharpened
 from tractexp.recording.estimator import estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)
@@ -29,6 +30,13 @@ class RecorderWindow(Measurement):
         return f"RecorderWindow({self.window}{f', {self.shape.name}' if self.shape else ''})"
 
     @property
+    def setting(self) -> float | str:
+        """How `model.window` names it."""
+        if self.said:
+            return RECORDED
+        return self.shape.name if self.shape else self.window
+
+    @property
     def averages(self) -> bool:
         """Whether no sample counts less than nothing."""
         return self.shape is None or bool((self.shape.weights >= 0).all())
@@ -41,7 +49,7 @@ class RecorderWindow(Measurement):
 
     def weights(self, step: float) -> np.ndarray:
         """What each sample, `step` [s] apart, counts around the middle one, (odd,)."""
-        return _weights(self.window / step) if self.shape is None else self.shape.on(step)
+        return mean_weights(self.window / step) if self.shape is None else self.shape.on(step)
 
     def observe(self, power: np.ndarray, drive: Drive, values: dict[str, np.ndarray]) -> np.ndarray:
         shown = np.empty_like(power)
@@ -54,16 +62,6 @@ class RecorderWindow(Measurement):
     def sharpened(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""
         return sharpened(event, self.weights(event.record.step), self.window)
-
-
-def _weights(samples: float) -> np.ndarray:
-    """What each sample around the middle one counts in the mean over a window, (odd,)."""
-    whole, part = divmod(samples / 2, 1)
-    half = np.zeros(int(whole) + 2)
-    half[:-2] += 0.5
-    half[1:-1] += 0.5
-    half[-2:] += part - part**2 / 2, part**2 / 2
-    return np.r_[half[:0:-1], 2 * half[0], half[1:]] / samples
 
 
 def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:

@@ -78,8 +78,9 @@ class Model:
 
     def __init__(
         self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL,
-        domain: str = PHASORS,
+        domain: str = PHASORS, window: float | str | None = None,
     ):  # fmt: skip
+        self.window = window  # over which the recorder averages phasors; see `tractexp.domain.averaging`
         self.motor, self.static, self.integration, self.domain = motor, static, integration, domain
         self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
         self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
@@ -90,6 +91,9 @@ class Model:
             self.title += ", integrated by Eq. (4) as printed"
         if self.waves:
             self.title += ", on waveforms"
+        if window is not None:
+            length = window if isinstance(window, str) else f"{1000 * window:g} ms"
+            self.title += f", behind the recorder's window ({length})"
 
     @property
     def waves(self) -> bool:
@@ -349,15 +353,16 @@ def _observed(effect: Measurement, outputs: np.ndarray, drive: Drive, columns: d
 
 
 def compose(
-    motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL, domain: str = PHASORS
+    motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL, domain: str = PHASORS,
+    window: float | str | None = None,
 ) -> Model:  # fmt: skip
     """A composite load of these parts. Raises `UserError` for an effect named twice, an unknown integration or domain.
 
-    `domain` is `phasors` or `waves`.
+    `domain` is `phasors` or `waves`; `window` that over which the recorder averages phasors.
     """
     check_choice("model.integration", integration, INTEGRATIONS)
     check_choice("domain", domain, DOMAINS)
     names = [effect.name for effect in effects]
     if twice := next((n for n in names if names.count(n) > 1), None):
         raise UserError(f"{MODEL.effects} names '{twice}' twice; name each effect once")
-    return Model(motor, static, effects, integration, domain)
+    return Model(motor, static, effects, integration, domain, window)

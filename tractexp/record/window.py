@@ -60,6 +60,16 @@ class Window:
         return cls(str(content["name"]), at, weights)
 
 
+def mean_weights(samples: float) -> np.ndarray:
+    """What each sample around the middle one counts in the mean over a window of so many samples, (odd,)."""
+    whole, part = divmod(samples / 2, 1)
+    half = np.zeros(int(whole) + 2)
+    half[:-2] += 0.5
+    half[1:-1] += 0.5
+    half[-2:] += part - part**2 / 2, part**2 / 2
+    return np.r_[half[:0:-1], 2 * half[0], half[1:]] / samples
+
+
 @np.errstate(invalid="ignore")  # what diverges stays what is not finite
 def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Mean of y (..., N) with weights (odd,) about each sample.

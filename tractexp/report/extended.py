@@ -83,13 +83,11 @@ def equations(page: Report, findings: Findings) -> None:
     page.heading("The extended model")
     if others := alternatives(findings.verdict.sets[1:]):
         page.text(f"It has {joined(findings.names)}; {others} instead would fit these events as well.")
-    page.text(
-        f"conf/model/extended.yaml beside this page: {use_of(findings.context.load.domain, 'conf')}. Its equations"
-        " that changed or came in:"
-    )
+    command = use_of(findings.context.load.domain, "conf/model/extended.yaml")
+    page.text(f"conf/model/extended.yaml beside this page: {command}. Its equations that changed or came in:")
     base = findings.context.load
     effects = [findings.catalogue[n].effect for n in findings.names]
-    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain)
+    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain, window=base.window)
     for was, line in changed(base.latex(), extended.latex()):
         if was is not None:
             page.text("before").equation(was).text("after")
