@@ -8,6 +8,7 @@ import dataclasses
 import errno
 import importlib.resources
 import io
+import itertools
 import json
 import math
 import os
@@ -249,6 +250,58 @@ def held(path: Path, seconds: float) -> Iterator[None]:
         yield
 
 
+@contextlib.contextmanager
+def claimed(path: Path, claimant: str) -> Iterator[None]:
+    """Hold the file `path`, which says by whom, and remove it at the end; a process that dies lets go of it.
+
+    Raises `UserError` where another process holds it. A file system without locks holds nothing.
+    """
+    with _as_user_error(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        file = _taken(path)
+    with file:
+        file.truncate(0)
+        file.write(encoded(claimant))
+        file.flush()
+        try:
+            yield
+        finally:
+            with contextlib.suppress(OSError):
+                path.unlink()
+
+
+def _taken(path: Path) -> IO[bytes]:
+    """The file of a lock, locked. What was removed between opening and locking it is none any more."""
+    while True:
+        there(path)
+        file = path.open("a+b")
+        try:
+            if not _locked(file):
+                file.seek(0)
+                raise UserError(
+                    f"{path.parent} is in use by {file.read(200).decode(errors='replace') or 'another process'}: wait"
+                    " until that has ended, or give another folder"
+                )
+            if os.name == "nt" or (path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))):
+                return file
+        except BaseException:
+            file.close()
+            raise
+        file.close()
+
+
+def new_folder(path: Path) -> Path:
+    """A folder that was not there: of this name, or with a number behind it. Raises `UserError` where it cannot be."""
+    with _as_user_error(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        for k in itertools.count(1):
+            named = path if k == 1 else path.with_name(f"{path.name}_{k}")
+            with contextlib.suppress(FileExistsError):
+                named.mkdir()
+                return named
+    raise AssertionError("numbers end nowhere")
+
+
 def _locked(file: IO[bytes]) -> bool:
     try:
         if os.name == "nt":
@@ -263,7 +316,8 @@ def _locked(file: IO[bytes]) -> bool:
     except OSError as error:
         if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
             return False
-        raise
+        if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a file system that knows no locks
+            raise
     return True
 
 

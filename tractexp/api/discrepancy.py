@@ -366,7 +366,8 @@ class Discrepancy(Task, call=investigate):
         from tractexp.discrepancy.discrepancy_json import use_of
 
         assert isinstance(result, Investigation)
-        paths = {path.name: path for path in (*result.write_results(job.folder), *result.write_drawings(job.folder))}
+        results = job.write(result.write_results)
+        paths = {path.name: path for path in (*results, *result.write_drawings(job.folder))}
         say()
         show(result.summary(), console())
         if page := paths.get(result.page):

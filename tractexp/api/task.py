@@ -16,6 +16,7 @@ from tractexp.errors import UserError
 from tractexp.outcome import Written
 from tractexp.plugin import Plugin, build, get
 from tractexp.progress import console, say
+from tractexp.run_folder import Write
 
 if TYPE_CHECKING:
     from tractexp.record.identity import Identity
@@ -123,13 +124,11 @@ class Task(Plugin):
 
     def run(self, job: "Job") -> None:
         """Do the task. Raises `UserError` before anything is logged where the input is wrong."""
-        result = self.perform(job)
-        job.begin()
-        self.conclude(job, result)
+        self.conclude(job, self.perform(job))
 
     def conclude(self, job: "Job", result: Written) -> None:
         """Write a result, show it, draw it, log it."""
-        paths = result.write_results(job.folder)
+        paths = job.write(result.write_results)
         say()
         show(result.summary(), console())
         say()
@@ -194,7 +193,7 @@ class Job:
     in_sweep: bool = False  # one of many: what only a person looks at may be left out
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
     measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
-    begin: Callable[[], None] = lambda: None  # before the first result is written: those of an earlier run go
+    placed: Callable[[Write], list[Path]] | None = None  # how results take the place of an earlier run's
 
     @functools.cached_property
     def events(self) -> Any:
@@ -236,6 +235,10 @@ class Job:
         from tractexp.api.setup import Setup
 
         return Setup.of(self.events.train, self.config["model"], objective=self.config["objective"]).problem
+
+    def write(self, results: Write) -> list[Path]:
+        """Write the results of a run into its folder: an earlier run's are there until these are whole. Their paths."""
+        return results(self.folder) if self.placed is None else self.placed(results)
 
     def tell(self, line: str) -> None:
         """Print a line of a call's progress. The first comes once the input is found right: then MLflow gets ready."""

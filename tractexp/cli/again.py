@@ -8,12 +8,13 @@ from pathlib import Path
 
 from tractexp import files, quoting
 from tractexp.cli.chosen import reads
-from tractexp.cli.configuration import FOLDER
 from tractexp.errors import UserError
 from tractexp.plugin import get
 from tractexp.progress import say
 from tractexp.provenance import group_of
 from tractexp.repeatable import refusal
+from tractexp.run_folder import CONFIGURATION as FOLDER
+from tractexp.run_folder import settle
 
 RESULT = "result.json"
 SEARCHED = "--config-dir"
@@ -34,6 +35,7 @@ def again(arguments: list[str]) -> list[str]:
     folder = Path(chosen.folder).absolute()
     if odd := [text for text in chosen.settings if "=" not in text]:
         raise UserError(f"{odd[0]} is no setting; give KEY=VALUE, as task=discrepancy")
+    settle(folder)
     lines, cwd, searched = _stored(folder)
     if searched and chosen.config_dir is None:
         raise UserError(

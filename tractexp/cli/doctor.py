@@ -14,6 +14,7 @@ from tractexp import files, quoting, tracking
 from tractexp.cli.sync import FOLDER, brought
 from tractexp.errors import UserError
 from tractexp.progress import say
+from tractexp.run_folder import WHOLE, settle
 from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences
 
@@ -127,6 +128,12 @@ def leavings(folder: Path) -> Iterator[Finding]:
         path.unlink(missing_ok=True)
     if halves:
         yield HEALED, f"{len(halves)} files of {folder} that were never finished are removed"
+    for whole in [*folder.rglob(WHOLE)] if folder.is_dir() else []:
+        try:
+            if settle(whole.parent):
+                yield HEALED, f"the results in {whole.parent} have their places; a run was killed before they had"
+        except UserError as error:
+            yield WRONG, str(error)
 
 
 def store(uri: str) -> Iterator[Finding]:

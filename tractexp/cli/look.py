@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tractexp import quoting
+from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.progress import console
 
@@ -34,7 +34,8 @@ def look(arguments: list[str]) -> int:
     view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
     rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
     show(view.everything() if chosen.all else view.summary().text(rest), console())
-    listed(view.write(chosen.folder or FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"))
+    usual = FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
+    listed(view.write(chosen.folder or files.new_folder(usual)))
     return 0
 
 

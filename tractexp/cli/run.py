@@ -1,6 +1,6 @@
 """From a composed configuration to a task that runs."""
 
-from collections.abc import Callable
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from tractexp.cli import configuration
 from tractexp.cli.chosen import given, refuse_unread
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
+from tractexp.run_folder import RunFolder, run_folder
 
 TERMINATED = 143  # the exit code of a process that SIGTERM ended
 
@@ -21,36 +22,39 @@ def run(config: Any) -> None:
 
     hydra = HydraConfig.get()
     folder, choices = Path(hydra.runtime.output_dir), dict(hydra.runtime.choices)
-    begin: Callable[[], None] | None = None
     try:
         plain: Any = OmegaConf.to_container(config, resolve=True)
         credentials.check("", plain)
-        begin = configuration.written(folder, config)
-        provenance.placed(folder)
-        perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), begin=begin))
-        configuration.concluded(folder)
     except UserError:
-        configuration.removed(folder)
+        with contextlib.suppress(OSError):  # where it is not empty
+            folder.rmdir()
         raise
-    except KeyboardInterrupt as stop:
-        saved = so_far(stop, folder, begin)
-        configuration.removed(folder)
-        raise Stopped(f"{_how(stop)}; {saved or again(config)}", getattr(stop, "code", 130)) from None
+    with run_folder(folder, configuration.contents(config), configuration.named(plain)) as place:
+        try:
+            provenance.placed(folder)
+            perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), placed=place.place))
+            place.conclude()
+        except KeyboardInterrupt as stop:
+            saved = so_far(stop, place)
+            raise Stopped(f"{_how(stop)}; {saved or again(config)}", getattr(stop, "code", 130)) from None
 
 
 def _how(stop: KeyboardInterrupt) -> str:
     return "ended by SIGTERM" if getattr(stop, "code", 130) == TERMINATED else "interrupted"
 
 
-def so_far(stop: KeyboardInterrupt, folder: Path, begin: Callable[[], None] | None) -> str:
+def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
     """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
-    if begin is None or (state := getattr(stop, "result", None)) is None:
+    if (state := getattr(stop, "result", None)) is None:
         return ""
     from tractexp.identification.result import write_history
 
-    begin()
-    path = state.result.write(folder / "interrupted.json")
-    write_history(folder / "history.csv", state.search_result.history)
+    path, _ = place.place(
+        lambda folder: [
+            state.result.write(folder / "interrupted.json"),
+            write_history(folder / "history.csv", state.search_result.history),
+        ]
+    )
     return (
         f"the best of {state.result.simulations} simulations so far, objective {state.result.objective:.4g} pu², is in"
         f" {path}; it is neither polished nor judged, and not logged"

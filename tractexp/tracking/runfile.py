@@ -15,6 +15,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
+from tractexp.run_folder import settle
 from tractexp.tracking.run import Line, TrackedRun, flatten, thinned
 
 FILE = "mlflow.json"
@@ -54,14 +55,15 @@ def save(folder: Path, run: TrackedRun, uri: str, sweep: bool = False) -> RunFil
 def read(folder: Path) -> RunFile | None:
     """The file of a folder; None where there is none. Raises `UserError` for a damaged file."""
     path = folder / FILE
+    settle(folder)
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = files.read_json(path)
         uri, run_id = _texts(content, "uri", "run_id")
         return RunFile(folder, _run(content["run"], folder), uri, run_id, bool(content["sweep"]))
     except FileNotFoundError:
         return None
-    except OSError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
+    except UserError as error:
+        raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
     except (ValueError, KeyError, TypeError, AttributeError) as error:
         raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
 
