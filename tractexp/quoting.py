@@ -48,6 +48,11 @@ def markdown(text: str) -> str:
     return "".join(f"\\{c}" if c in MARKDOWN else c for c in " ".join(text.splitlines()))
 
 
+def markdown_again(text: str) -> str:
+    """Markdown that somebody else may have written, as what `markdown` makes of its text: no link, no picture."""
+    return markdown(re.sub(r"\\([\\`*_<>\[\]|$~&#])", r"\1", text))
+
+
 def fenced(text: str) -> str:
     """A block of code of Markdown, which no backticks in the text end."""
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))

@@ -113,6 +113,8 @@ class Store:
 
 CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)  # some 10 kB each
 SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)  # draws of 10 MB
+KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DRAWS))
+MOST_LINKS = 40  # that a path leads through, as the system has it
 
 
 def damaged(folder: Path) -> list[Path]:
@@ -214,22 +216,81 @@ def _unfit(folder: Path, private: bool = False) -> str:
     """
     try:
         _create(folder)
-        place = folder.resolve()
-        state = place.stat()
         if hasattr(os, "geteuid"):  # Windows keeps a user's folders by other means
-            if state.st_uid != os.geteuid():
-                return "it belongs to another user"
-            if state.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-                return "other users can write to it"
-            for parent in place.parents:
-                mode = parent.stat().st_mode
-                if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
-                    return f"every user can put another in its place, since every user can write to {parent}"
-            if private and stat.S_IMODE(state.st_mode) != stat.S_IRWXU:
-                place.chmod(stat.S_IRWXU)
+            if reason := _writable_by_others(folder.resolve()) or _reachable_by_others(folder):
+                return reason
+            if private and stat.S_IMODE(folder.stat().st_mode) != stat.S_IRWXU:
+                folder.resolve().chmod(stat.S_IRWXU)
     except (OSError, ValueError) as error:
         return f"it cannot be made or looked at ({getattr(error, 'strerror', None) or error})"
     return "" if os.access(folder, os.W_OK | os.X_OK) else "it cannot be written to"
+
+
+def _reachable_by_others(folder: Path) -> str:
+    """Why others could put another folder in this one's place, "" where nobody can: of all that its path leads through.
+
+    That is every folder in which one of its parts is looked up, before and behind each link.
+    """
+    here, parts, links = Path(folder.absolute().anchor), [*folder.absolute().parts[1:]], 0
+    while parts:
+        part = parts.pop(0)
+        state, entry = here.stat(), (here / part).lstat()
+        if state.st_uid not in (0, os.geteuid()):
+            return f"another user can put another in its place, since {here} is theirs"
+        shared = _others_write(state)
+        if shared and not state.st_mode & stat.S_ISVTX:
+            who = "every user" if state.st_mode & stat.S_IWOTH else "a group"
+            return f"{who} can put another in its place, since {who} can write to {here}"
+        if shared and entry.st_uid not in (0, os.geteuid()):
+            return f"another user has put {here / part} there"
+        if stat.S_ISLNK(entry.st_mode):
+            links += 1
+            if links > MOST_LINKS:
+                return "its links lead nowhere"
+            target = Path(os.readlink(here / part))
+            parts[:0] = target.parts[1:] if target.is_absolute() else target.parts
+            here = Path(target.anchor) if target.is_absolute() else here
+        else:
+            here = here.parent if part == ".." else here / part
+    return ""
+
+
+def _writable_by_others(folder: Path) -> str:
+    """Why others could write into the store itself, or to one of its kinds; "" where nobody can."""
+    if folder.stat().st_uid != os.geteuid():
+        return "it belongs to another user"
+    if folder.stat().st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return "other users can write to it"
+    for kind in KINDS:
+        path = folder / kind
+        if not os.path.lexists(path):
+            continue
+        state = path.lstat()
+        if not stat.S_ISDIR(state.st_mode):
+            return f"{path} is a link or a file, and no folder"
+        if state.st_uid != os.geteuid() or state.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return f"other users can write to {path}"
+    return ""
+
+
+def _others_write(state: os.stat_result) -> bool:
+    """Whether others may write there: all of them, or those of a group that is not the user's alone."""
+    return bool(state.st_mode & stat.S_IWOTH) or (
+        bool(state.st_mode & stat.S_IWGRP) and not _is_private_group(state.st_gid)
+    )
+
+
+@functools.cache
+def _is_private_group(number: int) -> bool:
+    """Whether a group is the one that many systems make for a user, of the same name and with nobody else in it."""
+    import grp
+    import pwd
+
+    try:
+        group, user = grp.getgrgid(number), pwd.getpwuid(os.geteuid())
+    except KeyError:
+        return False
+    return group.gr_name == user.pw_name and user.pw_gid == number and set(group.gr_mem) <= {user.pw_name}
 
 
 def _create(folder: Path) -> None:

@@ -260,6 +260,41 @@ def within_reach(folder, monkeypatch):
     return "every user can put another in its place"
 
 
+def in_a_folder_of_a_group(folder, monkeypatch):
+    monkeypatch.setattr(store, "_is_private_group", lambda number: False)
+    folder.parent.chmod(0o775)
+    return "a group can put another in its place"
+
+
+def in_a_folder_of_another_user(folder, monkeypatch):
+    usual = os.getuid()
+    if usual:
+        pytest.skip("only root gives a folder away")
+    os.chown(folder.parent, 12345, 12345)
+    return "another user can put another in its place"
+
+
+def with_a_kind_that_is_open(folder, monkeypatch):
+    (folder / "code").mkdir(exist_ok=True)
+    (folder / "code").chmod(0o777)
+    return f"other users can write to {folder / 'code'}"
+
+
+def with_a_kind_that_is_a_link(folder, monkeypatch):
+    (folder.parent / "theirs").mkdir()
+    (folder / "texts").symlink_to(folder.parent / "theirs")
+    return f"{folder / 'texts'} is a link or a file, and no folder"
+
+
+def behind_a_link_that_others_can_change(folder, monkeypatch):
+    (folder.parent / "open").mkdir()
+    sound = folder.rename(folder.parent / "sound")
+    (folder.parent / "open" / "link").symlink_to(sound)
+    folder.symlink_to(folder.parent / "open" / "link")
+    (folder.parent / "open").chmod(0o777)
+    return "every user can put another in its place"
+
+
 def no_folder(folder, monkeypatch):
     folder.rmdir()
     folder.write_text("a file")
@@ -271,7 +306,11 @@ def read_only(folder, monkeypatch):
     return "it cannot be written to"
 
 
-FAULTS = [foreign, open_to_all, open_to_a_group, within_reach, no_folder, read_only]
+FAULTS = [
+    foreign, open_to_all, open_to_a_group, within_reach, no_folder, read_only, in_a_folder_of_a_group,
+    in_a_folder_of_another_user, with_a_kind_that_is_open, with_a_kind_that_is_a_link,
+    behind_a_link_that_others_can_change,
+]  # fmt: skip
 
 
 @WITHOUT_OWNERS

@@ -1,5 +1,6 @@
 """What somebody else gave is data: none of it runs, sends, overwrites, or stands in for what is ours."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -13,6 +14,10 @@ from command_line import free_port, run_command
 import tractexp.data
 from tractexp.cli.again import again
 from tractexp.errors import UserError
+from tractexp.tracking import TrackedRun
+from tractexp.tracking.runfile import FILE, save
+from tractexp.tracking.store import open_store
+from tractexp.tracking.sync import BROUGHT, sync
 
 DATA = Path(tractexp.data.__file__).parent
 QUICK = ("optimizer=random_search", "budget=10", "hydra.run.dir=run")
@@ -153,3 +158,50 @@ def test_a_damaged_configuration_is_a_sentence_and_takes_no_time(content, senten
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(UserError, match=sentence):
         again([str(folder)])
+
+
+# Runs that are brought into a store
+
+PICKLE = {"flavors": {"python_function": {"loader_module": "mlflow.pyfunc.model", "python_model": "p.pkl"}}}
+
+
+def brought(folder: Path, uri: str, **content) -> tuple[dict, list[str]]:
+    """What the store has of a run whose file somebody else wrote, and what was said."""
+    save(folder, TrackedRun("e", "one"), uri)
+    whole = json.loads((folder / FILE).read_text())
+    (folder / FILE).write_text(json.dumps(whole | {"run": whole["run"] | content}))
+    said: list[str] = []
+    assert sync(folder, uri, tell=said.append)[BROUGHT] == 1
+    client = open_store(uri)
+    run = client.get_run(json.loads((folder / FILE).read_text())["run_id"])
+    artifacts = [one.path for one in client.list_artifacts(run.info.run_id)]
+    return {"tags": run.data.tags, "artifacts": artifacts, "run": run}, said
+
+
+def test_no_model_of_others_comes_into_the_store_but_as_a_result_that_is_read(tmp_path, uri):
+    """MLflow loads a folder by its file `MLmodel`, and what that names: a pickle of its maker's."""
+    folder = tmp_path / "given"
+    for place in (folder / "model", folder / "figures" / "deep", folder):
+        place.mkdir(parents=True, exist_ok=True)
+        (place / "MLmodel").write_text(yaml.safe_dump(PICKLE))
+        (place / "p.pkl").write_bytes(b"x")
+    (folder / "small").mkdir()
+    (folder / "small" / "mlmodel").write_text(yaml.safe_dump(PICKLE))
+    (folder / "result.json").write_text('{"parameters": {}}')
+    ways = ["model", "figures", "MLmodel", "small", "p.pkl"]
+    found, said = brought(folder, uri, artifacts=ways, model="result.json")
+    assert found["artifacts"] == ["p.pkl"]  # which nothing loads by itself
+    assert not found["run"].outputs or not found["run"].outputs.model_outputs
+    assert sum("MLflow would load it as a model" in line for line in said) == 4
+    assert any("no model is made of" in line for line in said)
+
+
+def test_a_run_of_others_sets_no_tag_of_mlflow_and_shows_no_link(tmp_path, uri):
+    tags = {"mlflow.parentRunId": "x", "mlflow.source.name": "theirs", "tractexp.key": "y", "load": "7"}
+    picture = "A ![x](http://127.0.0.1:9/x) <img src=x> that is \\<own\\>"
+    found, _ = brought(tmp_path / "given", uri, tags=tags, description=picture)
+    assert found["tags"]["mlflow.source.name"] == "tractexp"
+    assert "mlflow.parentRunId" not in found["tags"]
+    assert found["tags"]["load"] == "7"
+    note = found["tags"]["mlflow.note.content"]
+    assert note == "A !\\[x\\](http://127.0.0.1:9/x) \\<img src=x\\> that is \\<own\\>"

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from tractexp import files, provenance
+from tractexp import files, provenance, quoting
 from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
 from tractexp.api.read import Dips, dips_of, dips_together
@@ -194,6 +194,6 @@ class LinearNetwork(Task, call=linear_network):
             metrics["model_error_held_out"] = error["held_out"]["value"]
         names = " and ".join(event.record.name for event in result.train)
         return {
-            "name": f"linear network, {names}", "metrics": metrics, "description": result.headline,
+            "name": f"linear network, {names}", "metrics": metrics, "description": quoting.markdown(result.headline),
             "records": result.content["records"],
         }  # fmt: skip

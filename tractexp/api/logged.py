@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from tractexp import quoting
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.search import REFUSED
 
@@ -32,7 +33,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
         "curves": _curves(fit),
         "tags": {"grade": fit.grade},
         "seconds": result.seconds,
-        "description": fit.headline,
+        "description": quoting.markdown(fit.headline),
         "records": result.records,
         "model": job.folder / "result.json" if predictor else None,
     }

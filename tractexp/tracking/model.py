@@ -60,7 +60,7 @@ def _save(folder: Path, result: Path, run_id: str, logged: Any) -> None:
         "python_function", loader_module=__name__, python_version=python, data=RESULT, env={"virtualenv": environment}
     )
     files.write(folder / "MLmodel", yaml.safe_dump(model.to_dict() | {"signature": SIGNATURE}))
-    files.copy(result, folder / RESULT)
+    files.write_json(folder / RESULT, files.read_json(result))
     packages = {f"{p.dist.name}=={p.dist.version}" for p in entry_points(group="tractexp.plugins") if p.dist}
     files.write(folder / "requirements.txt", "\n".join([f"mlflow=={mlflow.__version__}", *sorted(packages)]))
     files.write(folder / environment, f"python: {python}\ndependencies:\n- -r requirements.txt\n")

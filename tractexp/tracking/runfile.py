@@ -19,6 +19,15 @@ from tractexp.run_folder import settle
 from tractexp.tracking.run import Line, TrackedRun, flatten, thinned
 
 FILE = "mlflow.json"
+MOST_CHILDREN = 1000  # runs below one: sets of effects, optimizers
+NUMBER = (int, float)
+SHAPES: Mapping[str, Any] = {  # kinds of the entries of a run that are no texts
+    "parameters": dict, "metrics": dict, "curves": dict, "tags": dict, "artifacts": list, "records": list,
+    "children": list, "model": (str, type(None)), "parent": (str, type(None)), "seconds": NUMBER, "ended": NUMBER,
+}  # fmt: skip
+INNER: Mapping[str, Any] = {  # and of what these hold
+    "metrics": NUMBER, "tags": str, "artifacts": str, "records": dict, "children": dict, "curves": list,
+}  # fmt: skip
 KEY = re.compile(r"[\w-]*", re.ASCII)  # what may stand in MLflow's filter
 
 
@@ -64,7 +73,7 @@ def read(folder: Path) -> RunFile | None:
         return None
     except UserError as error:
         raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
-    except (ValueError, KeyError, TypeError, AttributeError) as error:
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
         raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
 
 
@@ -109,6 +118,15 @@ def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
     key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
     if not KEY.fullmatch(key):
         raise ValueError(f"its key is {key!r:.60}")
+    for name, kinds in SHAPES.items():
+        if not isinstance(content[name], kinds):
+            raise TypeError(f"its {name} is {content[name]!r:.60}")
+    for name, kinds in INNER.items():
+        each = content[name].values() if isinstance(content[name], dict) else content[name]
+        if not all(isinstance(value, kinds) for value in each):
+            raise TypeError(f"its {name} hold what they cannot: {content[name]!r:.60}")
+    if len(content["children"]) > MOST_CHILDREN:
+        raise ValueError(f"it has {len(content['children'])} runs below it, and at most {MOST_CHILDREN} can be")
     there = {
         "artifacts": [folder / path for path in content["artifacts"]],
         "model": None if content["model"] is None else folder / content["model"],

@@ -17,6 +17,9 @@ from tractexp.tracking.sweepfile import FILE, PAGES, folder_of, parent_of
 
 THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
 
+MODEL = "mlmodel"  # of a file, by which MLflow knows a folder as a model; small, as some file systems have it
+RESERVED = ("mlflow.", "tractexp.")  # how tags begin that MLflow and this package set
+
 
 def sync(
     root: Path, uri: str | None = None, tell: Callable[[str], None] = lambda line: None, own: str | None = None
@@ -63,18 +66,38 @@ def _named(uri: str) -> str:
 
 
 def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
-    """The run with those of its files, and of the runs below it, that are there and lie in its folder."""
+    """The run with those of its files, and of the runs below it, that are there and lie in its folder.
+
+    Nothing goes along that MLflow would obey: a model that it loads, a tag of its own, Markdown of others.
+    """
 
     def lies(path: Path) -> bool:
-        if not os.path.exists(path) or files.inside(path, folder):
-            return os.path.exists(path)
-        tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
+        if not os.path.exists(path):
+            return False
+        if not files.inside(path, folder):
+            tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
+        elif any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
+            tell(f"{path} is not sent: MLflow would load it as a model, and run what its maker put into it")
+        else:
+            return True
         return False
+
+    def reads(path: Path) -> bool:
+        from tractexp.identification.result import load
+
+        try:
+            load(path)
+        except UserError as error:
+            tell(f"no model is made of {path}: {error}")
+            return False
+        return True
 
     children = [_within(child, folder, tell) for child in run.children]
     artifacts = [path for path in run.artifacts if lies(path)]
-    model = run.model if run.model and lies(run.model) else None
-    return replace(run, artifacts=artifacts, model=model, children=children)
+    model = run.model if run.model and lies(run.model) and reads(run.model) else None
+    tags = {name: text for name, text in run.tags.items() if not name.startswith(RESERVED)}
+    told = quoting.markdown_again(run.description)
+    return replace(run, artifacts=artifacts, model=model, children=children, tags=tags, description=told)
 
 
 def _sent(one: RunFile, uri: str) -> str:
