@@ -8,9 +8,11 @@ from tractexp.errors import UserError
 
 ADDRESS = re.compile(r"([a-z][a-z0-9+.\-]*)://([^\s]*)", re.IGNORECASE)
 QUERY = re.compile(
-    r"[?&;](password|passwd|pwd|pass|sslpassword|token|access_token|auth_token|api_?key|secret|sig)=[^&;]",
+    r"[?&;#](?:[\w.\-]*(?:password|passwd|pwd|passphrase|token|secret|signature|credential|auth"
+    r"|(?:api|access|account|private)[-_.]?key)|pass|sig|key)=[^&;#]",
     re.IGNORECASE,
 )
+TOKEN = re.compile(r"dapi\w{8,}|[\w+/=\-]{32,}", re.ASCII)  # in the place of a profile of Databricks
 
 
 def held(text: str) -> bool:
@@ -18,7 +20,8 @@ def held(text: str) -> bool:
     for scheme, rest in ADDRESS.findall(text):
         user, at, _ = rest.rpartition("@")
         named = at and not user.startswith("/") and (":" in user or scheme.lower() in ("http", "https"))
-        if named or QUERY.search(rest):
+        token = scheme.lower().startswith("databricks") and TOKEN.fullmatch(rest)
+        if named or token or QUERY.search(rest):
             return True
     return False
 

@@ -53,6 +53,8 @@ def there(path: Path | str) -> bool:
     To open a named pipe waits for ever, a device may have no end, and a name that is no text can be stored nowhere.
     """
     name = str(path)
+    if len(name.splitlines()) > 1:
+        raise UserError(f"{name}: this name has a line break; rename the file")
     try:
         os.fsencode(name).decode()
         kind = stat.S_IFMT(os.stat(path).st_mode)

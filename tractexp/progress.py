@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Any
 
-from tractexp.wording import one_line, shown
+from tractexp.wording import one_line
 
 LOG_WIDTH = 120  # characters a table may take in a log file
 FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
@@ -41,7 +41,7 @@ def console() -> Any:
 
 def say(text: str = "") -> None:
     """Print one line."""
-    console().print(shown(text), markup=False)
+    console().print(one_line(text), markup=False)
 
 
 @contextmanager

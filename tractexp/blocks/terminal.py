@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
-from tractexp.wording import one_line, shown
+from tractexp.wording import one_line
 
 WIDTH = 200  # characters of a line of text that is no terminal's
 
@@ -14,13 +14,13 @@ def show(report: Report, console: Any) -> None:
     """Print a report on a console of rich."""
     for text in (report.title, report.lead):
         if text:
-            console.print(shown(text), markup=False)
+            console.print(one_line(text), markup=False)
     for block in report.blocks:
         if isinstance(block, Table):
             _table(block.brief, console)
         else:
             for line in _lines(block):
-                console.print(shown(line), markup=False)
+                console.print(one_line(line), markup=False)
 
 
 def _lines(block: Any) -> Sequence[str]:
@@ -29,8 +29,10 @@ def _lines(block: Any) -> Sequence[str]:
         return block.texts
     if isinstance(block, Items):
         return [f"  {text}" for text in block.texts]
-    if isinstance(block, Heading | CodeBlock):
-        return [f"  {block.text}" if isinstance(block, CodeBlock) else block.text]
+    if isinstance(block, CodeBlock):
+        return [f"  {line}" for line in block.text.split("\n")]
+    if isinstance(block, Heading):
+        return [block.text]
     return ()
 
 

@@ -189,7 +189,8 @@ def summary(jobs: Sequence[SweepJob]) -> None:
         say()
         rows = sorted((sorted(values), name) for name, values in objectives.items())
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1]))] for v, n in rows]
-        say(str(Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)))
+        for line in str(Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)).splitlines():
+            say(line)
         say("objectives in pu² at the end of the search, before the estimate is polished")
 
 
