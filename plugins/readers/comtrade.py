@@ -1,7 +1,7 @@
 """Records from COMTRADE fault recordings: the dips of one file, numbered in order of time."""
 
 from tractexp.extend import Recording, WaveformReader, plugin
-from tractexp.extend.files import comtrade, located
+from tractexp.extend.files import comtrade, kind_of, located
 
 
 @plugin
@@ -19,7 +19,11 @@ class COMTRADE(WaveformReader):
     Departures: the time skew of channels is corrected on request only.
     """
 
-    endings = (".cfg", ".cff", ".dat")
+    endings = parts = (".cfg", ".cff", ".dat")
+
+    @classmethod
+    def takes(cls, path: str) -> bool:
+        return kind_of(path) == "waves"
 
     encoding: str | None = None  # of the .cfg; null: found from its letters among utf-8, gbk, cp1251 and latin-1
 

@@ -48,7 +48,7 @@ class CSV(Tabular, Reader):
     Departures: any delimiter, title lines, unit rows.
     """
 
-    endings = (*ENDINGS, ".pqd", ".pqdif", ".cev")
+    endings = (*ENDINGS, ".pqd", ".pqdif", ".cev", ".cfg", ".cff", ".dat")
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number
@@ -116,7 +116,7 @@ class CSV(Tabular, Reader):
         sidecar = beside(path)
         table, mapping = self.table_of(path, sidecar)
         given = self.base_voltage or (sidecar.base and sidecar.base.voltage)
-        declared = sidecar.base.frequency if sidecar.base else self.frequency
+        declared = sidecar.base.frequency if sidecar.base else table.frequency or self.frequency
         quantities = powers(table, mapping, declared, self.reverse_current, kilovolts=given is not None)
         window = sidecar.window or (self.estimator and estimator_of(self.estimator).window(quantities.frequency))
         begun = {"time": quantities.start.isoformat()} if quantities.start else {}

@@ -18,7 +18,7 @@ class PQDIF(WaveformReader):
     Departures: histograms, spectra and flicker are not read, nor PKZIP and the compression of the whole file.
     """
 
-    endings = (".pqd", ".pqdif")
+    endings = parts = (".pqd", ".pqdif")
 
     encoding: str | None = None  # of its texts; null: found from their letters
 

@@ -19,7 +19,7 @@ class SEL(WaveformReader):
     are not read.
     """
 
-    endings = (".cev",)
+    endings = parts = (".cev",)
 
     encoding: str | None = None  # of the file; null: found from its letters
 

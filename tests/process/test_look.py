@@ -186,8 +186,10 @@ def test_a_file_without_events_or_loads_is_told_and_is_no_error(tmp_path):
     volts = recording(constant()[:3], names=("UA", "UB", "UC"))
     write(volts, tmp_path / "volts.cfg", "BINARY", 1999)
     alone = tractexp.look(tmp_path / "volts.cfg")
-    assert (len(alone.channels), len(alone.feeders)) == (3, 0)
-    assert str(alone).startswith("nothing is worth fitting: no voltages and currents of one load were recognised")
+    assert (len(alone.channels), len(alone.feeders)) == (3, 1)  # the bus, of which the dip is told
+    assert str(alone).startswith("nothing is worth fitting; dip at ")
+    assert "no current is recorded" in str(alone).splitlines()[0]
+    assert alone.commands == []
     assert str(quiet).startswith("nothing is worth fitting: nothing happened")
     for made in (quiet, alone):
         assert [p.name for p in made.write(tmp_path / "page")] == ["look.json", "look.html"]

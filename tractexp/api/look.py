@@ -19,7 +19,7 @@ from tractexp.overrides import typed
 from tractexp.progress import Progress, staged
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, smeared
-from tractexp.recording.feeder import unrecognised
+from tractexp.recording.feeder import can_be_named, unrecognised
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
 from tractexp.wording import counted
@@ -263,6 +263,8 @@ def _content(view: View) -> dict[str, Any]:
         }  # fmt: skip
     else:
         last = recording.segments[-1]
+        shown = any(each.feeder is None or each.feeder.currents for each in view.sights)
+        lacks = "" if shown else unrecognised(recording)
         content |= {
             "station": recording.station, "device": recording.device,
             "start": recording.start and recording.start.isoformat(),
@@ -270,10 +272,11 @@ def _content(view: View) -> dict[str, Any]:
             "seconds": last.start + (last.stop - last.first) / last.rate,
             "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in recording.segments],
             "notes": [
-                *recording.notes, *([] if view.sights else [f"no load was recognised: {unrecognised(recording)}"]),
+                *recording.notes, *([f"no load was recognised: {lacks}"] if lacks else []),
             ],
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
         }  # fmt: skip
+        content |= {"lacks": lacks, "can_be_named": can_be_named(recording)}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
 

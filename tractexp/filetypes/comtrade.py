@@ -45,14 +45,31 @@ def load(path: Path, encoding: str | None = None) -> Recording:
         raise UserError(f"{error.filename or path} cannot be read: {error.strerror or error}") from error
 
 
+def read_header(path: Path, encoding: str | None = None) -> Header:
+    """What the configuration of a record announces, without its samples; raises `UserError` as `load` does."""
+    path = Path(path)
+    if path.suffix.lower() == ".cff":
+        parts = _sections(_existing(path))
+        if "CFG" not in parts:
+            raise UserError(f"{path}: no section CFG")
+        place, first = parts["CFG"], parts["CFG"].line
+    else:
+        place, first = _whole(_pair(path)[0]), 1
+    text, _ = decode(_configuration(place), str(path), encoding)
+    return parse(str(path), lines(text), Remarks(str(path)), first)
+
+
+def _whole(path: Path) -> ByteRange:
+    return ByteRange(path, 0, path.stat().st_size)
+
+
 def _paired(path: Path, encoding: str | None) -> Recording:
     cfg, dat, note = _pair(path)
     remarks = Remarks(str(cfg))
     if note:
         remarks.add(note)
-    data = ByteRange(dat, 0, dat.stat().st_size)
-    text, encoding = decode(_configuration(ByteRange(cfg, 0, cfg.stat().st_size)), str(cfg), encoding)
-    return _recording(cfg, text, data, remarks, {"encoding": encoding})
+    text, encoding = decode(_configuration(_whole(cfg)), str(cfg), encoding)
+    return _recording(cfg, text, _whole(dat), remarks, {"encoding": encoding})
 
 
 def _combined(path: Path, encoding: str | None) -> Recording:

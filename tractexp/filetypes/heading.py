@@ -104,10 +104,29 @@ def _are_units(texts: Sequence[str]) -> bool:
 
 def _joined(groups: Sequence[Any], names: list[str]) -> list[str]:
     """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is one."""
-    above = [_text(cell) for cell in groups]
-    if len(above) != len(names) or len(names) < 3 or sum(map(bool, above)) < len(names) - 1:
+    above = _merged([_text(cell) for cell in groups], names)
+    repeated = [upper for upper, name in zip(above, names, strict=False) if name and names.count(name) > 1]
+    told = bool(repeated) and all(repeated) and len({*repeated}) > 1
+    few = sum(map(bool, above)) < len(names) - 1
+    if len(above) != len(names) or len(names) < 3 or (few and not told):
         return names
     return [f"{upper} {name}".strip() for upper, name in zip(above, names, strict=True)]
+
+
+def _merged(above: list[str], names: Sequence[str]) -> list[str]:
+    """A row of groups with the text of a merged cell, which stands over its first column, over all of its columns.
+
+    Only where names repeat, so that they need the groups to be told apart.
+    """
+    repeated = {name for name in names if name and names.count(name) > 1}
+    if not repeated or sum(map(bool, above)) < 2:
+        return above
+    above = [*above, *[""] * (len(names) - len(above))]
+    filled, last = list[str](), ""
+    for text, name in zip(above, names, strict=False):
+        last = text or last
+        filled.append(last if name in repeated or text else "")
+    return filled
 
 
 def _padded(texts: Sequence[str], width: int) -> tuple[str, ...]:

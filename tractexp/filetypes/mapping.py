@@ -67,15 +67,8 @@ def mapped(
         if choice is None:  # left out
             options.pop(_key(key), None)
     kind, keys = _kind(table, options, numbers)
-    chosen: dict[str, MappedColumn] = {}
-    for key in keys:
-        if len(options[key]) > 1:
-            listed = ", ".join(one.label for one in options[key])
-            raise UserError(
-                f"{table.source}: {key} could be any of the columns {listed}; say which, e.g. "
-                f"{DATA.columns}={{{key}: '{options[key][0].name}'}}"
-            )
-        chosen[key] = options[key][0]
+    _check_ambiguity(table, options, keys, columns)
+    chosen = {key: options[key][0] for key in keys}
     for key, one in chosen.items():
         if (quantity := one.role.quantity) in units:  # the user's unit goes before that in the header
             chosen[key] = replace(one, role=replace(one.role, unit=str(units[quantity])))
@@ -83,6 +76,39 @@ def mapped(
         _check_unit(table, one)
     days = [one for one in options.get("day", []) if one.number != chosen["t"].number][:1]
     return Mapped(kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days))
+
+
+def _check_ambiguity(
+    table: TableFile,
+    options: Mapping[str, list[MappedColumn]],
+    keys: Sequence[str],
+    given: Mapping[str, Any],
+) -> None:
+    """Raise `UserError` where several columns fit a key, with one setting that answers for all such keys at once.
+
+    It holds what was `given` already, so that no answer takes back the one before.
+    """
+    several = [key for key in keys if len(options[key]) > 1]
+    if not several:
+        return
+    listed = ", ".join(one.label for one in options[several[0]])
+    names = [name.strip() for name in table.heading.names]
+    firsts = {key: options[key][0] for key in several}
+    answers = {
+        key: f"'{one.name}'" if names.count(one.name.strip()) == 1 else str(one.number) for key, one in firsts.items()
+    }
+    answers |= {key: _answer(choice) for key, choice in given.items() if key not in answers}
+    said = ", ".join(f"{key}: {answer}" for key, answer in answers.items())
+    raise UserError(
+        f"{table.source}: {several[0]} could be any of the columns {listed}; say which, e.g. {DATA.columns}={{{said}}}"
+    )
+
+
+def _answer(choice: Any) -> str:
+    """A choice of a column as it is typed."""
+    if choice is None:
+        return "null"
+    return str(choice) if str(choice).isdigit() else f"'{choice}'"
 
 
 def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
@@ -167,7 +193,7 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
         key = name if name in exact else renamed.get(one.key, one.key)
         if key in numbers or (key in exact and name != key):
             continue
-        line = None if key == "U" and name == "U" else one.line
+        line = None if key == "U" and (name == "U" or one.key == "Ua") else one.line
         options.setdefault(key, []).append(MappedColumn(k, name, replace(one, key=key, line=line)))
     return _timed(table, options)
 
@@ -193,7 +219,15 @@ def _numbered(roles: Mapping[int, Role]) -> dict[str, str]:
                 phases |= {old: f"{letter}{p}{ending}" for old, p in zip(numbered, PHASES, strict=True)}
             elif letter in "PQ" and numbered[0] in keys:
                 phases[numbered[0]] = letter
-    return phases
+    return phases | _of_one_load(keys)
+
+
+def _of_one_load(keys: Collection[str]) -> dict[str, str]:
+    """What U L1, P L1, Q L1 are where no L2 and L3 are beside them: the whole of a load called L1."""
+    if not {"Pa", "Qa"} <= set(keys) or {"P", "Q", "Pb", "Pc", "Qb", "Qc"} & set(keys):
+        return {}
+    voltage = {"Ua": "U"} if not {"U", "U1", "Ub", "Uc"} & set(keys) else {}
+    return {"Pa": "P", "Qa": "Q", **voltage}
 
 
 def _timed(table: TableFile, options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
@@ -225,6 +259,8 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
     keys, wanted = set(options), set(chosen)
     kinds: dict[str, list[str]] = {}
     wave = _waveform(options)
+    if len({key[0] for key in wave}) == 1 and not _oscillates(table, options, wave):
+        wave = []
     if wave and (not _powers(options) or (_has(keys, "P") and _oscillates(table, options, wave))):
         kinds["waves"] = wave
     if powers := _powers(options):
@@ -279,14 +315,20 @@ def _phasors(options: Mapping[str, Any]) -> list[str]:
 
 
 def _waveform(options: Mapping[str, Any]) -> list[str]:
+    """Voltages and currents that may be waveforms: both, or those of one kind where no power stands beside them."""
     U, I = (_set(options, letter, ()) or [k for k in (letter, letter + "a", letter + "1") if k in options][:1]
             for letter in "UI")  # fmt: skip
-    return [*U, *I] if U and I else []
+    one_kind = len(U or I) == 3 and not _has(options, "P") and not _has(options, "Q")
+    return [*U, *I] if (U and I) or one_kind else []
 
 
 def _oscillates(table: TableFile, options: Mapping[str, list[MappedColumn]], keys: Sequence[str]) -> bool:
-    """Whether a voltage among the columns takes both signs, as a waveform does and a magnitude does not."""
-    for key in (key for key in keys if key[0] == "U"):
+    """Whether a voltage among the columns takes both signs, as a waveform does and a magnitude does not.
+
+    Where there is no voltage, whether a current does.
+    """
+    letter = "U" if any(key[0] == "U" for key in keys) else "I"
+    for key in (key for key in keys if key[0] == letter):
         cells = [row[options[key][0].number] for row in table.sample if options[key][0].number < len(row)]
         values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
         if values and min(values) < 0 < max(values):

@@ -64,6 +64,7 @@ class TableFile(ABC):
     sample: Sequence[Sequence[Any]]  # the first rows of cells
     notes: tuple[str, ...] = ()
     start: datetime | None = None  # of t = 0, where the file says it beside its columns
+    frequency: float | None = None  # Hz, nominal, where it does
 
     @abstractmethod
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
@@ -135,13 +136,13 @@ def column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> Ta
 
 
 def instrument_of(path: Path | str) -> ModuleType | None:
-    """The module of the instrument whose file it is, by its beginning; None for another file.
+    """The module of the instrument whose file it is, by its beginning or ending; None for another file.
 
-    It has `holds_waveforms`, and `load` and `table` for what the instrument was set to record.
+    It has `holds_waveforms`, and `table` for what else the instrument was set to record.
     """
-    from tractexp.filetypes import cev, pqdif
+    from tractexp.filetypes import cev, comtrade_table, pqdif
 
-    return next((each for each in (pqdif, cev) if each.recognizes(path)), None)
+    return next((each for each in (pqdif, cev, comtrade_table) if each.recognizes(path)), None)
 
 
 def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:

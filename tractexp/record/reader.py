@@ -29,6 +29,7 @@ class Reader(Plugin):
 
     group: ClassVar[str] = "data"
     endings: ClassVar[tuple[str, ...]] = ()  # of the files that `tractexp.read` gives it, in lower case
+    parts: ClassVar[tuple[str, ...]] = ()  # endings of an instrument's files: of one stem they are one record
     folders: ClassVar[bool] = False  # `data.path` is a folder, and `train` names events of its files
 
     @staticmethod

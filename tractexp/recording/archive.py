@@ -8,7 +8,8 @@ from pathlib import Path
 
 from tractexp.errors import DATA, UserError, nearest
 from tractexp.files import read
-from tractexp.record import Record, endings, reader_of
+from tractexp.plugin import discover
+from tractexp.record import Reader, Record, endings, reader_of
 from tractexp.record.foreign import is_record
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.reader import WaveformReader
@@ -46,11 +47,12 @@ def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> b
     """Whether a file is looked at: it can be read, or is a record of another format; what belongs to one is not."""
     if path.suffix.lower() not in readable:
         return is_record(path)
-    cls = reader_of(str(path))
-    if not issubclass(cls, WaveformReader):
-        return not _prose(path)
-    before = cls.endings[: cls.endings.index(path.suffix.lower())]  # of the parts of one record the first is read
-    return not any(path.with_suffix(ending).name.lower() in beside for ending in before)
+    ending = path.suffix.lower()
+    parts = next((cls.parts for cls in discover()[Reader.group].values() if ending in cls.parts), None)
+    if parts is None:
+        return issubclass(reader_of(str(path)), WaveformReader) or not _prose(path)
+    before = parts[: parts.index(ending)]  # of the parts of one record the first is read
+    return not any(path.with_suffix(each).name.lower() in beside for each in before)
 
 
 def _prose(path: Path) -> bool:

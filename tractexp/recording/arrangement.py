@@ -47,6 +47,15 @@ class _LivePhasors:
     V: np.ndarray
     I: np.ndarray
     calm: np.ndarray
+    current_turns: bool  # some current is a wave of the network's frequency, and not noise
+
+
+class _OtherOrder(UserError):
+    """An order of channels that makes no sense, with another one that should."""
+
+    def __init__(self, why: str, remedy: str, voltages: Sequence[int], currents: Sequence[int]) -> None:
+        super().__init__(f"{why}{remedy}")
+        self.why, self.voltages, self.currents = why, tuple(voltages), tuple(currents)
 
 
 def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
@@ -64,8 +73,25 @@ def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
 def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     """The feeder unchanged, or with line voltages taken as such, and a sentence for each observation in `why`.
 
-    Raises `UserError` where the order makes no sense and another one does, which is proposed with its P and Q.
+    Raises `UserError` where the order makes no sense: with another one, its P and Q, where that one is accepted.
     """
+    try:
+        return _arranged(recording, feeder)
+    except _OtherOrder as other:
+        advised = replace(feeder, voltages=other.voltages, currents=other.currents)
+        refused = other
+    try:
+        _arranged(recording, advised)
+    except UserError:
+        raise UserError(
+            f"{refused.why}; no other order of these channels makes sense either: they are not those of one load, or "
+            "one is connected wrongly; 'tractexp look' shows what the file holds"
+        ) from refused
+    raise refused
+
+
+def _arranged(recording: Recording, feeder: Feeder) -> Feeder:
+    """As `arranged`; raises `_OtherOrder` with an order that nobody has tried yet."""
     _residuals(recording, feeder)
     feeder = _lines_by_label(recording, feeder)
     connection = chosen("connection", feeder.connection)
@@ -81,8 +107,10 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
         live = _live_phasors(recording, feeder) or live
     _voltages(recording, feeder, live)
     if connection.currents == 3 == len(live.V):
-        _labels(recording, feeder, live)
-        _currents(recording, feeder, live)
+        if said := _labels(recording, feeder, live):
+            feeder = replace(feeder, why=(*feeder.why, said))
+        if live.current_turns:
+            _currents(recording, feeder, live)
     return _directed(feeder, live)
 
 
@@ -138,8 +166,8 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     """The feeder's phasors while voltage and current are alive; None where they never are."""
     numbers = [*feeder.voltages, *feeder.currents]
     windows = snapshots(recording, numbers, frequency(recording, feeder.voltages))
-    if windows is None:
-        return None
+    if windows is None or not any(windows.pure(i) for i in feeder.voltages):
+        return None  # noise has no order
     connection = chosen("connection", feeder.connection)
     V = connection.voltage() @ windows.of(feeder.voltages)
     I = connection.current() @ windows.of(feeder.currents) * (-1 if feeder.reverse_current else 1)
@@ -160,7 +188,8 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     alive &= load > LOADED * np.median(load[calm])  # not of all: a fault may last longer than the calm
     if not (alive & calm).any():
         return None
-    return _LivePhasors(V[:, alive], I[:, alive], calm[alive])
+    turns = any(windows.pure(i) for i in feeder.currents)
+    return _LivePhasors(V[:, alive], I[:, alive], calm[alive], turns)
 
 
 def _zero(x: np.ndarray) -> np.ndarray:
@@ -209,19 +238,21 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
         return
     if _to_ground(feeder) and (k := _turned(live.V[:, live.calm])) is not None:
         raise UserError(f"{DATA.voltages}={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
-    raise UserError(
+    voltages, currents = _swapped(feeder)
+    raise _OtherOrder(
         f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
-        f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one; give {_swapped(feeder)}"
-    )
+        f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one",
+        f"; give {_said(voltages, currents)}", voltages, currents,
+    )  # fmt: skip
 
 
-def _swapped(feeder: Feeder) -> str:
-    """The proposal of the other order of phases, in ascending numbers where that is possible."""
+def _swapped(feeder: Feeder) -> tuple[list[int], Sequence[int]]:
+    """(voltages, currents) in the other order of phases, in ascending numbers where that is possible."""
     n = len(feeder.voltages)
     turns = [(0, 2, 1), (2, 1, 0), (1, 0, 2)] if n == 3 == len(feeder.currents) else [(*range(n)[::-1],)]
     best = min(turns, key=lambda p: [feeder.voltages[k] for k in p])
     currents = [feeder.currents[k] for k in best] if len(feeder.currents) == n else feeder.currents[::-1]
-    return _said([feeder.voltages[k] for k in best], currents)
+    return [feeder.voltages[k] for k in best], currents
 
 
 def _turned(X: np.ndarray) -> int | None:
@@ -244,24 +275,34 @@ def _called(recording: Recording, number: int) -> str:
     return f"channel {number} '{recording.channels[number].name}'"
 
 
-def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> None:
-    """Refuse currents that are labelled in another order than the voltages."""
+def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> str:
+    """Refuse currents that are labelled in another order than the voltages; what is said where the waves contradict."""
     channels = recording.channels
     volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
     if volts is None or amps is None or volts[1] or amps[1] or volts[0] == amps[0]:
-        return
+        return ""
     (v, _), (c, _) = volts, amps
     if len(v) < 3 or len(c) < 3:
-        return
+        return ""
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
+    said = f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)}, says "
     both = ""
     if live is not None:
-        S, T = _power(live, (0, 1, 2)), _power(live, tuple(feeder.currents.index(i) for i in labelled))
-        both = f", which gives {_mw(T)} where the present order has {_mw(S)}"
-    raise UserError(
-        f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)}, says "
-        f"{recording.source}; give both in the same order: {_said(None, labelled)}{both}"
-    )
+        present, other = (0, 1, 2), tuple(feeder.currents.index(i) for i in labelled)
+        if _is_balanced(live, present) and not _is_balanced(live, other):
+            return f"{said}the file; the waves say that they are in the same order, which is taken"
+        both = f", which gives {_mw(_power(live, other))} where the present order has {_mw(_power(live, present))}"
+    raise _OtherOrder(
+        f"{said}{recording.source}", f"; give both in the same order: {_said(None, labelled)}{both}",
+        feeder.voltages, labelled,
+    )  # fmt: skip
+
+
+def _is_balanced(live: _LivePhasors, permutation: tuple[int, ...]) -> bool:
+    """Whether currents in an order have a positive sequence, and an angle that a load has or power fed back."""
+    first, second = (np.median(np.abs(x)[live.calm]) for x in sequences(live.I[[*permutation]]))
+    angle = abs(_angle(_power(live, permutation)))
+    return bool(second < BALANCED * first) and not SENSIBLE < angle < BACKWARD
 
 
 def _letters(places: Sequence[int]) -> str:
@@ -320,9 +361,10 @@ def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: compl
 
 def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], why: str) -> None:
     proposal = tuple(feeder.currents[k] for k in permutation)
-    raise UserError(
-        f"{DATA.currents}={[*feeder.currents]}: {why}; {_said(None, proposal)} gives {_mw(_power(live, permutation))}"
-    )
+    raise _OtherOrder(
+        f"{DATA.currents}={[*feeder.currents]}: {why}",
+        f"; {_said(None, proposal)} gives {_mw(_power(live, permutation))}", feeder.voltages, proposal,
+    )  # fmt: skip
 
 
 def _answers(live: _LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> int:

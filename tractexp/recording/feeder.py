@@ -12,7 +12,7 @@ from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.kirchhoff import closed_sums
-from tractexp.recording.label import Group, groups, kind, residual, words
+from tractexp.recording.label import Group, groups, kind, other_quantity, residual, words
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.unit import in_doubt
@@ -23,6 +23,7 @@ STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
+ALONE = "no current is recorded: there is no load to fit"
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -78,6 +79,46 @@ def propose(recording: Recording) -> list[Feeder]:
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
     return sorted(marked, key=lambda f: not f.loaded)
+
+
+def buses_alone(recording: Recording) -> list[Feeder]:
+    """The buses of a recording that shows no load, by their voltages; [] where none turns as a network does."""
+    volts = [i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == "voltage"]
+    f, strange = _frequency(recording, volts, [])
+    phasors = snapshots(recording, volts, f)
+    if not volts or phasors is None or strange:
+        return []
+    grouped = [g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)]
+    taken = {i for g in grouped for i in g.numbers}
+    alone = [i for i in volts if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)]
+    feeders = [_bus_alone(recording, phasors, group) for group in grouped]
+    return feeders + [
+        Feeder((i,), (), usual(1, 1), name=recording.channels[i].name.strip(), why=(ALONE,), loaded=False)
+        for i in alone
+    ]
+
+
+def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
+    """A bus without currents, its voltages in the order in which they turn."""
+    numbers, said = group.numbers, [f"voltages {_names(recording, group.numbers)}: {group.evidence}", ALONE]
+    if len(numbers) == 3:
+        first, second = (float(np.nanmedian(np.abs(x))) for x in sequences(phasors.of(numbers)))
+        if second > first:
+            numbers = (numbers[0], numbers[2], numbers[1])
+            said.append("they turn in the order a, c, b")
+    name = group.name or "the voltages"
+    return Feeder(numbers, (), usual(len(numbers), 3, group.pairs), name=name, why=tuple(said), loaded=False)
+
+
+def can_be_named(recording: Recording) -> bool:
+    """Whether settings that name voltages and currents can help: there are waves that may be one and the other."""
+    try:
+        recording.waveforms()
+    except UserError:
+        return False
+    waves = [c for c in recording.channels if c.form == "waveform" and not other_quantity(c)]
+    volts, amps = (sum(c.quantity in (quantity, "") for c in waves) for quantity in ("voltage", "current"))
+    return volts > 0 and amps > 0 and len(waves) > 1
 
 
 def unrecognised(recording: Recording) -> str:

@@ -50,12 +50,16 @@ class Happening:
     why: str  # what makes it (not) worth fitting, one sentence
 
 
-def happenings(waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors) -> list[Happening]:
+def happenings(
+    waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors, with_currents: bool = True
+) -> list[Happening]:
     """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from `start` [s] on.
 
-    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency.
+    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency. Where
+    no currents were recorded (not `with_currents`), those of the waveforms say nothing.
     """
-    return _happenings(of_waves(waves, rate, start, nominal, phasors))
+    trace = of_waves(waves, rate, start, nominal, phasors)
+    return _happenings(trace if with_currents else trace.without_currents())
 
 
 def happenings_of(record: Record) -> list[Happening]:
@@ -333,6 +337,8 @@ def _worth(
     if depth < SHALLOWEST:
         return False, f"{size}: too little to separate a load's answer from its noise"
     noise = len(trace.I) and not np.median(_clean(trace)[:, first : e.start], axis=1).any()
+    if not np.isfinite(trace.P).any():
+        return False, f"{size}, but no current is recorded, and without it no load"
     if not np.isfinite(before[0]) or np.hypot(*before) == 0 or noise:
         return False, f"{size}, but no load current flows before it"
     if np.hypot(*after) < CARRIES * np.hypot(*before):

@@ -71,6 +71,12 @@ def kind(channel: Channel) -> str:
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
 
+def other_quantity(channel: Channel) -> bool:
+    """Whether a channel is surely neither a voltage nor a current."""
+    unit = channel.unit.strip().lower()
+    return channel.quantity not in ("", "voltage", "current") or unit in OTHER_UNITS
+
+
 def phase(channel: Channel) -> str:
     """The phase that a channel's label gives: one or two of a, b, c; "" where it gives none."""
     label = re.sub(r"phase|[-_/ ]", "", plain(channel.phase))

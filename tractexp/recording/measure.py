@@ -30,6 +30,7 @@ class FeederWaves:
     def of(cls, recording: Recording, feeder: Feeder, segment: Segment) -> "FeederWaves":
         connection = chosen("connection", feeder.connection)
         V, I = connection.voltage(), (-1.0 if feeder.reverse_current else 1.0) * connection.current()
+        I = I if feeder.currents else np.zeros((len(V), 0))  # of a bus alone
         sums = np.zeros((len(V) + len(I), V.shape[1] + I.shape[1]))
         sums[: len(V), : V.shape[1]], sums[len(V) :, V.shape[1] :] = V, I
         return cls(recording, feeder, segment, sums)

@@ -14,7 +14,7 @@ from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
 from tractexp.record.phasor import Phasors
 from tractexp.recording.arrangement import arranged
-from tractexp.recording.feeder import Feeder, propose
+from tractexp.recording.feeder import Feeder, buses_alone, propose
 from tractexp.recording.happening import OF_LOADS, Happening, happenings, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.quality import Quality, quality, stamped
@@ -106,6 +106,8 @@ class Sight:
         before = np.flatnonzero((p.t > begin) & (p.t < stop))
         if not len(before):
             before = slice(0, 1)
+        if self.feeder is not None and not self.feeder.currents:
+            return float(np.median(p.U[before])), float("nan"), float("nan")
         return tuple(float(np.median(v[before])) for v in (p.U, np.real(p.S), np.imag(p.S)))  # type: ignore[return-value]
 
 
@@ -192,6 +194,8 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
     """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
     feeders = propose(recording)
+    if not feeders:
+        return [sight(reader, recording, bus) for bus in buses_alone(recording)]
     loaded = any(feeder.loaded for feeder in feeders)
     sights, buses = [], dict[str, _Bus]()
     for feeder in feeders:
@@ -219,7 +223,7 @@ def sight(
     bus = bus or _Bus()
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
-    if any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+    if feeder.currents and any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return blank  # no kV, no MW
     try:
         segments = recording.waveforms()
@@ -234,10 +238,12 @@ def sight(
         phasors.append(measured)
         if events:
             waves = FeederWaves.of(recording, feeder, segment)
-            changes += happenings(waves, segment.rate, segment.start, recording.frequency, measured)
+            timing = (segment.rate, segment.start, recording.frequency)
+            changes += happenings(waves, *timing, measured, with_currents=bool(feeder.currents))
     dips, refused = [], ""
     try:
-        dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency) if changes else []
+        if changes and feeder.currents:
+            dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency)
     except UserError as error:
         refused = str(error)
     numbered = _numbered(changes, dips, reader.path, refused)

@@ -16,7 +16,7 @@ from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.feeder import Feeder, propose, unrecognised
+from tractexp.recording.feeder import Feeder, can_be_named, propose, unrecognised
 from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
@@ -163,9 +163,10 @@ class WaveformReader(Reader):
         if not proposed:
             every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
             noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
+            remedy = f"{DATA.voltages} and {DATA.currents} name one; " if can_be_named(recording) else ""
             raise UserError(
-                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; {DATA.voltages} and "
-                f"{DATA.currents} name one; its channels: {every}"
+                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; {remedy}its channels: "
+                f"{every}"
             )
         loads = "; ".join(
             f"{f.name}: "

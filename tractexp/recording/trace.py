@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,11 @@ class Trace:
     @property
     def step(self) -> float:
         return float((self.t[-1] - self.t[0]) / (len(self.t) - 1))
+
+    def without_currents(self) -> "Trace":
+        """The same where no currents are recorded, nor powers."""
+        none, unknown = self.I[:0], np.full(len(self.t), np.nan)
+        return replace(self, P=unknown, Q=unknown, I=none, second=none, content=none)
 
     def jump(self, i: int) -> float:
         """Degrees by which the voltage's angle leaves, at sample i, the course it had before; nan where unknown."""

@@ -16,6 +16,8 @@ OPEN = 2  # loads whose charts are drawn at once; those of the others when they 
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
+UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+NO_CURRENT = "no current is recorded"
 NO_LOAD = "no load here: what happens to the voltage is listed with the loads of its bus"
 
 
@@ -74,7 +76,7 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
     commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
     if not entry["feeders"]:
-        page.verdict("No three voltages and currents of one load were recognised; the channels are listed below.")
+        page.verdict(f"{as_sentence(unnamed(entry))} The channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
         page.items([as_sentence(said) for said in unfitted.sentences([entry])])
@@ -103,7 +105,8 @@ def size(entry: Mapping[str, Any]) -> str:
     """U, P and Q of a load at the beginning; "" where they are not known."""
     if entry["U"] is None:
         return ""
-    return ", ".join(figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True))
+    sizes = (figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True))
+    return ", ".join(filter(None, sizes))
 
 
 def _channel(c: Mapping[str, Any]) -> list[str]:
@@ -151,7 +154,16 @@ def _described(entry: Mapping[str, Any]) -> list[str]:
 
 def quiet(entry: Mapping[str, Any]) -> str:
     """What is said of a load without events."""
+    if entry["voltages"] and not entry["currents"]:
+        return f"{NO_CURRENT}; {NOTHING}"
     return NOTHING if entry["loaded"] else NO_LOAD
+
+
+def unnamed(entry: Mapping[str, Any]) -> str:
+    """Why a file shows no load, and what would help, if anything does."""
+    if entry.get("lacks") and not entry["can_be_named"]:
+        return f"no load can be fitted: {entry['lacks']}"
+    return UNNAMED
 
 
 def starts(event: Mapping[str, Any], unit: str = "") -> str:

@@ -8,12 +8,11 @@ import numpy as np
 
 from tractexp.blocks import Report, Table
 from tractexp.report import unfitted
-from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size, starts
+from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size, starts, unnamed
 from tractexp.wording import counted, figure, joined
 
 NOTES = 3  # of a file that have room
 LISTED = 4  # events of a bus that its line has room for
-UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
@@ -32,7 +31,7 @@ def summary(content: Entry) -> Report:
         if unloaded and len(unloaded) < len(entry["feeders"]):
             page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
         page.items(list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"])))
-        page.text(*[f"  {UNNAMED}"] * (not buses and len(content["files"]) > 1))
+        page.text(*[f"  {unnamed(entry)}"] * (not buses and len(content["files"]) > 1))
     return page
 
 
@@ -50,7 +49,7 @@ def everything(content: Entry) -> Report:
             page.add(*[events(feeder)] * bool(feeder["events"])).items([quiet(feeder)] * (not feeder["events"]))
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
-        page.text(*([f"  {UNNAMED}"] * (not entry["feeders"])))
+        page.text(*([f"  {unnamed(entry)}"] * (not entry["feeders"])))
     return page
 
 
@@ -66,7 +65,7 @@ def _answer(files: Sequence[Entry]) -> str:
         return f"{_event(first)} of {best['name']} is worth fitting{_reservation(first['why'])}{command}"
     happened = [(feeder, event) for feeder in feeders for event in feeder["events"]]
     if not happened:
-        return f"nothing is worth fitting: {next(map(quiet, feeders), UNNAMED)}"
+        return f"nothing is worth fitting: {next(iter((*map(quiet, feeders), *map(unnamed, files))), '')}"
     feeder, event = max(happened, key=lambda each: _answered(each[1]))
     return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
 
@@ -129,7 +128,9 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
     happened = [_event(event) for event in _common(bus)]
     more = [f"{len(happened) - LISTED} more"] * (len(happened) > LISTED)
-    events = joined([*happened[:LISTED], *more]) or (NOTHING if any(feeder["loaded"] for feeder in bus) else "")
+    events = joined([*happened[:LISTED], *more]) or (
+        NOTHING if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
+    )
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])
     return f"bus {number}: {'; '.join(parts)}"
 

@@ -1,0 +1,70 @@
+"""COMTRADE records of values and not of waveforms: a swing recorder's U, P, Q and f, a PMU's phasors, as a table."""
+
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.filetypes import comtrade
+from tractexp.filetypes.columns import meaning, role, split_unit
+from tractexp.filetypes.table import Rows
+from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel
+
+ENDINGS = (".cfg", ".cff", ".dat")
+
+
+def recognizes(path: Path | str) -> bool:
+    """Whether a file is called as a COMTRADE record is."""
+    return Path(path).suffix.lower() in ENDINGS
+
+
+def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
+    """Whether the samples are waveforms: all but powers, or phasors, sampled more slowly than waveforms are.
+
+    Powers without a current beside them are values however fast they come. A record that cannot be read counts as
+    waveforms, whose reader says what is wrong.
+    """
+    try:
+        header = comtrade.read_header(path, encoding)
+    except UserError:
+        return True
+    parted = [(*split_unit(one.name.strip()), one.unit) for one in header.analogs]
+    units = [unit or inside for _, inside, unit in parted]
+    roles = {one.key for (name, *_), unit in zip(parted, units, strict=True) if (one := role(name, unit))}
+    quantities = [(meaning(unit) or ("",))[0] for unit in units]
+    powers = {"power", "reactive"} <= {*quantities} or {"P", "Q"} <= {key[0] for key in roles}
+    phasors = {"U", "I"} <= {key[0] for key in roles if key.endswith("_angle")}
+    fast = any(rate >= FEWEST_PER_CYCLE * header.frequency for rate, _ in header.rates)
+    if fast or not (powers or phasors):
+        return not (powers and "current" not in quantities)
+    return False
+
+
+def table(path: Path, encoding: str | None = None) -> Rows:
+    """The channels of a record as columns, on the primary side, in their units; the longest stretch of one rate.
+
+    Raises `UserError` as `comtrade.load`.
+    """
+    recording = comtrade.load(path, encoding)
+    segment = max(recording.segments, key=lambda one: one.stop - one.first)
+    part = slice(segment.first, segment.stop)
+    names = [channel.name.strip() for channel in recording.channels]
+    columns = [("t", "s", segment.t)]
+    for name, channel in zip(names, recording.channels, strict=True):
+        columns.append((*_heading(name, channel, names.count(name) > 1), channel.ratio * channel.recorded()[part]))
+    notes = list(recording.notes)
+    if len(recording.segments) > 1:
+        notes.append(
+            f"{len(recording.segments)} stretches of samples: the longest is read, {segment.rate:g} Hz from "
+            f"{segment.start:.3f} s"
+        )
+    rows = Rows.of(path, [(name, unit, np.asarray(v, float)) for name, unit, v in columns], 1, tuple(notes))
+    rows.start, rows.frequency = recording.start, recording.frequency
+    return rows
+
+
+def _heading(name: str, channel: Channel, repeated: bool) -> tuple[str, str]:
+    """(name of a column, with what it is measured on where others have the same name; unit)."""
+    bare, unit = split_unit(name)
+    where = " ".join(filter(None, (channel.circuit.strip(), channel.phase.strip())))
+    return (f"{where} {bare}".strip() if repeated else bare or name), channel.unit.strip() or unit
