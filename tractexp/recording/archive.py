@@ -5,6 +5,7 @@ import os
 import re
 from collections.abc import Collection, Iterator
 from pathlib import Path
+from typing import Any
 
 from tractexp.errors import DATA, UserError, nearest
 from tractexp.files import read
@@ -48,7 +49,8 @@ def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> b
     if path.suffix.lower() not in readable:
         return is_record(path)
     ending = path.suffix.lower()
-    parts = next((cls.parts for cls in discover()[Reader.group].values() if ending in cls.parts), None)
+    every: list[Any] = list(discover()[Reader.group].values())
+    parts = next((cls.parts for cls in every if ending in cls.parts), None)
     if parts is None:
         return issubclass(reader_of(str(path)), WaveformReader) or not _prose(path)
     before = parts[: parts.index(ending)]  # of the parts of one record the first is read
