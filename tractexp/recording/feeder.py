@@ -116,7 +116,10 @@ def can_be_named(recording: Recording) -> bool:
         recording.waveforms()
     except UserError:
         return False
-    waves = [c for c in recording.channels if c.form == "waveform" and not other_quantity(c)]
+    numbers = [i for i, c in enumerate(recording.channels) if c.form == "waveform" and not other_quantity(c)]
+    f = frequency(recording, numbers)
+    phasors = snapshots(recording, numbers, f) if f and nearest_nominal(f) else None
+    waves = [recording.channels[i] for i in numbers if phasors is not None and phasors.pure(i)]
     volts, amps = (sum(c.quantity in (quantity, "") for c in waves) for quantity in ("voltage", "current"))
     return volts > 0 and amps > 0 and len(waves) > 1
 
