@@ -84,16 +84,11 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
     is missing.
     """
     try:
-        there(path)
-        with open(path, "rb", opener=_opened) as file:
-            state = os.fstat(file.fileno())
-            if stat.S_IFMT(state.st_mode) in ODD:  # put in the place of a file meanwhile
-                raise UserError(f"{path} is {ODD[stat.S_IFMT(state.st_mode)]}, no ordinary file")
-            if limit is None and state.st_size > largest:
-                raise UserError(
-                    f"{path} has {state.st_size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB:"
-                    " give a part"
-                )
+        with opened(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            if limit is None and size > largest:
+                size_and_most = f"{size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB"
+                raise UserError(f"{path} has {size_and_most}: give a part")
             return file.read(-1 if limit is None else limit)
     except FileNotFoundError:
         raise
@@ -101,7 +96,18 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
         raise UserError(f"{path} cannot be read: {error.strerror or error}") from error
 
 
-def _opened(path: str, flags: int) -> int:
+@contextlib.contextmanager
+def opened(path: Path | str) -> Iterator[IO[bytes]]:
+    """An ordinary file, open to be read. Raises `UserError` for what only seems to be one, `OSError` as `open`."""
+    there(path)
+    with open(path, "rb", opener=_open_at_once) as file:
+        kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
+        if kind in ODD:  # put in the place of a file meanwhile
+            raise UserError(f"{path} is {ODD[kind]}, no ordinary file")
+        yield file
+
+
+def _open_at_once(path: str, flags: int) -> int:
     """Open without waiting for the other end of a named pipe."""
     return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))
 
@@ -117,11 +123,18 @@ def read_text(path: Path | str, largest: int = LARGEST) -> str:
 def read_json(path: Path | str, largest: int = RESULT) -> Any:
     """What a JSON file holds. Raises `UserError` for what is none, and as `read`."""
     try:
-        return json.loads(read(path, largest=largest).decode("utf-8-sig"))
-    except json.JSONDecodeError as error:
-        raise UserError(f"{path}: line {error.lineno}: not valid JSON ({error.msg})") from error
+        text = read(path, largest=largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
+    return parse_json(text, path)
+
+
+def parse_json(text: str, path: Path | str) -> Any:
+    """What a text in JSON says, that came from `path`. Raises `UserError` for what is none."""
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise UserError(f"{path}: line {error.lineno}: not valid JSON ({error.msg})") from error
     except RecursionError as error:
         raise UserError(f"{path}: its brackets lie deeper within one another than can be read") from error
     except ValueError as error:  # what Python's reader of whole numbers refuses

@@ -126,8 +126,8 @@ def damaged(folder: Path) -> list[Path]:
 def _sound(path: Path) -> bytes | None:
     """The content of a file as it was written; None where there is none, or another."""
     try:
-        data = path.read_bytes()
-    except OSError:
+        data = files.read(path)
+    except (OSError, UserError):
         return None
     content = data[SUM:]
     return content if hmac.compare_digest(data[:SUM], _sum(path, content)) else None

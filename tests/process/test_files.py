@@ -213,3 +213,61 @@ def dip() -> str:
     motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
     made = tractexp.simulate(values=motor, depth=0.4, rate=200, length=2).responses[0]
     return made.to_frame().to_csv(index=False)
+
+
+# What is read
+
+
+READERS = {  # calls that read a file, or make something of a text that a file held
+    "read_text", "read_bytes", "open", "loadtxt", "genfromtxt", "fromfile", "memmap", "fdopen",
+}  # fmt: skip
+PARSERS = {"yaml": {"load", "safe_load", "load_all", "full_load", "unsafe_load"}, "json": {"load", "loads"},
+           "np": {"load"}, "pickle": {"load", "loads"}, "OmegaConf": {"load"}}  # fmt: skip
+READ = {  # {module: {call: why it may}}; all else that is read goes through `tractexp/files.py`
+    "tractexp/choices.py": {"read_text": "installed files", "yaml.safe_load": "installed files", "read_bytes": "code"},
+    "tractexp/cli/look.py": {"yaml.safe_load": "a setting as it was typed"},
+    "tractexp/cli/new/__init__.py": {"read_text": "an installed file"},
+    "tractexp/composition.py": {"read_text": "installed files", "yaml.safe_load": "installed files"},
+    "tractexp/blocks/plotly.py": {"read_text": "an installed file", "read_bytes": "installed files"},
+    "tractexp/texts.py": {"read_bytes": "code"},
+    "tractexp/provenance.py": {"read_bytes": "code"},
+    "tractexp/model_file.py": {"yaml.load": "a text that `files` has read"},
+    "tractexp/model/model.py": {"json.loads": "the store, whose entries are its own"},
+    "tractexp/kernel/kernel.py": {"json.loads": "the store"},
+    "tractexp/store.py": {"np.load": "the store; nothing is unpickled"},
+    "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
+    "tractexp/studies/paper/search_store.py": {"json.loads": "the store"},
+    "tractexp/studies/comparison/load.py": {"loadtxt": "a text that `files` has read", "json.loads": "a parameter"},
+    "tractexp/filetypes/comtrade.py": {"memmap": "numbers of a file that `files` has found to be ordinary"},
+    "tractexp/filetypes/comtrade_samples.py": {"memmap": "the same", "fromfile": "the same"},
+    "tractexp/filetypes/table_text.py": {"loadtxt": "a text that `files` has read"},
+    "tractexp/filetypes/workbook.py": {"pickle.load": "the process that it started"},
+    "tractexp/tracking/owner.py": {"read_text": "the system's own files"},
+    "tractexp/tracking/process.py": {"pickle.load": "the process that started it", "pickle.loads": "that it started"},
+    "plugins/formats/_andes_run.py": {"json.load": "the process that started it"},
+    "plugins/formats/andes.py": {"json.loads": "its own text", "read_text": "its own code", "np.load": "its own file"},
+}  # fmt: skip
+
+
+def read_by(path: Path) -> set[str]:
+    """The calls of a module that read."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.Call):
+            continue
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
+        if name in PARSERS.get(owner, ()):
+            found.add(f"{owner}.{name}")
+        elif (
+            name in READERS and owner not in ("files", "webbrowser", "process", "self") and not owner.startswith("self")
+        ):
+            found.add(name)
+    return found
+
+
+def test_one_door_reads_what_others_may_have_written():
+    """`tractexp/files.py`: it waits for no pipe, ends at a size, and counts what aliases come to."""
+    sources = {p for place in ("tractexp", "plugins") for p in (ROOT / place).rglob("*.py")} - {DOOR}
+    found = {str(path.relative_to(ROOT)): calls for path in sources if (calls := read_by(path))}
+    assert found == {name: set(calls) for name, calls in READ.items()}

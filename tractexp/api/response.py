@@ -54,7 +54,7 @@ class Response:
 
     def _repr_html_(self) -> str:
         with tempfile.TemporaryDirectory() as folder:
-            drawn = self.draw(Path(folder) / "response.svg").read_text(encoding="utf-8")
+            drawn = files.read_text(self.draw(Path(folder) / "response.svg"))
         return drawn[drawn.index("<svg") :]
 
     def to_frame(self) -> Any:

@@ -216,7 +216,7 @@ class Report:
         """An SVG file. Raises `UserError` where it is not there or not SVG."""
         path = Path(path)
         try:
-            drawing = path.read_text(encoding="utf-8")
+            drawing = files.read_text(path)
         except OSError as error:
             raise UserError(f"the figure {path} cannot be read: {error.strerror}") from error
         if "<svg" not in drawing:

@@ -162,7 +162,7 @@ def store(uri: str) -> Iterator[Finding]:
 
 def _ours(database: Path) -> bool:
     """Whether a damaged file was a store of MLflow's, as far as what is left of it says; an empty one is nobody's."""
-    content = database.read_bytes()
+    content = files.read(database)
     return not content.strip(b"\0") or b"alembic_version" in content or b"mlflow." in content
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_fields import number, quoted
 from tractexp.filetypes.comtrade_header import VALUE, Header
@@ -37,7 +38,7 @@ class ByteRange:
         return self.stop - self.first
 
     def content(self, length: int | None = None) -> bytes:
-        with self.path.open("rb") as file:
+        with files.opened(self.path) as file:
             file.seek(self.first)
             return file.read(self.size if length is None else min(length, self.size))
 
@@ -155,7 +156,7 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
 def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
     """Cells (M, width) of one block of lines after the other; nan where a cell is empty."""
     line, carried, remaining = place.line, b"", place.size
-    with place.path.open("rb") as file:
+    with files.opened(place.path) as file:
         file.seek(place.first)
         while remaining > 0:
             block = file.read(min(BLOCK, remaining))

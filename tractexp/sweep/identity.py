@@ -7,7 +7,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from tractexp import provenance
+from tractexp import files, provenance
 from tractexp.composition import texts
 from tractexp.errors import UserError
 from tractexp.files import located
@@ -36,7 +36,7 @@ def _file(name: str) -> str:
         path = located(name)
         if not path.is_file():
             return ""
-        files = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))
-        return "".join(_digest(file.read_bytes()) for file in files if file.is_file())
+        beside = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))
+        return "".join(_digest(files.read(file)) for file in beside if file.is_file())
     except (OSError, ValueError, UserError):  # the job will say what is wrong with it
         return ""

@@ -1,10 +1,11 @@
 """The state of a job of a sweep: `status.json` in its folder."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
+from tractexp import files
 from tractexp.errors import UserError, among
 from tractexp.files import write_json
 
@@ -12,6 +13,10 @@ FILE = "status.json"
 SEARCHED = "search_objective"  # the metric by which optimizers are compared
 ESTIMATED = "objective"
 RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
+KINDS: Mapping[str, Any] = {  # of the entries, which somebody else may have written
+    "status": str, "message": str, "configuration": str, "inputs": str, "seconds": (int, float), "choices": dict,
+    "seed": int, "metrics": dict,
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,9 +44,11 @@ class Status:
 def read(folder: Path) -> Status | None:
     """The status of the job in `folder`; None where there is none that can be read."""
     try:
-        return Status(**json.loads((folder / FILE).read_text(encoding="utf-8")))
-    except (OSError, ValueError, TypeError):
+        state = Status(**files.read_json(folder / FILE, files.CONFIGURATION))
+    except (OSError, TypeError, UserError):
         return None
+    fits = all(isinstance(getattr(state, name), kinds) for name, kinds in KINDS.items())
+    return state if fits else None
 
 
 def objective(folder: Path, name: str = SEARCHED) -> float | None:

@@ -4,11 +4,11 @@ import contextlib
 import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import TASK, UserError, among
 from tractexp.tracking.owner import search
 from tractexp.tracking.store import open_store, sentences
@@ -85,8 +85,8 @@ def _files(client: Any, run_id: str) -> dict[str, str]:
     texts = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in FILES:
-            with contextlib.suppress(MlflowException, OSError, ValueError):
-                texts[name] = Path(client.download_artifacts(run_id, name, folder)).read_text(encoding="utf-8")
+            with contextlib.suppress(MlflowException, OSError, ValueError, UserError):
+                texts[name] = files.read_text(client.download_artifacts(run_id, name, folder), files.RESULT)
     return texts
 
 

@@ -1,8 +1,10 @@
 """`sweep.json`, by which the jobs of a sweep, and later tasks, find its parent run."""
 
-import json
 from pathlib import Path
 from typing import Any
+
+from tractexp import files
+from tractexp.errors import UserError
 
 FILE = "sweep.json"
 MULTIRUN = "multirun.yaml"  # the configuration that every sweeper leaves in a sweep's folder
@@ -26,7 +28,8 @@ def waits(folder: Path) -> bool:
 
 def _content(folder: Path) -> dict[str, Any]:
     try:
-        content = json.loads((folder / FILE).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        content = files.read_json(folder / FILE, files.CONFIGURATION)
+    except (OSError, UserError):
         return {}
-    return content if isinstance(content, dict) else {}
+    run = content.get("run") if isinstance(content, dict) else 0
+    return content if run is None or isinstance(run, str) else {}

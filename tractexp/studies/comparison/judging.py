@@ -1,7 +1,6 @@
 """Runs judged: those of one problem, those of several, and the same variants on BBOB."""
 
 import contextlib
-import json
 from collections.abc import Mapping, Sequence
 from inspect import unwrap
 from pathlib import Path
@@ -83,8 +82,8 @@ def _on_bbob(comparison: Comparison, instances: int, folder: Path | None, cores:
 
 def _stored(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
     """The runs on BBOB that were made before with the same code and settings."""
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
-        content = json.loads((folder / BBOB).read_text(encoding="utf-8"))
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError, UserError):
+        content = files.read_json(folder / BBOB)
         if content["of"] == files.plain(settings):
             return BenchmarkResult.from_dict(content["made"])
     return None

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from tractexp import files
 from tractexp.composition import leaves
 from tractexp.errors import TASK, UserError
 from tractexp.identification.result import by_event
@@ -17,6 +18,7 @@ from tractexp.studies.comparison.runs import SearchRun
 FITTING = "identify"  # the task whose runs are compared
 FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
 UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")  # what MLflow says of a run that neither finished nor failed
+MEND = "run this job again, or remove its folder"
 ENDED = ("objective", "epsilon_p", "epsilon_q")
 
 
@@ -51,6 +53,11 @@ def _jobs(folder: Path) -> list[Path]:
 
 
 def _job(folder: Path) -> SearchRun | None:
+    with _readable(folder):
+        return _read_job(folder)
+
+
+def _read_job(folder: Path) -> SearchRun | None:
     config = _yaml(folder / ".hydra" / "config.yaml")
     if config["task"]["name"] != FITTING:
         return None
@@ -67,12 +74,12 @@ def _job(folder: Path) -> SearchRun | None:
     if unfinished:
         return SearchRun(**fields, **unfinished)
     with _readable(folder / "result.json") as path:
-        result = json.loads(path.read_text(encoding="utf-8"))
+        result = files.read_json(path)
         ended = ended_search(result)
         fields |= {key: float(ended[key]) for key in ENDED} | {"parameters": parameters_of(ended)}
         fields["code"] = code_of(result)
     with _readable(folder / "history.csv") as path:
-        return SearchRun(**fields, **_history(path.read_text(encoding="utf-8")))
+        return SearchRun(**fields, **_history(files.read_text(path, files.RESULT)))
 
 
 def _history(text: str) -> dict[str, Any]:
@@ -105,9 +112,11 @@ def _readable(path: Path) -> Iterator[Path]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # NumPy's about a file without a row, which raises next
             yield path
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, UserError) as error:
+        if MEND in str(error):  # of a file within
+            raise
         reason = str(error).strip().partition("\n")[0] or type(error).__name__
-        raise UserError(f"{path} cannot be read: {reason}; run this job again, or remove its folder") from error
+        raise UserError(f"{path} cannot be read: {reason}; {MEND}") from error
 
 
 def _status(folder: Path) -> Mapping[str, Any]:
@@ -115,7 +124,7 @@ def _status(folder: Path) -> Mapping[str, Any]:
     if not (folder / "status.json").is_file():
         return {}
     with _readable(folder / "status.json") as path:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = files.read_json(path, files.CONFIGURATION)
         return {"message": "", **content, "status": str(content["status"])}
 
 
@@ -131,13 +140,8 @@ def _unfinished(folder: Path, status: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _yaml(path: Path) -> Any:
-    import yaml
-
     with _readable(path):
-        try:
-            return yaml.load(path.read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader))
-        except yaml.YAMLError as error:
-            raise ValueError(str(error)) from error
+        return files.read_yaml(path)
 
 
 def flat(node: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,7 +188,7 @@ def _logged(one: Any) -> SearchRun:
         return SearchRun(**fields, failure=f"its status in MLflow is {one.status}")
     for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
-    result = json.loads(one.files.get("result.json", "{}"))
+    result = files.parse_json(one.files.get("result.json", "{}"), f"the result.json of {one.name}")
     details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
     total, seconds = ended.pop("simulations"), ended.pop("seconds")
     if "history.csv" in one.files:

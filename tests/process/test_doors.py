@@ -1,0 +1,231 @@
+"""Every file that somebody else may have written, in every shape that none should have, at the door that reads it.
+
+It is read, left out, or refused in one sentence: no other exception, no wait, no memory beyond what is there.
+"""
+
+import contextlib
+import json
+import os
+import resource
+import shutil
+import signal
+import socket
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+
+import tractexp
+import tractexp.data
+from tractexp.cli.again import again
+from tractexp.errors import UserError
+
+if os.name == "nt":
+    pytest.skip("named pipes, sockets and links are made", allow_module_level=True)
+
+DATA = Path(tractexp.data.__file__).parent
+SECONDS = 30  # of one reading, on a machine that is busy with others
+MEMORY = 6 << 30  # bytes of addresses of this process while it reads: a sparse file of 3 GB is not read whole
+LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"a{k + 1}: &a{k + 1} [{', '.join(10 * [f'*a{k}'])}]\n" for k in range(9)
+)
+
+
+# Shapes of a file
+
+
+def socketed(path: Path) -> None:
+    with contextlib.chdir(path.parent), socket.socket(socket.AF_UNIX) as end:
+        end.bind(path.name)
+
+
+def sparse(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(3 << 30)
+
+
+def halved(path: Path) -> None:
+    content = path.read_bytes()
+    path.write_bytes(content[: len(content) // 2])
+
+
+def cycled(path: Path) -> None:
+    path.unlink()
+    path.symlink_to(path.name)
+
+
+SHAPES: dict[str, Callable[[Path], object]] = {
+    "pipe": lambda path: (path.unlink(), os.mkfifo(path)),
+    "link to nowhere": lambda path: (path.unlink(), path.symlink_to("absent")),
+    "link to a device": lambda path: (path.unlink(), path.symlink_to("/dev/zero")),
+    "link to a pipe": lambda path: (path.unlink(), os.mkfifo(f"{path}.pipe"), path.symlink_to(f"{path}.pipe")),
+    "cycle": cycled,
+    "socket": lambda path: (path.unlink(), socketed(path)),
+    "folder": lambda path: (path.unlink(), path.mkdir()),
+    "giant": lambda path: (path.unlink(), sparse(path)),
+    "empty": lambda path: path.write_bytes(b""),
+    "cut": halved,
+    "aliases": lambda path: path.write_text(LAUGHS),
+    "brackets": lambda path: path.write_text("[" * 200_000),
+    "a number": lambda path: path.write_text("5"),
+    "a list": lambda path: path.write_text("[1, [2], {}]"),
+    "keys of others": lambda path: path.write_text('{"a": {"b": null}, "task": [], "hydra": 5, "run": {}}'),
+    "zeros": lambda path: path.write_bytes(bytes(5000)),
+    "no text": lambda path: path.write_bytes(bytes(range(128, 256)) * 50),
+}
+
+
+# Folders as they should be, and the doors that read them
+
+
+def run_of(folder: Path) -> Path:
+    """The folder of a run and of a sweep's job, with all that is read of either."""
+    (folder / ".hydra").mkdir(parents=True)
+    runtime = {"cwd": str(folder), "config_sources": [], "choices": {"optimizer": "pso", "data": "tibet"}}
+    contents = {
+        "hydra.yaml": {"hydra": {"runtime": runtime}}, "overrides.yaml": ["seed=1"],
+        "config.yaml": {"task": {"name": "identify"}, "seed": 1, "optimizer": {"name": "pso"}},
+    }  # fmt: skip
+    for name, content in contents.items():
+        (folder / ".hydra" / name).write_text(yaml.safe_dump(content))
+    ended = {"objective": 1.0, "epsilon_p": 1.0, "epsilon_q": 1.0, "parameters": {"C": 0.9}}
+    (folder / "result.json").write_text(json.dumps(ended))
+    (folder / "history.csv").write_text("iteration,simulations,seconds,objective\n0,20,0.1,2\n1,40,0.2,1\n")
+    status = {"status": "finished", "message": "", "configuration": "a", "inputs": "b", "seconds": 1.0,
+              "choices": {"optimizer": "pso"}, "seed": 1}  # fmt: skip
+    (folder / "status.json").write_text(json.dumps(status))
+    (folder / "sweep.json").write_text(json.dumps({"run": "x"}))
+    return folder
+
+
+def compared(folder: Path) -> object:
+    from tractexp.studies.comparison.load import from_sweep
+
+    return from_sweep(folder.parent)
+
+
+def its_state(folder: Path) -> object:
+    from tractexp.sweep import status
+    from tractexp.tracking import sweepfile
+
+    sweepfile.waits(folder)
+    return status.read(folder), status.objective(folder), sweepfile.parent_of(folder)
+
+
+def kept(folder: Path) -> Path:
+    """A run that waits to be logged."""
+    from tractexp.tracking import TrackedRun
+    from tractexp.tracking.runfile import save
+
+    save(run_of(folder), TrackedRun("e", "one", artifacts=[folder / "result.json"]), "sqlite:///absent.db")
+    return folder
+
+
+def waiting(folder: Path) -> object:
+    from tractexp.tracking import runfile
+    from tractexp.tracking.sync import _within, waiting
+
+    waiting(folder)
+    one = runfile.read(folder)
+    return one and _within(one.run, folder, lambda line: None)
+
+
+def records(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    for name in ("tibet_30pct.csv", "tibet_50pct.cfg", "tibet_50pct.dat"):
+        shutil.copy(DATA / name, folder / name)
+    (folder / "tibet_30pct.json").write_text("{}")
+    return folder
+
+
+def model_of(folder: Path) -> Path:
+    folder.mkdir(parents=True)
+    (folder / "m.yaml").write_text("defaults: [{motor: electromechanical}, {static: exponential}, _self_]\n")
+    return folder
+
+
+def modeled(folder: Path) -> object:
+    from tractexp.composition import read_choice
+
+    return read_choice("model", str(folder / "m.yaml"))
+
+
+def loaded(folder: Path) -> object:
+    from tractexp.identification.result import load
+
+    return load(folder / "result.json")
+
+
+def read_table(folder: Path) -> object:
+    return tractexp.read(str(folder / "tibet_30pct.csv"))
+
+
+def looked(folder: Path) -> object:
+    return tractexp.look(str(folder / "tibet_50pct.cfg"), progress=False)
+
+
+DOORS = [  # the file, the folder that holds it as it should be, and what reads it
+    (".hydra/hydra.yaml", run_of, lambda folder: again([str(folder)])),
+    (".hydra/overrides.yaml", run_of, lambda folder: again([str(folder)])),
+    (".hydra/config.yaml", run_of, compared),
+    (".hydra/hydra.yaml", run_of, compared),
+    ("result.json", run_of, compared),
+    ("history.csv", run_of, compared),
+    ("status.json", run_of, compared),
+    ("status.json", run_of, its_state),
+    ("sweep.json", run_of, its_state),
+    ("result.json", run_of, loaded),
+    ("mlflow.json", kept, waiting),
+    ("result.json", kept, waiting),
+    ("m.yaml", model_of, modeled),
+    ("tibet_30pct.csv", records, read_table),
+    ("tibet_30pct.json", records, read_table),
+    ("tibet_50pct.cfg", records, looked),
+    ("tibet_50pct.dat", records, looked),
+]
+
+
+@contextlib.contextmanager
+def limited() -> Iterator[None]:
+    """Raise `TimeoutError` for what waits, and `MemoryError` for what takes more than there should be."""
+
+    def late(*_):
+        raise TimeoutError(f"it takes more than {SECONDS} s")
+
+    before, most = signal.signal(signal.SIGALRM, late), resource.getrlimit(resource.RLIMIT_AS)
+    signal.alarm(SECONDS)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, most[1]))
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        resource.setrlimit(resource.RLIMIT_AS, most)
+        signal.signal(signal.SIGALRM, before)
+
+
+def outcome(read: Callable[[Path], object], folder: Path) -> str:
+    """What is wrong with how a door takes a file; "" for nothing."""
+    here = Path.cwd()
+    try:
+        with limited():
+            read(folder)
+    except UserError as error:
+        return "" if str(error).strip() else "it is refused without a word"
+    except BaseException as error:
+        return f"{type(error).__name__}: {error!s:.200}"
+    finally:
+        os.chdir(here)
+    return ""
+
+
+@pytest.mark.parametrize(("name", "made", "read"), DOORS, ids=[f"{name} {read.__name__}" for name, _, read in DOORS])
+def test_every_shape_of_a_file_is_read_left_or_refused(name, made, read, tmp_path):
+    assert outcome(read, made(tmp_path / "as it should be" / "0")) == ""
+    found = {}
+    for k, (shape, give) in enumerate(SHAPES.items()):
+        folder = made(tmp_path / str(k) / "0")
+        give(folder / name)
+        found[shape] = outcome(read, folder)
+        shutil.rmtree(tmp_path / str(k))
+    assert {shape: why for shape, why in found.items() if why} == {}
