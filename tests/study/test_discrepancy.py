@@ -28,7 +28,7 @@ from tractexp.discrepancy.held_out import assess, carried, judged_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
-from tractexp.inference import kernels, local_minima, observed, surprises
+from tractexp.inference import goodness_of_fit, kernels, local_minima, observed
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import scales
@@ -37,6 +37,7 @@ from tractexp.inference.descent import normal
 from tractexp.inference.effort import Effort
 from tractexp.inference.fit_effort import TOGETHER
 from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.goodness_of_fit import Scale, tail
 from tractexp.inference.injection import PUSHES
 from tractexp.inference.linearization import tangent
 from tractexp.inference.noise_in_quiet import QuietNoise
@@ -44,7 +45,6 @@ from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.inference.score_test import ScoreTest, signed_drop
 from tractexp.inference.separable import SeparableColumns
-from tractexp.inference.surprises import Scale, tail
 from tractexp.model.model import compose
 from tractexp.noise import Autoregression, white_noise
 from tractexp.noise import Noise as PowerNoise
@@ -508,7 +508,7 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
-    monkeypatch.setattr(surprises, "statistics", lambda channels, problem: {})
+    monkeypatch.setattr(goodness_of_fit, "statistics", lambda channels, problem: {})
     projection = SimpleNamespace(
         variance_component=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
         split=np.ones((1, 3)),

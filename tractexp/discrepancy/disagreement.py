@@ -12,6 +12,7 @@ from tractexp.inference.chance import Chance, chance_at, is_noise_exact, scales
 from tractexp.inference.context import Context
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
 from tractexp.inference.fitting import Refit, refit
+from tractexp.inference.goodness_of_fit import GoodnessOfFit
 from tractexp.inference.linearization import Linearization, rich_residuals, tangent
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import Score, ScoreTest
@@ -61,14 +62,19 @@ class Disagreement:
         return self.context.criteria
 
     @functools.cached_property
+    def goodness_of_fit(self) -> GoodnessOfFit:
+        """How often chance leaves as much as this fit does."""
+        return GoodnessOfFit(self.chance.surprises(self.projection, self.context))
+
+    @property
     def left(self) -> dict[str, float]:
-        """How often chance leaves as much as this fit does, by each test."""
-        return self.chance.surprises(self.projection, self.context)
+        """How often chance leaves as much, by each test."""
+        return self.goodness_of_fit.p_by_test
 
     @property
     def p_left(self) -> float:
-        """The same by the most surprised test, corrected for their number."""
-        return min(1.0, len(self.left) * min(self.left.values()))
+        """How often it does by the most significant test, corrected for their number."""
+        return self.goodness_of_fit.p
 
     @property
     def adequate(self) -> bool:
@@ -84,7 +90,7 @@ class Disagreement:
     @property
     def loudest(self) -> str:
         """What stands out most of that which this fit leaves."""
-        return min(self.left, key=self.left.__getitem__)
+        return self.goodness_of_fit.most_significant_test
 
     @property
     def resting(self) -> list[str]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.surprises import LOUDEST, ResidualWindow, energies, extremes, residual_windows
+from tractexp.inference.goodness_of_fit import LOUDEST, ResidualWindow, energies, extremes, residual_windows
 
 
 @dataclass(frozen=True)

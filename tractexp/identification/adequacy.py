@@ -15,15 +15,15 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.inference import surprises
+from tractexp.inference import goodness_of_fit
 from tractexp.inference.descent import MOST_NUMBERS
+from tractexp.inference.goodness_of_fit import PER_EVENT, GoodnessOfFit, compare_with_draws
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import off_walls
 from tractexp.inference.separable import Sensitivities, SeparableBasis
-from tractexp.inference.surprises import PER_EVENT, SMALLEST_P, tail
 
 DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
@@ -96,7 +96,7 @@ def surprise(
     basis, split = J.basis(), of_each_event(J, steady)
 
     def left(rest: np.ndarray) -> dict[str, np.ndarray]:
-        by_test = surprises.statistics(rest.reshape(len(rest), observed.drive.channels, -1), observed.problem)
+        by_test = goodness_of_fit.statistics(rest.reshape(len(rest), observed.drive.channels, -1), observed.problem)
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
     excess = squares and Excess.of(squares, unit, J, least)
@@ -107,17 +107,17 @@ def surprise(
         white = likelihood.whiten(some)
         parts.append(left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {}))
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    p_values = {name: tail(values[1:], values[:1]) for name, values in by_test.items()}
-    loudest = min(p_values, key=p_values.__getitem__)
+    values, draws = ({name: rows[part] for name, rows in by_test.items()} for part in (slice(1), slice(1, None)))
+    fit = GoodnessOfFit(compare_with_draws(values, draws))
     ratio, where = loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
-    return Surprise(min(1.0, max(len(p_values) * p_values[loudest], SMALLEST_P)), loudest, ratio, where)
+    return Surprise(fit.p, fit.most_significant_test, ratio, where)
 
 
 def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
     """What `steady` shared coordinates (k,) of their own for each event could change beside the event's own."""
     shared = J.without_own.T
     columns = np.concatenate([shared[~steady], shared[steady]])
-    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(surprises.DISTINCT, 1e-9)
+    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(goodness_of_fit.DISTINCT, 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,7 @@ def _linear(likelihood: Likelihood) -> np.ndarray:
 
 def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
     """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
-    windows = surprises.residual_windows(problem)
+    windows = goodness_of_fit.residual_windows(problem)
     row = problem.drive.spoken.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
     k = int(np.argmax(level))

@@ -10,13 +10,13 @@ from dataclasses import dataclass, field, fields
 import numpy as np
 
 from tractexp import store
-from tractexp.inference import surprises
+from tractexp.inference import goodness_of_fit
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
+from tractexp.inference.goodness_of_fit import SMALLEST_P, Scale, compare_with_draws
 from tractexp.inference.linearization import Linearization, rich_residuals
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.score_test import ScoreTest
-from tractexp.inference.surprises import SMALLEST_P, Scale, tail
 from tractexp.noise import Noise
 from tractexp.wording import in_words
 
@@ -43,8 +43,7 @@ class Chance:
 
     def surprises(self, projection: ScoreTest, context: Context) -> dict[str, float]:
         """How often chance leaves as much as a fit does, by each test of adequacy."""
-        by_test = projection.statistics(context.problem)
-        return {name: tail(self.left[name], value, self.scales.get(name)) for name, value in by_test.items()}
+        return compare_with_draws(projection.statistics(context.problem), self.left, self.scales)
 
 
 def chance_at(
@@ -80,7 +79,7 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.of(_white(t, noise, np.random.default_rng((seed, k))))
-        by_test = surprises.statistics(drawn.channels(t.context.problem), t.context.problem)
+        by_test = goodness_of_fit.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
     parts = each_apart(part, range(1, MORE + 1), t.context.effort)

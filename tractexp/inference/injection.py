@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tractexp.inference.surprises import windows
+from tractexp.inference.goodness_of_fit import windows
 from tractexp.model.parts import Effect
 from tractexp.parameter import Parameter
 

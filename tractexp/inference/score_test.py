@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.inference import surprises
+from tractexp.inference import goodness_of_fit
 from tractexp.inference.catalogue import Candidate
+from tractexp.inference.goodness_of_fit import DISTINCT, PER_EVENT, SMALLEST_P
 from tractexp.inference.problem import Problem
-from tractexp.inference.surprises import DISTINCT, PER_EVENT, SMALLEST_P
 from tractexp.noise.span import spanned
 
 
@@ -130,7 +130,7 @@ class ScoreTest:
         by_test = {
             "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
-            **surprises.statistics(self.channels(problem), problem),
+            **goodness_of_fit.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
             by_test[PER_EVENT] = ((self.r @ spanned(self.split, DISTINCT, 1e-12).T) ** 2).sum(axis=1)

@@ -1,4 +1,4 @@
-"""What a fit leaves: statistics of the whitened, projected residual, and how surprising they are.
+"""Goodness of fit: statistics of the whitened, projected residual, and how often chance leaves as much.
 
 Each looks for another kind of thing that a model does not account for. Sums of many parts (b,) have a gamma
 tail, the largest of many (b, k) that of a Gumbel distribution, both with the moments of draws under the null, so that
@@ -7,6 +7,7 @@ extreme value distribution.
 """
 
 import itertools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -24,6 +25,31 @@ PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after
 BURSTS = (0.1, 0.3)  # s, lengths of the stretches after the dips in which an oscillation may come and go
 FEWEST = 8  # samples of a stretch with an oscillation
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
+
+
+@dataclass(frozen=True)
+class GoodnessOfFit:
+    """How often chance leaves as much as a fit does, by what each test looks for."""
+
+    p_by_test: dict[str, float]
+
+    @property
+    def most_significant_test(self) -> str:
+        """What stands out most of that which the fit leaves."""
+        return min(self.p_by_test, key=self.p_by_test.__getitem__)
+
+    @property
+    def p(self) -> float:
+        """By the most significant test, corrected for the number of tests."""
+        return min(1.0, len(self.p_by_test) * self.p_by_test[self.most_significant_test])
+
+
+def compare_with_draws(
+    values: Mapping[str, np.ndarray], draws: Mapping[str, np.ndarray], scales: Mapping[str, "Scale"] | None = None
+) -> dict[str, float]:
+    """Return how often each statistic, (1,) or (1, k), is as large among its draws, (b,) or (b, k)."""
+    scales = scales or {}
+    return {name: tail(draws[name], value, scales.get(name)) for name, value in values.items()}
 
 
 def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
