@@ -8,7 +8,7 @@ import pytest
 import tractexp
 from tractexp.identification.estimate import held_to_usual
 from tractexp.inference.blocks import blocks_of
-from tractexp.inference.descent import descend
+from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.prior import departures, held_in_words
 from tractexp.inference.problem import Problem

@@ -7,8 +7,8 @@ from written_out import dense
 
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.inference.blocks import LENGTH, blocks_of
-from tractexp.inference.descent import descend
 from tractexp.inference.interval import interval_factor
+from tractexp.inference.least_squares import descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import scatter

@@ -19,8 +19,9 @@ from tractexp.identification.agreement import compare_events
 from tractexp.identification.profile import checked
 from tractexp.identification.uncertainty import conclude
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
-from tractexp.inference.descent import central_differences, descend, normal
+from tractexp.inference.differences import central_differences
 from tractexp.inference.information import Information
+from tractexp.inference.least_squares import descend, normal
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.inference.residual_tests import jarque_bera, ljung_box

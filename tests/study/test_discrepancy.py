@@ -28,17 +28,17 @@ from tractexp.discrepancy.held_out import assess, carried, judged_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
-from tractexp.inference import goodness_of_fit, kernels, local_minima, observed
+from tractexp.inference import goodness_of_fit, kernels, multistart, observed
 from tractexp.inference.base_fit import base_fit
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import scales
 from tractexp.inference.context import Context
-from tractexp.inference.descent import normal
 from tractexp.inference.effort import Effort
 from tractexp.inference.fit_effort import TOGETHER
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.goodness_of_fit import Scale, tail
 from tractexp.inference.injection import PUSHES
+from tractexp.inference.least_squares import normal
 from tractexp.inference.linearization import tangent
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.problem import Problem
@@ -107,7 +107,7 @@ def test_the_base_model_is_fitted_in_the_better_of_two_valleys(monkeypatch):
     """Where the reactive static load may stand for a part of the motor's, the box alone led to the worse side."""
     made = events("feeder_impedance", size=0.6377, seed=287367529, count=4, noise=LOUD, recorder=FAST)[:3]
     best = base_fit(bench(base(), made, ())).fit.deviance
-    monkeypatch.setattr(local_minima, "along_least_certain", lambda likelihood, unit: unit[None])
+    monkeypatch.setattr(multistart, "along_least_certain", lambda likelihood, unit: unit[None])
     assert base_fit(bench(base(), made, ())).fit.deviance > best + 100
 
 

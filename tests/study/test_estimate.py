@@ -13,10 +13,10 @@ from tractexp.blocks import Table
 from tractexp.identification import adequacy
 from tractexp.identification.adequacy import Grade, Surprise, graded
 from tractexp.identification.estimate import estimate, polished
-from tractexp.inference.descent import Descent
+from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.local_minima import distinct
 from tractexp.inference.model_error import ModelError
+from tractexp.inference.multistart import distinct
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.noise import Noise
@@ -257,7 +257,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     whole = polished(problem).uncertainty
 
     def one_bad_start(likelihood, points):
-        from tractexp.inference.descent import descend
+        from tractexp.inference.least_squares import descend
 
         bad = likelihood.to_unit(TRUTH * np.array([1, 0.4, 0.45, 1, 1, 1, 0.5]))
         return descend(likelihood.rows, bad, np.ones_like(bad, dtype=bool))

@@ -17,8 +17,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tractexp.inference.descent import central_differences, descend
+from tractexp.inference.differences import central_differences
 from tractexp.inference.information import Information
+from tractexp.inference.least_squares import descend
 from tractexp.parameter import Box
 
 FILES = Path(__file__).parents[1] / "oracle" / "nist"

@@ -14,7 +14,7 @@ from tractexp.identification.profile import checked, profiles, revised
 from tractexp.identification.profile_lanes import End, LikelihoodProfile, Region
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
-from tractexp.inference.descent import descend
+from tractexp.inference.least_squares import descend
 from tractexp.inference.problem import Problem
 from tractexp.report import posterior
 from tractexp.report.profile import meaning, report

@@ -10,8 +10,8 @@ from hypothesis.extra.numpy import arrays
 
 from tractexp import progress
 from tractexp.errors import UserError
-from tractexp.identification.least_squares import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
+from tractexp.identification.polish import APART, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.search import Limits, search
 from tractexp.parameter import best_distinct
 from tractexp.plugin import build

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from written_out import dense, dense_normal
 
-from tractexp.inference.descent import central_differences, forward_differences, normal
+from tractexp.inference.differences import central_differences, forward_differences
+from tractexp.inference.least_squares import normal
 from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, Sensitivities, SeparableColumns
 
 RNG = np.random.default_rng(7)

@@ -29,7 +29,7 @@ from tractexp.inference.fitting import (
     rough_refit,
     wide_refits,
 )  # fmt: skip
-from tractexp.inference.local_minima import DISTINCT
+from tractexp.inference.multistart import DISTINCT
 from tractexp.inference.score_test import Score
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even

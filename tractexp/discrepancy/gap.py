@@ -7,8 +7,8 @@ import numpy as np
 
 from tractexp.domain.playback import relative_error
 from tractexp.inference.context import Context
+from tractexp.inference.differences import two_sided
 from tractexp.inference.injection import PUSHES, perturbations
-from tractexp.inference.linear import two_sided
 from tractexp.inference.linearization import resting
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from tractexp.inference import goodness_of_fit
-from tractexp.inference.descent import MOST_NUMBERS
 from tractexp.inference.goodness_of_fit import PER_EVENT, GoodnessOfFit, compare_with_draws
+from tractexp.inference.least_squares import MOST_NUMBERS
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError
 from tractexp.inference.observed import Observed

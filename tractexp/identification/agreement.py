@@ -9,8 +9,9 @@ import numpy as np
 
 from tractexp import files
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.inference.descent import MOST_NUMBERS, Rows, descend
+from tractexp.inference.differences import Rows
 from tractexp.inference.information import Information
+from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
 

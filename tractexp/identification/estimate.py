@@ -22,9 +22,9 @@ from tractexp.errors import MODEL, TASK, UserError
 from tractexp.identification.adequacy import Surprise, surprise
 from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, conclude, threshold
 from tractexp.inference.blocks import blocks_of, exceeds
-from tractexp.inference.descent import Descent
+from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.local_minima import along_least_certain, distinct, explored, screened
+from tractexp.inference.multistart import along_least_certain, distinct, explored, screened
 from tractexp.inference.observed import Observed
 from tractexp.inference.prior import held_in_words
 from tractexp.inference.problem import Problem

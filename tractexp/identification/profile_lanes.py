@@ -11,7 +11,7 @@ from enum import StrEnum
 import numpy as np
 
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.inference.descent import Descent
+from tractexp.inference.least_squares import Descent
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back

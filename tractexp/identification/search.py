@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 
 from tractexp.errors import Stopped, UserError
-from tractexp.identification.least_squares import Elite, polish
 from tractexp.identification.optimizer import REFUSED, Box, Optimizer
+from tractexp.identification.polish import Elite, polish
 
 UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
 POLISH_STEPS = 450  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,

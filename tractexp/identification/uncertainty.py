@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.identification.verdict import ParameterVerdict, judge
-from tractexp.inference.descent import CENTRAL
+from tractexp.inference.differences import CENTRAL
 from tractexp.inference.information import Information
 from tractexp.inference.interval import LEVEL, interval_factor
 from tractexp.inference.likelihood import Likelihood

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.local_minima import valleys
+from tractexp.inference.multistart import valleys
 from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.noise import Noise
 

@@ -10,6 +10,7 @@ import numpy as np
 from tractexp import store
 from tractexp.domain import Domain, domain_of
 from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.differences import finite, slopes, two_sided
 from tractexp.inference.effort import Effort
 from tractexp.inference.free_set import FreeSet
 from tractexp.inference.kernels import Family, Kernels, Key
@@ -23,11 +24,6 @@ from tractexp.record import Event
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
-
-
-def finite(changes: np.ndarray) -> np.ndarray:
-    """Changes of a residual; none where a simulation diverges: that tells nothing of what little would do."""
-    return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +159,24 @@ class Context:
         at = self.coordinates
         prior = [(unit[:, k] - at.null[k]) / at.prior_deviation[k] for k in faults]
         return np.concatenate([white, *(p[:, None] for p in prior)], axis=1)
+
+    def linearize(
+        self, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return the residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they and their differences.
+
+        The rows are whitened: C N of the records, then those of the priors of the faults of the measurement.
+        """
+        at, k = self.coordinates, len(columns)
+        points, width = two_sided(unit, columns)
+        raw = self.residuals(np.concatenate([unit[None], points]), names)
+        white = self.whiten(noise, np.concatenate([raw[:1], slopes(raw[1:], width)]))
+        held = [(i, c) for i, c in enumerate(columns) if c in at.prior_deviation]
+        prior = np.zeros((1 + k, len(held)))
+        for row, (i, c) in enumerate(held):
+            prior[1 + i, row] = 1 / at.prior_deviation[c]
+            prior[0, row] = (unit[c] - at.null[c]) / at.prior_deviation[c]
+        return raw[0], np.concatenate([white, prior], axis=1)
 
     @property
     def apart(self) -> SeparableColumns:

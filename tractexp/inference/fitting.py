@@ -10,7 +10,7 @@ from tractexp import store
 from tractexp.inference import fit_effort
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.descent import descend
+from tractexp.inference.least_squares import descend
 from tractexp.inference.promising import promising
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct

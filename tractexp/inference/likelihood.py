@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.domain import domain_of
-from tractexp.inference.descent import Descent, central_differences, descend
+from tractexp.inference.differences import central_differences
 from tractexp.inference.free_set import FreeSet
+from tractexp.inference.least_squares import Descent, descend
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities, SeparableColumns

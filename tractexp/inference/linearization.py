@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.context import Context
+from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fit_effort import BOUND_MARGIN
 from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES, perturbations
-from tractexp.inference.linear import slopes, two_sided
 from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned

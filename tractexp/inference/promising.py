@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from tractexp.inference.context import Context
-from tractexp.inference.linear import finite, linearised
+from tractexp.inference.differences import finite
 from tractexp.noise import Noise
 
 LEAST = 1e-9  # of the deviance: a change below that is none
@@ -42,7 +42,7 @@ def _expected(
     nuisances: Sequence[int],
 ) -> np.ndarray:
     """The deviance (n,) of a linear step from each start, which differ from `ground` (D,) by their effects alone."""
-    raw, rows = linearised(context, ground, noise, nuisances, ())
+    raw, rows = context.linearize(ground, noise, nuisances, ())
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)
     white = context.whiten(noise, finite(context.residuals(units, names) - raw))

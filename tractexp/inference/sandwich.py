@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.inference.blocks import blocks_of
-from tractexp.inference.descent import central_differences
+from tractexp.inference.differences import central_differences
 from tractexp.inference.information import STRUCTURAL, Information
 from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood

@@ -13,8 +13,8 @@ import numpy as np
 
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven
 from tractexp.inference.context import Context
+from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
-from tractexp.inference.linear import slopes, two_sided
 from tractexp.model.drive import Drive
 
 FOLLOWS = 1e-6  # pu: how near one comes to the other

@@ -14,8 +14,8 @@ import numpy as np
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_of
 from tractexp.inference.context import Context
+from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
-from tractexp.inference.linear import linearised, slopes, two_sided
 from tractexp.inference.linearization import resting
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
@@ -86,7 +86,7 @@ def sided(context: Context, noise: Noise, fit: Refit) -> Side:
     faults = at.sizes(context.catalogue.of_measurement)
     own = [k for k in at.parameters(fit.names) if k not in faults]
     columns = [*at.base, *faults, *own, *at.before]
-    _, rows = linearised(context, fit.unit, noise, columns, fit.names)
+    _, rows = context.linearize(fit.unit, noise, columns, fit.names)
     shared = context.drive.measured.size + len(faults)
     free = ~resting(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]

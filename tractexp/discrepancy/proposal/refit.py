@@ -17,7 +17,6 @@ from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
 from tractexp.inference.information import free_standard_errors
-from tractexp.inference.linear import linearised
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
@@ -199,6 +198,6 @@ def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
     context, chosen = result.context, result.term(fit)
     at = context.coordinates
     own = at.parameters(fit.names)
-    _, rows = linearised(context, fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
+    _, rows = context.linearize(fit.unit, result.noise, [*at.nuisances(()), *own], fit.names)
     spread = free_standard_errors(rows[1:].T)[-len(own) :] * [at.width(at.names[k]) for k in own]
     return dict(zip(values_of(at, fit.unit, chosen), spread.tolist(), strict=True))

@@ -15,7 +15,6 @@ from tractexp.discrepancy.proposal.bed import Setting, place, sizes_of
 from tractexp.discrepancy.proposal.library import Term
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.linear import linearised
 from tractexp.noise import Noise
 
 STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
@@ -41,7 +40,7 @@ class Ground:
     @classmethod
     def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
         """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
-        raw, rows = linearised(context, unit, noise, context.coordinates.nuisances(()), ())
+        raw, rows = context.linearize(unit, noise, context.coordinates.nuisances(()), ())
         Q = np.linalg.qr(rows[1:].T)[0]
         ground = cls(context, unit, noise, raw, Q, rows[0])
         return replace(ground, r=ground.off(rows[:1])[0])

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.identification.search import REFUSED
-from tractexp.inference.descent import MOST_NUMBERS, descend
+from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
 from tractexp.studies.comparison.runs import SearchRun

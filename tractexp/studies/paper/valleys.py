@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.identification.search import REFUSED
-from tractexp.inference.descent import descend
+from tractexp.inference.least_squares import descend
 from tractexp.inference.problem import Problem
 
 SAME = 1.02  # descents that end within so many times of each other are in one valley

@@ -4,18 +4,13 @@ Profiles, starts and subsets of events are lanes. A call with the differences of
 dampings of all steps replace hundreds of single simulations, which cost as much to call as to run.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.inference.differences import Rows, central_differences, forward_differences
 from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, SeparableColumns
 
-# (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot be simulated
-Rows = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-DIFFERENCE = 1e-6  # of a parameter's range
-CENTRAL = 1e-5  # of it, where both sides are taken: truncation and rounding both stay below 1e-7 of a column
 DAMPINGS = np.array([1e-3, 1e-1, 1e1, 1e3])  # tried together, relative to the lane's own
 LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e9
 LARGEST_STEP = 0.3  # of a parameter's range
@@ -39,62 +34,6 @@ class Descent:
         """These ends and further ones."""
         unit, deviance = np.concatenate([self.unit, more.unit]), np.concatenate([self.deviance, more.deviance])
         return Descent(unit, deviance, self.simulations + more.simulations)
-
-
-def forward_differences(
-    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
-) -> np.ndarray:
-    """Derivatives (n, k + m, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
-
-    First those to each coordinate that acts on all rows, then those to the m of each row's own event. One that cannot
-    be simulated is zero.
-    """
-    n, d = unit.shape
-    shared, steps = apart.shared(d), apart.moves(d)
-    h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
-    moved = unit[:, None, :] + steps * h[:, None, :]
-    J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
-    J -= base[:, None, :]
-    J[:, : len(shared)] /= h[:, shared, None]
-    for mine, coordinates in zip(apart.rows, apart.coordinates, strict=True):
-        J[:, len(shared) :, mine] /= h[:, coordinates, None]
-    if (lost := ~np.isfinite(J.sum(axis=2))).any():
-        J[lost] = np.where(np.isfinite(J[lost]), J[lost], 0.0)
-    return J
-
-
-def central_differences(
-    rows: Rows, unit: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
-) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (n, R) at `unit` (n, D) and derivatives (n, k + m, R) from both sides, in the order of the forward ones.
-
-    One batch of n (2 (k + m) + 1). Next to a wall, or where one side cannot be simulated, the difference is one-sided.
-    """
-    n, d = unit.shape
-    up = np.minimum(unit + CENTRAL, 1.0) - unit
-    down = unit - np.maximum(unit - CENTRAL, 0.0)
-    shared, moves = apart.shared(d), apart.moves(d)
-    steps = np.concatenate([np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1)
-    batch = rows((unit[:, None] + steps).reshape(-1, d), np.repeat(lanes, steps.shape[1])).reshape(*steps.shape[:2], -1)
-    base, above, below = batch[:, 0], batch[:, 1 : len(moves) + 1], batch[:, len(moves) + 1 :]
-    J, k = np.zeros_like(above), len(shared)
-    J[:, :k] = _from_both_sides(base, above[:, :k], below[:, :k], up[:, shared], down[:, shared])
-    for mine, own in zip(apart.rows, apart.coordinates, strict=True):
-        J[:, k:, mine] = _from_both_sides(
-            base[:, mine], above[:, k:, mine], below[:, k:, mine], up[:, own], down[:, own]
-        )
-    return base, J
-
-
-def _from_both_sides(
-    base: np.ndarray, above: np.ndarray, below: np.ndarray, up: np.ndarray, down: np.ndarray
-) -> np.ndarray:
-    """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k) from there."""
-    lost_up, lost_down = np.isnan(above).any(axis=2), np.isnan(below).any(axis=2)
-    for side, lost in (above, lost_up), (below, lost_down):
-        side[lost] = base[np.nonzero(lost)[0]]
-    span = np.where(lost_up, 0.0, up) + np.where(lost_down, 0.0, down)
-    return (above - below) / np.where(span > 0, span, 1.0)[..., None]
 
 
 def normal(
@@ -158,7 +97,7 @@ def descend(
     Forward differences are enough for an estimate, whose standard errors are far wider than what they truncate. The
     minimum itself, to more than four digits, takes `central` ones.
 
-    Not `least_squares.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
+    Not `polish.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
     """
     unit = np.clip(start, 0.0, 1.0)
     n = len(unit)

@@ -75,8 +75,8 @@ def least_squares_from(
     the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. Returns
     the point (d,) it ended at and its objective; a start that cannot be simulated is left at once.
 
-    Not `descent.descend`: here each simulation is counted and the search loop may stop it anywhere, and the method is a
-    library's; there hundreds of lanes share each simulation call.
+    Not `inference.least_squares.descend`: here each simulation is counted and the search loop may stop it anywhere, and
+    the method is a library's; there hundreds of lanes share each simulation call.
     """
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 

@@ -1,11 +1,11 @@
-"""The valleys of a model: its best fits from all over its box, because a few random starts may all miss the best.
+"""Many starts all over the box, and the local minima they end in: a few random ones may all miss the best.
 
 What a model seems to miss in a wrong valley is not missing, and what is estimated there is not the estimate.
 """
 
 import numpy as np
 
-from tractexp.inference.descent import Descent
+from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
