@@ -4,7 +4,6 @@ Of waveforms it is white but for what noise of the voltage causes (`tractexp.noi
 short a record, and has the offsets that the channels may have kept.
 """
 
-import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -12,9 +11,8 @@ import numpy as np
 
 from tractexp.inference.context import Context
 from tractexp.inference.jumps import jumps
-from tractexp.inference.observed import Observed
+from tractexp.inference.observed import Observed, estimate_noise
 from tractexp.noise import Noise
-from tractexp.noise.random_walk import walk_of_load
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +48,13 @@ class QuietNoise:
         Of waveforms the model there tells how noise of the voltage is passed on.
         """
         context, problem = self.context, self.context.problem
-        walk = functools.partial(
-            walk_of_load, context.events, context.drive, problem.power, left, columns, context.valid,
-            seen=context.criteria.wandering,
-        )  # fmt: skip
         errors = [shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None]
         shapes = np.concatenate(errors) if errors else None
         there = context.kernels.at(context.coordinates.present(unit), unit)
-        return context.domain.noise(residual, context.valid, problem.quiet, *there, walk, shapes)
+        return estimate_noise(
+            problem, residual, context.valid, problem.quiet, there, shapes, left, columns,
+            seen=context.criteria.wandering,
+        )  # fmt: skip
 
 
 def white(context: Context) -> Noise:

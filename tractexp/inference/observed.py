@@ -59,13 +59,11 @@ class Observed:
         rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(residuals.shape)  # the fit took the others
         columns = J.columns.reshape(-1, *residuals.shape)
         where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, valid)
-        walk = functools.partial(
-            walk_of_load, self.events, self.drive, self.problem.power, residuals, columns, valid, seen=SEEN
-        )
         try:
-            return self.problem.domain.noise(
-                residuals / np.sqrt(rest), valid, where, self.problem, values, walk, input_errors
-            )
+            return estimate_noise(
+                self.problem, residuals / np.sqrt(rest), valid, where, (self.problem, values), input_errors,
+                residuals, columns, seen=SEEN,
+            )  # fmt: skip
         except UserError:
             return None
 
@@ -107,3 +105,21 @@ class Observed:
         own = np.tile(problem.by_event(values), (count, 1, 1))
         response = problem.model.simulate(drive, own, np.tile(problem.step.substeps, count))
         return response.outputs[:, 0].reshape(drive.channels, count, -1).swapaxes(0, 1)
+
+
+def estimate_noise(
+    records: Problem, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice],
+    model: tuple[Problem, np.ndarray], input_errors: np.ndarray | None,
+    left: np.ndarray | None, columns: np.ndarray | None, *, seen: float,
+) -> Noise:  # fmt: skip
+    """Return the noise of a residual (C, N) in the quiet stretches of the records.
+
+    `model` with its free values (d,) tells how noise of the voltage is passed on, `input_errors` (k, C, N) what errors
+    of the record do. What the fit leaves, `left` (C, N), and the columns of all that could explain it (k, C, N) tell
+    more of how the load wanders; it does where twice the log-likelihood gains `seen`. Raises `UserError` where too few
+    samples are quiet.
+    """
+    walk = functools.partial(
+        walk_of_load, records.events, records.drive, records.power, left, columns, valid, seen=seen
+    )
+    return records.domain.noise(residual, valid, quiet, *model, walk, input_errors)
