@@ -70,7 +70,7 @@ def test_leaving_out_a_block_is_what_a_refit_without_it_gives():
         rest = before[(before < block.start) | (before >= block.stop)]
         other = Problem(case.model, [event], substeps=int(case.step.substeps[0]))
         other.drive.before[0] = other.drive.measured[:, rest].mean(axis=1)
-        part = Likelihood(other, squares.noise, known, initial_power=False)
+        part = Likelihood(problem=other, noise=squares.noise, valid=known, initial_power=False)
         moved.append(descend(part.rows, unit[None], tolerance=1e-9).unit[0] - unit)
     errors = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum(np.square(moved), axis=0)) * (case.upper - case.lower)
     ratio = scattered.information.standard_errors / errors
@@ -156,7 +156,7 @@ def test_a_parameter_on_a_bound_that_changes_nothing_is_not_known_and_ruins_noth
     frozen = np.zeros((1, 7), dtype=bool)
     frozen[0, -1] = True
     unit = descend(squares.rows, unit[None], frozen).unit[0]
-    silent = Silent(case, squares.noise, squares.valid, initial_power=False)
+    silent = Silent(problem=case, noise=squares.noise, valid=squares.valid, initial_power=False)
     errors = scatter(silent, unit).information.standard_errors
     assert np.isinf(errors[-1])
     assert np.isfinite(errors[:-1]).all()
@@ -167,7 +167,7 @@ class Silent(Likelihood):
 
     @property
     def with_initial_power(self):
-        return Silent(self.problem, self.noise, self.valid, initial_power=True)
+        return Silent(problem=self.problem, noise=self.noise, valid=self.valid, initial_power=True)
 
     def jacobian(self, unit):
         rows, J = super().jacobian(unit)

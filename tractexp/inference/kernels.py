@@ -14,14 +14,13 @@ import numpy as np
 
 from tractexp.domain import domain_of
 from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.fit_problem import FitProblem
 from tractexp.inference.injection import PUSHES, Injection
-from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.problem import Problem
 from tractexp.model.declaration import Refused
 from tractexp.model.drive import Drive
 from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect
-from tractexp.noise import Noise
 from tractexp.record import Event
 
 # Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and often no machine;
@@ -103,7 +102,7 @@ class Kernels:
         self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)  # of all coordinates
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
-        self._likelihoods: dict[Key, tuple[Likelihood, np.ndarray]] = {}
+        self._fit_problems: dict[Key, tuple[FitProblem, np.ndarray]] = {}
 
     def too_coarse(self, values: np.ndarray) -> bool:
         """Whether fits of the base model's free values (n, d) lie where the steps are longer than in the whole box."""
@@ -123,28 +122,27 @@ class Kernels:
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, C, N) [pu] at coordinates (n, D)."""
-        likelihood, columns = self._of(key)
-        return likelihood.residuals(unit[:, columns])
+        fit_problem, columns = self._of(key)
+        return fit_problem.residuals(unit[:, columns])
 
     def at(self, names: Iterable[str], unit: np.ndarray) -> tuple[Problem, np.ndarray]:
         """The problem of a set of names, and its free values (..., d) at coordinates (..., D)."""
-        likelihood, columns = self._of(self.family.key(names))
-        return likelihood.problem, likelihood.values(unit[..., columns])
+        fit_problem, columns = self._of(self.family.key(names))
+        return fit_problem.problem, fit_problem.values(unit[..., columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
         """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
         problem, free = self.at(names, unit)
         return problem.model.simulate(drive, problem.full(free), self.substeps).by_candidate
 
-    def _of(self, key: Key) -> tuple[Likelihood, np.ndarray]:
-        """The likelihood by one kernel, and where its coordinates stand among all."""
-        if key not in self._likelihoods:
+    def _of(self, key: Key) -> tuple[FitProblem, np.ndarray]:
+        """The fit problem of one kernel, and where its coordinates stand among all."""
+        if key not in self._fit_problems:
             problem = self._problem(key, self.substeps)
-            unweighted = Noise.white(*np.ones(problem.drive.channels))  # residuals alone are asked for
             own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
             columns = np.r_[own, len(self._column) + before].astype(int)
-            self._likelihoods[key] = Likelihood.of(problem, unweighted), columns
-        return self._likelihoods[key]
+            self._fit_problems[key] = FitProblem(problem=problem, valid=problem.drive.weights > 0), columns
+        return self._fit_problems[key]
 
     def _problem(self, key: Key, substeps: int) -> Problem:
         model = self.family.of(key)
