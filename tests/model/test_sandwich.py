@@ -173,3 +173,23 @@ class Silent(Likelihood):
         rows, J = super().jacobian(unit)
         J.columns[self.free - 1] = 0.0
         return rows, J
+
+
+def test_the_power_before_is_free_around_what_was_measured_and_stands_there_at_first():
+    case = problem()
+    free = Likelihood.of(case).free_set
+    (P, Q), reach = case.drive.before[0], 0.2 * np.linalg.norm(case.drive.before[0])
+    assert free.names[-2:] == ("P0[1]", "Q0[1]")
+    assert free.box.lower[free.before] == pytest.approx([P - reach, Q - reach])
+    assert free.box.upper[free.before] == pytest.approx([P + reach, Q + reach])
+    moved = np.full(free.dimension, 0.25)
+    stood = free.at_measured_power(moved)
+    assert stood[: free.parameter_count].tolist() == [0.25] * 7
+    assert free.box.from_unit(stood)[free.before] == pytest.approx([P, Q])
+
+
+def test_where_the_power_before_is_held_only_the_parameters_are_free():
+    case = problem()
+    free = Likelihood.of_squares(case, NOISE).free_set
+    assert free.names == case.space.names
+    assert not len(free.before)
