@@ -141,7 +141,7 @@ def test_a_difference_is_one_sided_where_the_other_side_is_lost():
             return made
 
     at = np.array([0.3, 0.5, 0.5, 1.0])
-    rows, J = central_differences(Straight(None, None, None).rows, at[None], np.zeros(1, dtype=int))
+    rows, J = central_differences(Straight(problem=None, valid=None, noise=None).rows, at[None], np.zeros(1, dtype=int))
     np.testing.assert_allclose(rows[0], A @ at)
     np.testing.assert_allclose(J[0].T, A, rtol=1e-6, atol=1e-9)
 
