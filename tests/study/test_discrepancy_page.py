@@ -15,7 +15,6 @@ from tractexp.discrepancy import verdict
 from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.recommended import adequacy
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, overlay
@@ -163,10 +162,10 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):
     for found, whose in ((named, "The extended model is graded "), (unexplained, "The base model is graded ")):
         words, _ = page(found, tmp_path)
-        grade = adequacy(found)
+        grade = found.final_grade.adequacy
         told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}."
         assert words.index(told) < words.index("Next: ")
-    assert adequacy(named).grade == "adequate" != adequacy(unexplained).grade
+    assert named.final_grade.adequacy.grade == "adequate" != unexplained.final_grade.adequacy.grade
 
 
 def test_what_is_not_extended_is_not_called_so(silent, unexplained, tmp_path):

@@ -18,7 +18,6 @@ from tractexp.discrepancy.least_squares import least_squares_tests, residual_noi
 from tractexp.discrepancy.precision import standard_errors
 from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions
 from tractexp.discrepancy.proposal.library import term
-from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.verdict import verdict
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
@@ -334,7 +333,7 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
     assert inexact.train.before.chi2_per_sample > 100
     assert inexact.train.after.chi2_per_sample > 5
     assert inexact.tests.noise.levels == pytest.approx([2e-4, 2e-4], rel=0.5)
-    assert "times as loud as the noise" in adequacy(inexact).sentence
+    assert "times as loud as the noise" in inexact.final_grade.adequacy.sentence
     assert inexact.tests.p_left < 1e-6
     alone = tractexp.identify(dips()[:2], progress=False)
     assert inexact.train.before.error.value == pytest.approx(alone.model_error.value, rel=0.03)

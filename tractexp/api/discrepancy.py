@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp import files, quoting
-from tractexp.api.arguments import public
+from tractexp.api.arguments import Choice, public
 from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
 from tractexp.api.read import dips_together
@@ -23,8 +23,8 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
-from tractexp.identification.result import Result, conclude
-from tractexp.identification.search import History, SearchResult
+from tractexp.identification.result import Result, conclude, refuse_failed
+from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
@@ -55,7 +55,7 @@ class Misfit:
     model_error: Mapping[str, Any]
     epsilon_p: float
     epsilon_q: float
-    chi2_per_sample: float
+    chi2_per_sample: float | None
     epsilon_i: float | None = None
 
 
@@ -317,11 +317,19 @@ def _steps(question: Question, progress: Progress) -> "Steps":
         if base.shown:
             tell(shown_in_words(base.shown))
         if base.priors:
-            tell(f"{MODEL.priors} holds no fit of an investigation, which judges by the records alone")
+            tell(f"{MODEL.priors} holds the models that are graded, and no fit by which effects are ranked")
         return findings_of(
             base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
-            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}), seed=q.seed, tell=tell,
+            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}), priors=base.priors,
+            shown=tuple(base.shown), search=functools.partial(_search_end, q.seed), seed=q.seed, tell=tell,
         )  # fmt: skip
+
+
+def _search_end(seed: int, problem: Problem) -> np.ndarray:
+    """The free values (d,) at which the search of an identification ends that is asked for nothing unusual."""
+    end = search(problem, Choice.of("optimizer", None).build("optimizer"), seed)
+    refuse_failed(problem, end)
+    return end.values
 
 
 def _concluded(question: Question, steps: "Steps") -> Investigation:
@@ -331,20 +339,18 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 
 
 def _estimated(question: Question, steps: "Steps") -> Result:
-    """The extended model's parameters as a result, which predicts and is logged as a model."""
+    """The graded model's parameters as a result, which predicts and is logged as a model."""
     from tractexp.discrepancy.discrepancy_json import recorder_window
-    from tractexp.discrepancy.recommended import adequacy
 
-    base, bench, unit = question.model, steps.context, steps.extended.unit
+    base, graded, effort = question.model, steps.final_grade, steps.context.effort
     model = base.with_(effects=sorted({*base.effects, *steps.names}), window=recorder_window(steps))
-    problem = Problem(model.model, question.train, base.bounds, base.fixed, int(bench.problem.step.substeps.max()))
-    values = np.array([bench.coordinates.value(name, unit) for name in problem.space.names])
+    values, problem = graded.values, graded.problem
     objective = float(problem.objective(values[None])[0])
-    history = History(np.array([bench.effort.simulations]), np.array([objective]), values[None], np.zeros(1))
+    history = History(np.array([effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"
-    search = SearchResult(values, objective, bench.effort.simulations, 0, 0, 0.0, status, history)
-    result, _ = conclude(problem, search, question.validate, question.seed, model.node, "descent")
-    return replace(result, adequacy=adequacy(steps).to_dict(), shown_effects=dict(base.shown))
+    end = SearchResult(values, objective, effort.simulations, 0, 0, 0.0, status, history)
+    result = conclude(problem, end, values, graded.fits, question.seed, model.node, "descent")
+    return replace(result, adequacy=graded.adequacy.to_dict(), shown_effects=dict(base.shown))
 
 
 @plugin

@@ -127,19 +127,20 @@ def _searched(
 ) -> "Iterable[tuple[Result, list[Fit]]]":
     """The estimate, then where each search ended, with the fits of the held-out events."""
     from tractexp.identification.estimate import estimate
-    from tractexp.identification.result import conclude
+    from tractexp.identification.result import conclude, play, refuse_failed
 
     problem, node, fitted = setup.problem, setup.model.node, len(setup.train)
     for optimizer in optimizers:
         for seed in range(setup.seed, setup.seed + seeds):
             tell(progress, [f"{optimizer.name}, seed {seed}"])
             end = setup.search(optimizer, seed, progress)
+            refuse_failed(problem, end)
+            ends = {optimizer.name: end.values}
             if (optimizer, seed) == (optimizers[0], setup.seed):
-                likely = estimate(problem, end.values).uncertainty.values
-                result, fits = conclude(problem, end, setup.validate, seed, node, ESTIMATE, likely)
-                yield result, fits[fitted:]
-            result, fits = conclude(problem, end, setup.validate, seed, node, optimizer.name)
-            yield result, fits[fitted:]
+                ends = {ESTIMATE: estimate(problem, end.values).uncertainty.values, **ends}
+            for name, values in ends.items():
+                fits = play(problem, values, setup.validate)
+                yield conclude(problem, end, values, fits, seed, node, name), fits[fitted:]
 
 
 def _generalised(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:

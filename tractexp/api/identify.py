@@ -17,8 +17,8 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import set_holding
 from tractexp.errors import Stopped, UserError
-from tractexp.identification.adequacy import Adequacy, graded
-from tractexp.identification.result import Result, active_bounds, by_event, conclude, errors_of, refuse_failed
+from tractexp.identification.adequacy import Adequacy
+from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.inference.model_error import ModelError
 from tractexp.inference.prior import departures
@@ -57,8 +57,9 @@ class FitSpec(Setup):
         """Where a search was when it was stopped, as an identification that nothing is judged of."""
         if end is None or not end.objective < REFUSED:
             return None
-        node, name = self.model.node, self.optimizer.name
-        return Identification(conclude(self.problem, end, self.validate, self.seed, node, name)[0], self, end)
+        fits = play(self.problem, end.values, self.validate)
+        result = conclude(self.problem, end, end.values, fits, self.seed, self.model.node, self.optimizer.name)
+        return Identification(result, self, end)
 
 
 @dataclass(frozen=True)
@@ -394,29 +395,30 @@ def _concluded(setup: FitSpec, end: SearchResult, progress: Progress = False) ->
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
-    from tractexp.identification.estimate import estimate
+    from tractexp.identification.grade import grade_estimate, grade_model
     from tractexp.identification.profile import checked
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.yardstick import yardstick
 
     problem = setup.problem
     refuse_failed(problem, end)
-    estimated = estimate(problem, end.values)
-    uncertainty = estimated.uncertainty
+    shown = setup.model.shown
+    graded = grade_model(problem, setup.validate, end.values, shown)
+    uncertainty = graded.uncertainty
     if setup.check_intervals:
         profiled = checked(uncertainty, counter("points at most on the profiles", progress))
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
-    result, fits = conclude(
-        problem, end, setup.validate, setup.seed, setup.model.node, setup.optimizer.name, uncertainty.values
-    )
-    result = replace(result, shown_effects=dict(setup.model.shown))
-    held = active_bounds(problem, uncertainty.values, result.nuisances)
-    adequacy = graded(estimated.surprise, *errors_of(result), held)
+    if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
+        moved = replace(graded.estimation, uncertainty=uncertainty)
+        graded = grade_estimate(problem, moved, setup.validate, shown)
+    fits, adequacy = list(graded.fits), graded.adequacy
+    result = conclude(problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name)
+    result = replace(result, shown_effects=dict(shown))
     together = compare_events(uncertainty) if len(problem.events) > 1 else None
     fields = uncertainty.fields()
     fields["uncertainty"] |= together.fields() if together else {"gains": {}, "odd_events": []}
     fields["uncertainty"]["notes"] += together.notes if together else []
-    starts = [s.to_dict(problem.space.names) for s in estimated.starts]
+    starts = [s.to_dict(problem.space.names) for s in graded.estimation.starts]
     structures = [rival.to_dict() for rival in uncertainty.rivals]
     data = set_holding(tuple(event.record.where for event in problem.events))
     advice = [
@@ -428,7 +430,7 @@ def _concluded(setup: FitSpec, end: SearchResult, progress: Progress = False) ->
         result, **fields, adequacy=adequacy.to_dict(), linear_network=beside, starts=starts,
         rival_structures=structures, advice=advice,
     )  # fmt: skip
-    return result, FitDetails(fits, estimated, uncertainty, together, adequacy)
+    return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)
 
 
 def _with_priors(problem: Problem, result: Result) -> list[str]:

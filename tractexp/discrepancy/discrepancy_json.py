@@ -6,9 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import files, quoting
-from tractexp.discrepancy import recommended
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import Curves, closed
+from tractexp.discrepancy.gap import Curves, GapTest, closed, share_closed
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
@@ -19,6 +18,7 @@ from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
+from tractexp.identification.grade import Misfit
 from tractexp.inference.model_error import ModelError, in_percent
 from tractexp.provenance import again
 from tractexp.wording import joined
@@ -28,7 +28,7 @@ PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 
 def content(investigation: Findings) -> dict[str, Any]:
     """The content of `discrepancy.json`."""
-    window, held = investigation.context.records.window, investigation.validate
+    window = investigation.context.records.window
     return {
         "verdict": investigation.verdict.word,
         "complete": investigation.verdict.complete,
@@ -37,11 +37,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
         "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
-        "gap": {
-            "train": _gap(investigation.train.before, investigation.train.after),
-            "validate": held and _gap(held.before, held.after),
-            "fitted_to_both": investigation.fitted_to_both,
-        },
+        "gap": gaps(investigation),
         "contributions": [
             {"effects": list(names), "model_error": files.plain(error)} for names, error in investigation.contributions
         ],
@@ -53,8 +49,9 @@ def content(investigation: Findings) -> dict[str, Any]:
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
         "next_event": None if investigation.next_event is None else investigation.next_event.to_dict(),
-        "adequacy": recommended.adequacy(investigation).to_dict(),
-        "held": recommended.held(investigation),
+        "base_adequacy": investigation.base_grade.adequacy.to_dict(),
+        "adequacy": investigation.final_grade.adequacy.to_dict(),
+        "held": investigation.held,
         "extended": "conf/model/extended.yaml" if investigation.names else None,
         "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
@@ -82,10 +79,9 @@ def recommendation(investigation: Findings) -> str:
             return f"fit the held-out events, too ({DATA.train})"
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
-        grade = recommended.adequacy(investigation).grade
-        if grade is not Grade.ADEQUATE:
+        if investigation.final_grade.adequacy.grade is not Grade.ADEQUATE:
             return "find what is missing still: investigate further events, or the extended model as the base model"
-        held = recommended.held(investigation)
+        held = investigation.held
         rest = f"; these events cannot tell {joined(list(held))}, which it holds" if held else ""
         return f"use the extended model{rest}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
@@ -94,6 +90,32 @@ def recommendation(investigation: Findings) -> str:
 def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     """Parameters of the extended model, each with its standard error where the fit gives one."""
     return {e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after}
+
+
+def gaps(investigation: Findings) -> dict[str, Any]:
+    """How far off the graded models are: the base model before, the one that the investigation ends with after.
+
+    chi2 is that of the fits by which effects were ranked; None where there is none of the held-out events.
+    """
+    before, after = (investigation.misfits(one) for one in (investigation.base_grade, investigation.final_grade))
+    ranked = {"train": investigation.train, "validate": investigation.validate}
+    rows: dict[str, Any] = {
+        role: was and now and _graded_gap(was, now, ranked[role])
+        for role, was, now in zip(ranked, before, after, strict=True)
+    }
+    return {**rows, "fitted_to_both": investigation.fitted_to_both}
+
+
+def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[str, Any]:
+    was, now = (None, None) if ranked is None else (ranked.before.chi2_per_sample, ranked.after.chi2_per_sample)
+    closed = share_closed(before.error, after.error)
+    return {"before": _misfit(before, was), "after": _misfit(after, now), "closed": files.plain(closed)}
+
+
+def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
+    own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
+    errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
+    return files.plain({"model_error": _error(misfit.error)} | errors | own | {"chi2_per_sample": chi2})
 
 
 def _gap(before: Curves, after: Curves) -> dict[str, Any]:
@@ -124,10 +146,10 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
         return None
     near, tests = investigation.verdict.nearest, investigation.tests
     nearest = near and (near.carried or near.curves)[1].error
-    gap = investigation.validate or investigation.train
+    before, after = (investigation.judged(one) for one in (investigation.base_grade, investigation.final_grade))
     return {
-        "model_error": _error(nearest or gap.after.error),
-        "share": files.plain(1 - gap.closed) if investigation.names else None,
+        "model_error": _error(nearest or after.error),
+        "share": files.plain(1 - share_closed(before.error, after.error)) if investigation.names else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
@@ -222,7 +244,7 @@ def write_model(investigation: Findings, node: Mapping[str, Any], path: Path) ->
     """
     effects = sorted({*node.get("effects", ()), *investigation.names})
     settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
-    held, window = recommended.held(investigation), recorder_window(investigation)
+    held, window = investigation.held, recorder_window(investigation)
     extended: dict[str, Any] = {
         "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],
         "effects": effects,
@@ -242,8 +264,8 @@ def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mappi
     """What the extended model is, and why it holds what it holds, a sentence each."""
     lines = [f"The base model with what was found missing: {joined(investigation.names)}."]
     if not investigation.verdict.complete:
-        after = (investigation.validate or investigation.train).after.error
-        lines.append(f"Something is missing still: it misses {in_percent(after.value)} of the load's response.")
+        left = investigation.judged(investigation.final_grade).error.value
+        lines.append(f"Something is missing still: it misses {in_percent(left)} of the load's response.")
     if (window := investigation.context.records.window) is not None:
         lines.append(f"window: {window.describe()}.")
     elif investigation.context.load.window is not None:
@@ -259,5 +281,4 @@ def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mappi
 
 def recorder_window(investigation: Findings) -> float | str | None:
     """The recorder's window that was taken into account, as `model.window` names it."""
-    window, load = investigation.context.records.window, investigation.context.load
-    return load.window if window is None else window.setting
+    return investigation.window

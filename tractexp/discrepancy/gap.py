@@ -79,10 +79,15 @@ def share_gone(factor: float) -> float:
 
 
 def closed(before: Curves, after: Curves) -> float:
+    """The share of the squared model error that is gone between two curves."""
+    return share_closed(before.error, after.error)
+
+
+def share_closed(before: ModelError, after: ModelError) -> float:
     """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
     below 0 where more is left than before. nan where that falls short of the noise by more than there was before, which
     was within the error of the noise's level then."""
-    square, rest = before.error.square, after.error.square
+    square, rest = before.square, after.square
     return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
 
 

@@ -10,6 +10,7 @@ from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
 from tractexp.discrepancy.explanations import Explanations, explanations
 from tractexp.discrepancy.gap import GapTest, gap
+from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
 from tractexp.discrepancy.incomplete import incomplete
 from tractexp.discrepancy.next_event.choose import NextEvent
@@ -22,12 +23,15 @@ from tractexp.discrepancy.survivors import Survivors, survivors
 from tractexp.discrepancy.verdict import NAMED, NONE, UNEXPLAINED, Verdict, verdict, word_of
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
+from tractexp.identification.grade import GradedModel, Misfit
+from tractexp.identification.verdict import UNIDENTIFIED, size
 from tractexp.inference.base_fit import BaseFit, base_fit
 from tractexp.inference.catalogue import Catalogue, catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
+from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
@@ -47,6 +51,7 @@ class Findings:
     verdict: Verdict
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
+    grader: Grader
     proposed: ProposalResult = field(default_factory=ProposalResult)  # of a term, where nothing explains
     all_fitted: bool = False  # whether the held-out events were fitted like the others, since only all show something
 
@@ -82,12 +87,11 @@ class Findings:
     @functools.cached_property
     def contributions(self) -> list[tuple[tuple[str, ...], float]]:
         """Names, from none to all of them, one more at a time, and the model's error with them."""
-        if (predicted := self.held_out.predictions) is not None:
-            return [(one.names, one.error) for one in predicted.contributions(self.names)]
         if not self.names:
             return []
-        judged = self.validate or self.train
-        return [((), judged.before.error.value), (self.names, judged.after.error.value)]
+        predicted, ends = self.held_out.predictions, [(), self.names]
+        sets = ends if predicted is None else [one.names for one in predicted.contributions(self.names)]
+        return [(names, self.judged(self.grade_of(names)).error.value) for names in sets]
 
     @property
     def bare(self) -> Refit:
@@ -116,6 +120,54 @@ class Findings:
     def validate(self) -> GapTest | None:
         """The gap on the held-out events."""
         return None if self.assessment is None else self.assessment.gap
+
+    @functools.cached_property
+    def held(self) -> dict[str, float]:
+        """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
+        if not self.names:
+            return {}
+        return {
+            e.parameter.name: e.value
+            for e in self.after
+            if e.verdict.startswith(UNIDENTIFIED) or e.half > size(e.value, *e.parameter.bounds) / 2
+        }
+
+    @property
+    def window(self) -> float | str | None:
+        """The recorder's window that was taken into account, as `model.window` names it."""
+        found = self.context.records.window
+        return self.context.load.window if found is None else found.setting
+
+    @property
+    def base_grade(self) -> GradedModel:
+        """The base model as it was given, as an identification grades it."""
+        return self.grader.grade_base()
+
+    @property
+    def final_grade(self) -> GradedModel:
+        """The same of the model that the investigation ends with."""
+        return self.grade_of(self.names)
+
+    def grade_of(self, names: Sequence[str]) -> GradedModel:
+        """The base model with some of the names added, graded with all that the extended model has beside them."""
+        if not self.names:
+            return self.grader.grade((), self.window)
+        if not names:
+            return self.base_grade
+        own = {p.name for p in self.catalogue.parameters([name for name in self.names if name not in names])}
+        held = {name: value for name, value in self.held.items() if name not in own}
+        return self.grader.grade(names, self.window, held, fit_all=self.fitted_to_both)
+
+    def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
+        """How far off a graded model is on the events that were to be fitted, and on those that were to be held out."""
+        split = len(self.grader.train)
+        fitted, held_out = graded.fits[:split], graded.fits[split:]
+        return Misfit.of(fitted), Misfit.of(held_out) if held_out else None
+
+    def judged(self, graded: GradedModel) -> Misfit:
+        """The same on the held-out events, where there are any."""
+        fitted, held_out = self.misfits(graded)
+        return held_out or fitted
 
     @functools.cached_property
     def before(self) -> list[ParameterEstimate]:
@@ -207,14 +259,19 @@ def investigate(
     only: Sequence[str] = (),
     substeps: int | None = None,
     criteria: Criteria | None = None,
+    priors: bool = False,
+    shown: Sequence[str] = (),
+    search: Callable[[Problem], np.ndarray] | None = None,
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Findings:
     """Find where model and records disagree, name what is missing, add it, and measure how the gap shrinks.
 
     `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters, `only` names the
-    effects that are tested (none: all), `substeps` the Runge-Kutta steps per sample (None: as many as needed). Raises
-    `UserError` for wrong events or names.
+    effects that are tested (none: all), `substeps` the Runge-Kutta steps per sample (None: as many as needed).
+
+    Of grades are `priors`, `shown`, effects that the base model has because its records show them, and `search`, which
+    gives the free values (d,) that an identification's search ends at. Raises `UserError` for wrong events or names.
     """
     criteria = criteria or Criteria()
     train, validate = (domain_of(model).events(events) for events in (train, validate))
@@ -227,10 +284,14 @@ def investigate(
 
         given = model, missing, Records.of(train), bounds or {}, fixed or {}, criteria, effort
         context = Context.of(*given, substeps)
-        findings = _findings(base_fit(context), validate, seed)
+        grader = Grader(
+            model, missing, tuple(train), tuple(validate), bounds or {}, fixed or {}, substeps, priors, shown, search
+        )
+        findings = _findings(base_fit(context), validate, seed, grader)
         if context.kernels.too_coarse(findings.base_values):
             effort.say("the fits lie where the motor is fast: again with shorter steps")
-            findings = _findings(base_fit(Context.of(*given, context.kernels.box_substeps)), validate, seed)
+            finer = Context.of(*given, context.kernels.box_substeps)
+            findings = _findings(base_fit(finer), validate, seed, grader)
         return findings
 
     with Effort(tell).audible() as effort:
@@ -238,18 +299,18 @@ def investigate(
         if findings.verdict.word == UNEXPLAINED and findings.held_out.shows_more:
             effort.say("only all events together show something: again, fitted to all of them")
             of_all = findings_of([*train, *validate], ())
-            findings = _without_confirmation(of_all) if of_all.evident else findings
+            findings = _without_confirmation(of_all, findings) if of_all.evident else findings
         return replace(findings, proposed=_proposal(findings, seed))
 
 
-def _without_confirmation(findings: Findings) -> Findings:
-    """The same, where events were fitted that were to be held out."""
+def _without_confirmation(findings: Findings, before: Findings) -> Findings:
+    """The same, where events were fitted that were to be held out, as they were `before`."""
     why = "only all events together show it, so all were fitted, and none is left to confirm it"
     said = replace(findings.verdict, reason=f"{findings.verdict.reason}; {why}")
-    return replace(findings, verdict=said, all_fitted=True)
+    return replace(findings, verdict=said, grader=before.grader, all_fitted=True)
 
 
-def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
+def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grader) -> Findings:
     """The investigation from the base model's fit to the verdict."""
     base, first = behind_recorder(base, disagreement(base, seed), seed)
     explained = explanations(base, first, seed)
@@ -267,6 +328,7 @@ def _findings(base: BaseFit, validate: Sequence[Event], seed: int) -> Findings:
         verdict=said,
         train=_gap(outcome.first.context, outcome, said),
         withheld=tuple(validate),
+        grader=grader,
     )
 
 

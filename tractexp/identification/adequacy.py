@@ -189,16 +189,15 @@ def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]
     return level[k], f"{window.channel} of {name} from {window.start:.3f} to {window.end:.3f} s"
 
 
-def graded(
-    surprise: Surprise, fitted: ModelError, held_out: ModelError | None = None, active_bounds: Sequence[str] = (),
-    least_p: float = ADEQUATE_P,
-) -> Adequacy:  # fmt: skip
+def grade_errors(
+    surprise: Surprise, fitted: ModelError, held_out: ModelError | None = None, active_bounds: Sequence[str] = ()
+) -> Adequacy:
     """The grade of an estimate that leaves this of the fitted and of held-out events.
 
-    What is left is nothing but noise from p = `least_p` on. `active_bounds` say which bounds hold a parameter.
+    `active_bounds` say which bounds hold a parameter.
     """
     errors = [fitted, *([held_out] if held_out else [])]
-    noise = surprise.p is not None and surprise.p >= least_p
+    noise = surprise.adequate
     sure = max(e.interval[0] if noise else e.value for e in errors)
     held = "".join(f"; a bound holds {bound}" for bound in active_bounds)
     if sure >= WRONG:

@@ -18,7 +18,7 @@ from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.search import REFUSED, History, SearchResult
 from tractexp.identification.verdict import EDGE
-from tractexp.inference.model_error import ModelError, in_percent, model_error
+from tractexp.inference.model_error import in_percent, model_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
 from tractexp.model.model import CLASSICAL, Model, compose
@@ -253,25 +253,22 @@ def load(path: Path) -> Result:
 def conclude(
     problem: Problem,
     end: SearchResult,
-    validate: Sequence[Event],
+    free: np.ndarray,
+    fits: Sequence[Fit],
     seed: int,
     settings: Mapping[str, Any],
     optimizer: str,
-    estimate: np.ndarray | None = None,
-) -> tuple[Result, list[Fit]]:
-    """Judge the free values `estimate` (d,) on the fitted and the held-out events, by default where the search end.
+) -> Result:
+    """The result of free values (d,) and what they make of each event, `fits` of `play`; `end` is that of the search.
 
     Raises `UserError` where no candidate at all had a steady state.
     """
     refuse_failed(problem, end)
-    model = problem.model
-    free = end.values if estimate is None else estimate
-    fits, epsilon_p, epsilon_q = fitted(problem, free)
-    fits += [respond(model, problem.full(free)[0], event, VALIDATE) for event in validate]
+    epsilon_p, epsilon_q = relative_errors([fit for fit in fits if fit.role == TRAIN])
     first, estimates = problem.events[0], _values(problem, free)
     own = OwnBase.at(first.record)
     exponents = {p.name: p.power_exponent for p in problem.parameters}
-    result = Result(
+    return Result(
         **estimates,
         **_spent(end),
         objective=float(problem.objective(free[None])[0]),
@@ -294,7 +291,6 @@ def conclude(
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )
-    return result, fits
 
 
 def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
@@ -321,18 +317,24 @@ def _meant(problem: Problem) -> str:
     return "" if own.ratio == 1 else f", which are meant on the record's own base of {own}"
 
 
-def fitted(problem: Problem, free: np.ndarray) -> tuple[list[Fit], float, float]:
-    """The fitted events at free values (d,), and epsilon_p and epsilon_q of Eq. (20) over all of them, as fractions."""
+def play(problem: Problem, free: np.ndarray, validate: Sequence[Event] = ()) -> list[Fit]:
+    """The fitted events at free values (d,), then those of `validate`, at which nothing was fitted."""
     own = problem.by_event(free)[:, 0]
     fits = [respond(problem.model, v, event, TRAIN) for v, event in zip(own, problem.events, strict=True)]
-    measured = {c: np.concatenate([getattr(f.event.record, c) for f in fits]) for c in "PQ"}
-    calculated = {c: np.concatenate([getattr(f, c) for f in fits]) for c in "PQ"}
-    return fits, relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
+    shared = problem.full(free)[0]
+    return fits + [respond(problem.model, shared, event, VALIDATE) for event in validate]
+
+
+def relative_errors(fits: Sequence[Fit]) -> tuple[float, float]:
+    """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
+    measured = {c: np.concatenate([getattr(fit.event.record, c) for fit in fits]) for c in "PQ"}
+    calculated = {c: np.concatenate([getattr(fit, c) for fit in fits]) for c in "PQ"}
+    return relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
 
 
 def searched(problem: Problem, end: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself end, and what that took: what optimizers are compared by."""
-    _, epsilon_p, epsilon_q = fitted(problem, end.values)
+    epsilon_p, epsilon_q = relative_errors(play(problem, end.values))
     errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
     return _values(problem, end.values) | errors | _spent(end) | {"at_bound": at_bound(problem, end.values)}
 
@@ -361,9 +363,3 @@ def active_bounds(problem: Problem, values: np.ndarray, nuisances: Collection[st
     """The same without nuisances, as a sentence tells them: 'T_m at 1'."""
     names = [name for name in at_bound(problem, values) if name not in nuisances]
     return [f"{name} at {values[problem.space.index(name)]:.4g}" for name in names]
-
-
-def errors_of(result: Result) -> tuple[ModelError, ModelError | None]:
-    """The model's error on the fitted events and on those held out."""
-    held_out = result.model_error["held_out"]
-    return ModelError.of(result.model_error), held_out and ModelError.of(held_out)

@@ -10,7 +10,6 @@ from tractexp.blocks import Report, Table
 from tractexp.discrepancy.discrepancy_json import recommendation
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import estimates
-from tractexp.discrepancy.recommended import adequacy
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.inference.model_error import in_percent
@@ -71,7 +70,7 @@ def gap(content: Mapping[str, Any]) -> Table:
     columns = ["events", "model", "model error", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
     caption = "Model error: what is left of the load's response, in S, beyond the noise, with its 95 % interval."
     caption += f" epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
-    caption += " chi2 per sample: 1 where only noise is left."
+    caption += " chi2 per sample: of the fits by which effects are ranked, 1 where only noise is left."
     if named:
         columns.append("gap closed")
         caption += " Gap closed: the share of the squared model error that is gone."
@@ -113,7 +112,7 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
 def _graded(findings: Findings) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if findings.names else "base"
-    grade = adequacy(findings)
+    grade = findings.final_grade.adequacy
     return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
 
 
@@ -155,8 +154,9 @@ def _size(error: float | None) -> str:
 
 def _off(misfit: Mapping[str, Any]) -> list[str]:
     """How far off curves are, as a table has it."""
-    errors = [misfit["epsilon_p"], misfit["epsilon_q"], *[misfit.get("epsilon_i")]]
-    return [*(epsilon(e) for e in errors if e is not None), f"{misfit['chi2_per_sample']:.3f}"]
+    shown = ["epsilon_p", "epsilon_q", *["epsilon_i"] * (misfit.get("epsilon_i") is not None)]
+    chi2 = misfit["chi2_per_sample"]
+    return [*(epsilon(misfit[name]) for name in shown), "" if chi2 is None else f"{chi2:.3f}"]
 
 
 def _left(page: Report, findings: Findings) -> None:

@@ -7,7 +7,6 @@ from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import use_of
 from tractexp.discrepancy.forms import CATALOGUE, FittedLaw, forms
 from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.recommended import held
 from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
@@ -69,7 +68,7 @@ def parameters(page: Report, findings: Findings) -> None:
         columns, rows, f"± one standard error, from {how} in the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
-    if retained := held(findings):
+    if retained := findings.held:
         page.text(f"These events cannot tell {joined(list(retained))}: the extended model holds what was found.")
     if why := [f"{e.parameter.name} is {e.verdict}." for e in parameter_estimates if brief(e.verdict) != e.verdict]:
         with page.folded("Why some are known badly, and what of them is known"):

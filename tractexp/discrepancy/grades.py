@@ -1,0 +1,61 @@
+"""The base model and the extended one, graded as an identification grades them.
+
+The fits of an investigation rank effects. What a model is good for is told by `tractexp.identification.grade` alone: on
+the same events, in the same roles, with the bounds that the user set, and behind the recorder's window where the
+investigation takes one into account.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tractexp.identification.grade import GradedModel, grade_model
+from tractexp.inference.catalogue import Catalogue
+from tractexp.inference.problem import Problem
+from tractexp.model.model import Model, compose
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class Grader:
+    """What an investigation was asked, as far as grades hang on it; models that were graded once are kept."""
+
+    base: Model
+    catalogue: Catalogue
+    train: tuple[Event, ...]
+    validate: tuple[Event, ...]
+    bounds: Mapping[str, Sequence[float]]
+    fixed: Mapping[str, float]
+    substeps: int | None = None
+    priors: bool = False
+    shown: Collection[str] = ()  # effects that the base model has because its records show them
+    search: Callable[[Problem], np.ndarray] | None = None  # where an identification's search ends, (d,) free values
+    known: dict[str, GradedModel] = field(default_factory=dict)
+
+    def grade_base(self) -> GradedModel:
+        """The base model as it was given."""
+        return self.grade((), self.base.window)
+
+    def grade(
+        self, names: Sequence[str], window: float | str | None, held: Mapping[str, float] | None = None,
+        *, fit_all: bool = False,
+    ) -> GradedModel:  # fmt: skip
+        """The base model with the named effects, behind a recorder's `window`, some parameters held at values.
+
+        With `fit_all` the held-out events are fitted like the others.
+        """
+        fixed = {**self.fixed, **(held or {})}
+        key = repr((sorted(names), window, sorted(fixed.items()), fit_all))
+        if key not in self.known:
+            fitted, judged = ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
+            model = self._extended(names, window)
+            problem = Problem(model, fitted, self.bounds, fixed, self.substeps, priors=self.priors)
+            searched = None if self.search is None else self.search(problem)
+            self.known[key] = grade_model(problem, judged, searched, self.shown)
+        return self.known[key]
+
+    def _extended(self, names: Sequence[str], window: float | str | None) -> Model:
+        base, own = self.base, {effect.name for effect in self.base.effects}
+        added = [self.catalogue[name].effect for name in names if name not in own]
+        return compose(base.motor, base.static, [*base.effects, *added], base.integration, base.domain, window)

@@ -1,0 +1,99 @@
+"""The grade of a model on records: what its estimate leaves of the fitted and the held-out events.
+
+It is reckoned here alone, whoever asks. So the same model and records have the same error, grade and sentence in an
+identification, in an investigation, in what is stored, logged and exported, and on every page.
+"""
+
+import functools
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tractexp.identification.adequacy import Adequacy, grade_errors
+from tractexp.identification.estimate import EstimationResult, estimate, polished
+from tractexp.identification.result import Fit, active_bounds, model_errors, play, relative_errors
+from tractexp.identification.uncertainty import Uncertainty
+from tractexp.inference.model_error import ModelError, model_error
+from tractexp.inference.problem import Problem
+from tractexp.record import Event
+
+
+@dataclass(frozen=True, eq=False)
+class GradedModel:
+    """A model's estimate, as it fits some events and predicts others; `fits` has the fitted events first."""
+
+    problem: Problem
+    estimation: EstimationResult
+    fits: tuple[Fit, ...]
+    adequacy: Adequacy
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        return self.estimation.uncertainty
+
+    @property
+    def values(self) -> np.ndarray:
+        """The free parameters (d,)."""
+        return self.uncertainty.values
+
+    @functools.cached_property
+    def errors(self) -> dict[str, Any]:
+        """The model's error as `result.json` has it: of the fitted events, of those held out, and of each."""
+        return model_errors(self.fits)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far a model is off some events: the model's error, and the relative errors of Eq. (20), as fractions.
+
+    `epsilon_i` is that of the currents, over several events the rms of theirs; None of phasors.
+    """
+
+    error: ModelError
+    epsilon_p: float
+    epsilon_q: float
+    epsilon_i: float | None
+
+    @classmethod
+    def of(cls, fits: Sequence[Fit]) -> "Misfit":
+        """Of some events together."""
+        currents = [fit.epsilon_i**2 for fit in fits if fit.epsilon_i is not None]
+        of_currents = float(np.sqrt(np.mean(currents))) if currents else None
+        return cls(model_error(fits), *relative_errors(fits), of_currents)
+
+
+def grade_model(
+    problem: Problem, validate: Sequence[Event] = (), searched: np.ndarray | None = None, shown: Collection[str] = ()
+) -> GradedModel:
+    """The estimate for a problem, and its grade on the fitted events and on `validate`.
+
+    `searched` (d,) are free values that a search ended at, `shown` effects that the model has because its records show
+    them. Raises `UserError` where nothing of the box can be simulated.
+    """
+    estimation = polished(problem) if searched is None else estimate(problem, searched)
+    return grade_estimate(problem, estimation, validate, shown)
+
+
+def grade_estimate(
+    problem: Problem, estimation: EstimationResult, validate: Sequence[Event] = (), shown: Collection[str] = ()
+) -> GradedModel:
+    """The grade of an estimate that is there already."""
+    values = estimation.uncertainty.values
+    fits = play(problem, values, validate)
+    errors = model_errors(fits)
+    held_out = errors["held_out"]
+    adequacy = grade_errors(
+        estimation.surprise,
+        ModelError.of(errors),
+        held_out and ModelError.of(held_out),
+        active_bounds(problem, values, _nuisances(problem, shown)),
+    )
+    return GradedModel(problem, estimation, tuple(fits), adequacy)
+
+
+def _nuisances(problem: Problem, shown: Collection[str]) -> list[str]:
+    """Parameters, as the problem names them, of effects that nobody asked for: their bounds tell nothing."""
+    own = {p.name for effect in problem.model.effects if effect.name in shown for p in effect.parameters}
+    return [name for name in problem.space.names if name.partition("[")[0] in own]
