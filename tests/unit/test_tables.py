@@ -193,8 +193,8 @@ class TestNamesAndUnits:
                 r"say which is which: .*\{U: \.\.\., P: \.\.\., Q: \.\.\.\}",
             ),
             (
-                "time,voltage_A,real_power,reactive_power",
-                r"if voltage_A is meant, say so: .*\{U: 'voltage_A'",
+                "time,voltage_N,real_power,reactive_power",
+                r"if voltage_N is meant, say so: .*\{U: 'voltage_N'",
             ),
             ("time,U,Pa,x", r"column P, Q is missing; .*if Pa is meant, say so: data.columns=\{P: 'Pa', Q: \.\.\.\}"),
             ("C1MAG,U,P,x", r"column t, Q is missing; .*: data.columns=\{t: 'C1MAG', Q: \.\.\.\}"),

@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from tractexp.recording.phase_mark import ORDERS, plain, spell_marks
 from tractexp.recording.recording import unit_of
 from tractexp.recording.unit import amount
 
@@ -48,9 +49,11 @@ WORDS: Mapping[str, str] = {
     **dict.fromkeys(("soc", "century"), "soc"),
     **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
     **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l", "ul",
-                     "spannung", "напряжение", "电压", "tension", "tensión"), "U"),
-    **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente"),
-                    "I"),
+                     "ull", "uln", "vll", "vln", "ulg", "vlg", "uac", "vac", "umean", "vmean", "uavg",
+                     "vavg", "spannung", "напряжение", "напряж", "电压",
+                     "tension", "tensión", "voltaje", "tensione"), "U"),
+    **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente",
+                     "corrente"), "I"),
     **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "ppq", "active", "real",
                      "wirkleistung", "активная", "有功", "有功功率"), "P"),
     **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "qpq", "reactive",
@@ -68,23 +71,28 @@ FRACTIONS: Mapping[str, str] = {
 ANGLE = frozenset(("angle", "ang", "winkel", "arg", "phi", "theta", "угол", "相角", "角度", "deg"))
 POSITIVE = frozenset(("pos", "positive", "ps", "1", "正序", "mitsystem"))
 PHASES: Mapping[str, str] = {
-    **dict.fromkeys(("a", "l1", "an", "ag", "а", "a相"), "a"),
-    **dict.fromkeys(("b", "l2", "bn", "bg", "b相"), "b"),
-    **dict.fromkeys(("c", "l3", "cn", "cg", "c相"), "c"),
-    **dict.fromkeys(("ab", "12", "l12", "l1l2", "l1-l2"), "ab"),
-    **dict.fromkeys(("bc", "23", "l23", "l2l3", "l2-l3"), "bc"),
-    **dict.fromkeys(("ca", "31", "l31", "l3l1", "l3-l1"), "ca"),
+    **dict.fromkeys(("a", "l1", "an", "ag"), "a"),
+    **dict.fromkeys(("b", "l2", "bn", "bg"), "b"),
+    **dict.fromkeys(("c", "l3", "cn", "cg"), "c"),
+    **dict.fromkeys(("ab", "12", "l12", "l1l2"), "ab"),
+    **dict.fromkeys(("bc", "23", "l23", "l2l3"), "bc"),
+    **dict.fromkeys(("ca", "31", "l31", "l3l1"), "ca"),
+    "ba": "ba", "cb": "cb", "ac": "ac",
     **dict.fromkeys(POSITIVE, "1"),
     **dict.fromkeys(("neg", "negative", "ns", "2", "负序", "gegensystem"), "2"),
     **dict.fromkeys(("0", "zero", "zs", "零序"), "0"),
     "3": "3", "n": "n",
 }  # fmt: skip
-LINE = frozenset(("ll", "ul", "u1l", "line", "l-l", "pp", "ph-ph", "verkettet", "线电压"))
-GROUND = frozenset(("ln", "phase-to-ground", "ph", "lg", "l-n", "ph-g", "strang", "相电压"))
+BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}  # line voltages that are the opposite of those of `data.columns`
+LINE = frozenset(("ll", "ul", "ull", "vll", "u1l", "line", "pp"))
+GROUND = frozenset(("ln", "lg", "uln", "vln", "ulg", "vlg", "ph", "an", "bn", "cn", "ag", "bg", "cg"))
 COMPOUND = re.compile(
-    r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns|a|b|c"
-    r"|0|1|2|3|n)(mag|m|ang|rms)?"
+    r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|ba|cb|ac|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns"
+    r"|a|b|c|0|1|2|3|n)(mag|m|ang|rms)?"
 )
+PHASE_KEYS = ("a", "b", "c", "ab", "bc", "ca")
+TABLE_ORDERS = (*ORDERS, "UVW")  # the last: UV is the voltage of phase V
+BY_UNIT: Mapping[str, str] = {"voltage": "U", "current": "I", "power": "P", "reactive": "Q"}
 
 
 @dataclass(frozen=True)
@@ -94,6 +102,7 @@ class Role:
     key: str  # t, frac, soc, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in _angle
     unit: str = ""
     line: bool | None = None  # of a voltage: line to line, phase to ground, unsaid
+    backward: bool = False  # of a line voltage: BA, which is the opposite of AB
 
     @property
     def quantity(self) -> str:
@@ -139,28 +148,68 @@ def fits(quantity: str, unit: str, exact: bool = False) -> bool:
     return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
-def role(name: str, unit: str = "") -> Role | None:
-    """What a column of that name and unit is; None for anything else."""
-    words = _words(name)
-    if not words:
-        return None
-    fractions = [word for word in words if word in FRACTIONS and (not FRACTIONS[word] or len(words) == 1)]
+def order_of(names: Sequence[str], units: Sequence[str]) -> str:
+    """The order of phases, one of `TABLE_ORDERS`, in which most columns of a table have marks; the first of several."""
+
+    def marked(order: str) -> int:
+        roles = (role(name, unit, order) for name, unit in zip(names, units, strict=True) if name)
+        ours = [one for one in roles if one and one.key[:1] in tuple("UIPQ")]
+        keys = {one.key.removesuffix("_angle") for one in ours}
+        sets = ([key for key in keys if key[0] == letter and key[1:] in PHASE_KEYS] for letter in "UIPQ")
+        counts = ([sum(len(key) == size for key in one) for size in (2, 3)] for one in sets)
+        grounded = len({one.key for one in ours if one.line is False and one.key[1:] in PHASE_KEYS})
+        return max(grounded, sum(max(singles if singles == 3 else 0, pairs) for singles, pairs in counts))
+
+    return max(TABLE_ORDERS, key=marked)
+
+
+def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
+    """What a column of that name and unit is, in a table with that order of phases; None for anything else."""
+    fractions = [word for word in (words := _words(name)) if word in FRACTIONS]
     for fraction in fractions:
-        return Role("frac", unit or FRACTIONS[fraction])
-    said = next((pair for pair in (_compound(words), _worded(words)) if pair), None)
+        if not FRACTIONS[fraction] or len(words) == 1:
+            return Role("frac", unit or FRACTIONS[fraction])
+    kind = (meaning(unit) or ("",))[0]
+    electrical = kind in (*BY_UNIT, "angle") or any(WORDS.get(word) in BY_UNIT.values() for word in _words(name))
+    unmarked = None if electrical else _quantity(_words(name))
+    if unmarked and unmarked[0] not in BY_UNIT.values():
+        return Role(unmarked[0], unit)
+    spelled, ground = spell_marks(name, order)
+    words = _words(name) if spelled == plain(name) else _words(spelled)
+    said = _quantity(words)
+    if said is None or (electrical and said[0] not in BY_UNIT.values()):
+        said = _marked(words, kind, ground) or said
     if said is None:
         return None
     key, phase = said
-    kind = (meaning(unit) or ("",))[0]
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
-        return role(f"{name} {unit}")
+        return role(f"{name} {unit}", order=order)
+    whole, backward = BACKWARD.get(phase, phase), phase in BACKWARD
     angle = kind == "angle" or ANGLE & set(words) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
     if key in ("U", "I") and angle:
-        return Role(f"{key}{phase}_angle", unit)
+        return Role(f"{key}{whole}_angle", unit, backward=backward)
     if key not in ("U", "I", "P", "Q"):
         return Role(key, unit)
-    line = True if LINE & set(words) or len(phase) == 2 else False if phase or GROUND & set(words) else None
-    return Role(key + phase, unit, line if key == "U" else None)
+    if key != "U":
+        return Role(key + whole, unit)
+    grounded = ground or bool(GROUND & {*words, *(word[1:] for word in words if word[0] in "uv")})
+    line = True if LINE & set(words) or len(phase) == 2 else False if grounded else None
+    return Role(key + whole, unit, line, backward)
+
+
+def _quantity(words: Sequence[str]) -> tuple[str, str] | None:
+    """(quantity, phase) that words say."""
+    return next((pair for pair in (_compound(words), _worded(words)) if pair), None) if words else None
+
+
+def _marked(words: Sequence[str], kind: str, ground: bool) -> tuple[str, str] | None:
+    """(quantity, phase) of a name that is little more than a mark: its unit, or two phases or ground, say it."""
+    phase = next((PHASES[word] for word in words if PHASES.get(word, "0")[0] in "abc"), "")
+    more = [word for word in words if word not in PHASES and word not in ANGLE and word not in ("mag", "rms")]
+    if not phase or (more and not kind):
+        return None
+    quantity = BY_UNIT.get(kind) or ("U" if (ground or len(phase) == 2) and kind in ("", "angle") else "")
+    return (quantity, phase) if quantity else None
 
 
 def _words(name: str) -> list[str]:
@@ -169,7 +218,6 @@ def _words(name: str) -> list[str]:
     text = re.sub(r"[^\w]+|_", " ", text.lower().replace("d/dt", "dt").replace("df/dt", "dfdt"))
     text = re.sub(r"\b(bus|busbar|node|feeder|gen|substation|to|ckt)\s+\d+\b", " ", text)
     text = re.sub(r"\b\d{3,}\b", " ", text)
-    text = re.sub(r"([abc]相)", r" \1 ", text)
     return text.split()
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from tractexp.errors import DATA, UserError, among, nearest, setting
 from tractexp.filetypes.cells import is_number
 from tractexp.filetypes.clock import first_day, is_time
-from tractexp.filetypes.columns import Role, fits, is_unit, role
+from tractexp.filetypes.columns import Role, fits, is_unit, order_of, role
 from tractexp.filetypes.table import TableFile
 from tractexp.recording.unit import amount
 
@@ -177,13 +177,15 @@ def _squeezed(name: str) -> str:
 def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[MappedColumn]]:
     """{key: the columns that could be it}; the user's choice, and a name that is the key itself, excludes others."""
     heading, options = table.heading, {}
+    names = _spelled(heading.names)
+    order = order_of(names, heading.units)
     for key, number in numbers.items():
-        label = role(heading.names[number], heading.units[number])
+        label = role(heading.names[number], heading.units[number], order)
         line = label.line if label and label.quantity == "U" else None
+        line = False if line is None and label and label.key[:1] == "U" and label.key[1:] in PHASES else line
         options[key] = [MappedColumn(number, table.label(number), Role(key, heading.units[number], line))]
     free = [k for k in range(len(heading.names)) if k not in numbers.values() and heading.names[k]]
-    names = _spelled(heading.names)
-    roles = {k: one for k in free if (one := role(names[k], heading.units[k]))}
+    roles = {k: one for k in free if (one := role(names[k], heading.units[k], order))}
     exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
     if "U" not in exact and "U" not in numbers:
         exact.discard("U2")  # of U1, U2, U3
@@ -264,7 +266,7 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
     if wave and (not _powers(options) or (_has(keys, "P") and _oscillates(table, options, wave))):
         kinds["waves"] = wave
     if powers := _powers(options):
-        kinds["powers"] = powers
+        kinds["powers"] = [*powers, *_telling_current(table, options, powers)]
     if phasors := _phasors(options):
         kinds["phasors"] = phasors
     order = [kind for kind in ("phasors", "waves", "powers") if kind in kinds]
@@ -297,16 +299,37 @@ def _set(keys: Iterable[str], letter: str, single: Sequence[str]) -> list[str]:
 
 
 def _powers(options: Mapping[str, Any]) -> list[str]:
-    U = _set(options, "U", ("U", "U1"))
+    U = _set(options, "U", ("U", "U1")) or _some(options, "U")
     P, Q = _set(options, "P", ("P",)), _set(options, "Q", ("Q",))
     return [*U, *P, *Q, *(key for key in ("f", "U2") if key in options)] if U and P and Q else []
 
 
+def _telling_current(table: TableFile, options: Mapping[str, list[MappedColumn]], powers: Sequence[str]) -> list[str]:
+    """The key of a current [kA] beside powers, which tells whether a voltage whose name does not is line to line."""
+    first, keys = options[powers[0]][0], [key for key in ("I", "Ia", "Ib", "Ic", "I1") if key in options]
+    told = first.role.line is not None or first.name == first.role.key == "U" or not first.role.unit
+    if told or not keys or len(options[keys[0]]) > 1:
+        return []
+    one = options[keys[0]][0]
+    cells = [row[one.number] if one.number < len(row) else "" for row in table.sample]
+    numbers = all(is_number(cell) or is_number(cell, ",") for cell in cells)
+    return [keys[0]] if one.role.unit and numbers else []
+
+
+def _some(keys: Iterable[str], letter: str) -> list[str]:
+    """The one or two phases, else lines, that are there of one quantity."""
+    keys = set(keys)
+    groups = ([letter + p for p in marks if letter + p in keys] for marks in (PHASES, LINES))
+    return next((group for group in groups if group), [])
+
+
 def _phasors(options: Mapping[str, Any]) -> list[str]:
-    """Magnitudes and angles: of three phases where they are there, else of the positive sequence."""
+    """Magnitudes and angles: of three phases where they are there, else of two, else of the positive sequence."""
     result: list[str] = []
     for letter in "UI":
         groups = [[letter + p for p in PHASES], [letter + p for p in LINES], [f"{letter}1"], [letter]]
+        marks = LINES if letter == "U" else PHASES  # of which two say the third
+        groups += [[letter + p for p in marks if p != left] for left in marks]
         whole = [g for g in groups if all(k in options and f"{k}_angle" in options for k in g)]
         if not whole:
             return []

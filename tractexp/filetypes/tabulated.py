@@ -1,6 +1,6 @@
 """The content of a table, from its columns: what it holds, and a load's powers against time."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
@@ -10,11 +10,12 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.files import located
 from tractexp.filetypes.columns import PER_UNIT, factor
-from tractexp.filetypes.mapping import LINES, Mapped, MappedColumn, check_mapping, mapped
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.sidecar import Sidecar, beside
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
+from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
@@ -22,11 +23,7 @@ VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 ALIVE = 0.5  # of the median voltage: at less the frequency is noise
 SLOWEST = 10.0  # Hz: no network's frequency is lower
-# kV line to line (IEC 60038, EN 50163, China, North America), and 27.5 kV of traction substations
-NOMINAL_VOLTAGES = (
-    0.23, 0.4, 0.48, 0.69, 1.0, 3.0, 3.3, 6.0, 6.6, 10.0, 11.0, 13.8, 15.0, 20.0, 22.0, 25.0, 27.5, 33.0, 35.0, 66.0,
-    69.0, 110.0, 115.0, 132.0, 138.0, 150.0, 161.0, 220.0, 230.0, 275.0, 330.0, 345.0, 380.0, 400.0, 500.0, 765.0,
-)  # fmt: skip
+AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +131,8 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     power = next(key for key in mapping.columns if key[0] == "P")
     absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
     if absolute["U"] or (absolute["U"] is None and kilovolts):
-        notes += _to_lines(columns, mapping.columns[first].role.line, first)
+        current = next((values[key] for key in values if key[0] == "I"), None)
+        notes += _to_lines(columns, mapping.columns[first].role.line, first, current)
     return Powers(columns, absolute, (*table.notes, *notes), start=start)
 
 
@@ -150,13 +148,33 @@ def _check_power_units(table: TableFile, mapping: Mapped) -> None:
         )
 
 
-def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str) -> list[str]:
-    """Make phase voltages line-to-line ones; what was taken for what."""
-    if line is False:
-        for name in {"U", "U2"} & set(columns):
-            columns[name] = columns[name] * np.sqrt(3)
-        return [f"{key} taken as a phase voltage: times sqrt(3) it is line to line"]
-    return ["U taken as line-to-line voltage"] if line is None else []
+def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str, current: np.ndarray | None) -> list[str]:
+    """Make phase voltages line-to-line ones; what was taken for what, and why where the name does not say it."""
+    if line:
+        return []
+    level, why = float(np.nanmedian(columns["U"])), ""
+    product = None if current is None or line is not None else _by_power(columns, current)
+    if product is not None:
+        line, why = product, ", for P and Q are the product of it and the current then"
+    elif line is None and key[1:] in PHASES and is_between_phases(level):
+        line, why = True, f", for {level:.4g} kV is near a nominal voltage, and times sqrt(3) near none"
+    elif line is None:
+        line = key[1:] not in PHASES
+    if line:
+        return [f"{key} taken as line-to-line voltage{why}"]
+    for name in {"U", "U2"} & set(columns):
+        columns[name] = columns[name] * np.sqrt(3)
+    return [f"{key} taken as a phase voltage{why}: times sqrt(3) it is line to line"]
+
+
+def _by_power(columns: Mapping[str, np.ndarray], current: np.ndarray) -> bool | None:
+    """Whether a voltage is line to line by S = sqrt(3) U I, where that or S = 3 U I holds; else None."""
+    size = np.hypot(columns["P"], columns["Q"])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = size / (np.abs(columns["U"]) * np.abs(current))
+    ratio = float(np.median(ratio[np.isfinite(ratio)])) if np.isfinite(ratio).any() else 0.0
+    fits = {line: abs(ratio / by - 1) < AGREES for line, by in ((True, np.sqrt(3)), (False, 3.0))}
+    return next((line for line, good in fits.items() if good), None)
 
 
 def _absolute(mapping: Mapped, key: str) -> bool | None:
@@ -167,6 +185,8 @@ def _absolute(mapping: Mapped, key: str) -> bool | None:
 def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], datetime | None, tuple[str, ...]]:
     """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; the moment of t = 0, and notes on the times."""
     kinds = {"t": "time", **{key: "gaps" for key in mapping.columns if key[0] in "PQ"}}
+    if mapping.kind == "powers":
+        kinds |= {key: "gaps" for key in mapping.columns if key[0] == "I"}
     cells = table.read({one.number: kinds.get(key, "number") for key, one in mapping.columns.items()})
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
@@ -186,15 +206,18 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
     scale, angle_notes = _radians(table, mapping, values)
     V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
+    V, turned = _forward(V, [mapping.columns[k] for k in keys["U"]])
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
     V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
+    if not absolute and keys["U"][0][1:] in LINES:  # per unit of a line voltage
+        V1, V2 = np.sqrt(3) * V1, None if V2 is None else np.sqrt(3) * V2
     size, three = (np.sqrt(3), 3.0) if absolute else (1.0, 1.0)
     S = three * V1 * I1.conj()
     columns = {"t": values["t"], "U": size * np.abs(V1), "P": S.real, "Q": S.imag}
     if V2 is not None:
         columns["U2"] = size * np.abs(V2)
     source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
-    notes = [*mapping.notes, *note, *angle_notes, *sort, source]
+    notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
     if "f" in values:
         columns["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
     else:
@@ -203,24 +226,33 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes), start=start)
 
 
+def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
+    """Phasors (K, N) of line voltages as AB, BC, CA; a note where all are named the other way, as V1 - V2 is."""
+    backward = np.array([one.role.backward for one in sources])
+    if not backward.any():
+        return V, []
+    names = ", ".join(one.label for one in sources)
+    if backward.all():
+        return V, [f"{names} taken as V1 - V2 and so on (where U21 is V2 - V1, the power is the opposite)"]
+    return np.where(backward, -1, 1)[:, None] * V, []
+
+
 def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
     """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does not say it."""
+    level = float(np.nanmedian(np.abs(V)))
+    if one.role.key[1:] in PHASES and one.role.line is None and is_between_phases(level):
+        why = f"{level:.4g} kV is near a nominal voltage, and times sqrt(3) near none"
+        return V / FORWARD, [f"{one.label} and the others taken as line to line, for {why}"]
     if one.role.key != "U" or one.role.line is False:
         return V, []
-    level = float(np.nanmedian(np.abs(V)))
     if one.role.line:
         return V / np.sqrt(3), []
-    line = _off_nominal(level) <= _off_nominal(np.sqrt(3) * level)
+    line = off_nominal(level) <= off_nominal(np.sqrt(3) * level)
     if line:
         why = f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than {np.sqrt(3) * level:.4g} kV"
         return V / np.sqrt(3), [f"{one.label} {why} (data.columns={{U1: ..., U1_angle: ...}} says phase to ground)"]
     why = f"taken as phase to ground: times sqrt(3) it is {np.sqrt(3) * level:.4g} kV, nearer to a nominal voltage"
     return V, [f"{one.label} {why} (a name with LL says line to line)"]
-
-
-def _off_nominal(voltage: float) -> float:
-    """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm."""
-    return min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES) if voltage > 0 else np.inf
 
 
 def _in_units(
@@ -266,10 +298,12 @@ def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
 
 
 def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
-    """Positive and negative sequence (N,) of phasors (3, N) of phases or lines; of one (1, N), it and None."""
+    """Positive and negative sequence (N,) of phasors of three or two phases or lines; of one (1, N), it and None."""
     if len(X) == 1:
         return X[0], None
-    positive, negative = sequences(X)
-    if keys[0][1:] in LINES:
+    marks = LINES if keys[0][1:] in LINES else PHASES
+    three = [X[keys.index(k)] if (k := keys[0][0] + mark) in keys else -X.sum(axis=0) for mark in marks]
+    positive, negative = sequences(np.array(three))
+    if marks == LINES:
         return positive / FORWARD, negative / FORWARD.conjugate()
     return positive, negative

@@ -75,6 +75,7 @@ def _channel(table: TableFile, mapping: Mapped, number: int, values: np.ndarray,
     unit = mapping.columns[key].role.unit if key in mapping.columns else unit
     quantity = {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
     phase = key[1:].upper() if key[1:] in (*PHASES, *LINES) else ""
+    phase = phase[::-1] if meaning and meaning.backward else phase
     return Channel(name, values, unit, quantity, phase)
 
 

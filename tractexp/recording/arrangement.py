@@ -18,7 +18,8 @@ from tractexp.record.direction import at_level, direction
 from tractexp.record.phasor import sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.feeder import Feeder
-from tractexp.recording.label import backward, groups, kind, order, residual
+from tractexp.recording.label import backward, groups, is_to_ground, kind, order, residual
+from tractexp.recording.nominal_voltage import is_between_phases
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal, snapshots
 
@@ -209,6 +210,9 @@ def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) ->
         if len(group.numbers) == 3 and not group.pairs and _root3(recording, feeder.voltages, group.numbers):
             others = ", ".join(_called(recording, i) for i in group.numbers)
             return f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
+    level = float(np.median(V1[live.calm]))
+    if is_between_phases(level) and not any(is_to_ground(recording.channels[i]) for i in feeder.voltages):
+        return f"{level:.4g} kV is near a nominal voltage, and times sqrt 3 near none: {used}"
     return ""
 
 

@@ -7,17 +7,14 @@ no list of naming schemes is needed: only the alphabets that number phases, and 
 import functools
 import itertools
 import re
-import unicodedata
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
+from tractexp.recording.phase_mark import DIGITS, ORDERS, QUANTITY, pairs, plain, quantity_before, spell_marks
 from tractexp.recording.recording import Channel
 
-ALPHABETS = ("abc", "rst", "uvw", "123")
-CYRILLIC = str.maketrans("авсеіо", "abceio")  # letters that look like Latin ones, as phases are often typed
-QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
 RESIDUAL = re.compile(
     r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
 )
@@ -49,14 +46,14 @@ class Group:
     missing: int | None = None  # the phase that is not there, of two phases
 
 
-def plain(text: str) -> str:
-    """Lower case, full-width and Roman characters and look-alike Cyrillic letters as Latin ones."""
-    return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
-
-
 def residual(channel: Channel) -> bool:
     """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
     return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in ("n", "g", "e", "3i0", "3u0")
+
+
+def is_to_ground(channel: Channel) -> bool:
+    """Whether the name or the phase of a voltage says that it is to ground: AN, L1-G, phase to ground."""
+    return any(spell_marks(text, letters)[1] for text in (channel.name, channel.phase) for letters in ORDERS)
 
 
 def kind(channel: Channel) -> str:
@@ -67,7 +64,7 @@ def kind(channel: Channel) -> str:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
     if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
-    letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwn]{1,2})(?![a-z]))", plain(channel.name))
+    letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))", plain(channel.name))
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
 
@@ -77,12 +74,13 @@ def other_quantity(channel: Channel) -> bool:
     return channel.quantity not in ("", "voltage", "current") or unit in OTHER_UNITS
 
 
-def phase(channel: Channel) -> str:
-    """The phase that a channel's label gives: one or two of a, b, c; "" where it gives none."""
-    label = re.sub(r"phase|[-_/ ]", "", plain(channel.phase))
+def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
+    """The phase that a channel's label gives in one of the orders: one or two of a, b, c; "" where it gives none."""
+    label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(channel.phase))
+    label = re.sub(r"(?<=.)(?:n|g|e|pe|gnd)$", "", label)  # to ground, as a phase by itself is
     for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
         marks = [*text.replace("l", "")]
-        for letters in ALPHABETS:
+        for letters in orders:
             if 1 <= len(marks) <= 2 and all(m in letters for m in marks) and len(set(marks)) == len(marks):
                 return "".join("abc"[letters.index(m)] for m in marks)
     return ""
@@ -106,11 +104,12 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
 
     What the file's phases say comes first, then what the names share.
     """
-    labels = [phase(c) for c in channels]
-    for pairs, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
-        places = tuple(reading(mark) for mark in labels)
-        if all(len(mark) == 1 + pairs for mark in labels) and len(set(places)) == len(places):
-            return places, pairs
+    for letters in ORDERS:
+        labels = [phase(c, (letters,)) for c in channels]
+        for two, reading in ((False, "abc".find), (True, lambda mark: PLACE.get(mark, -1))):
+            places = tuple(reading(mark) for mark in labels)
+            if all(len(mark) == 1 + two for mark in labels) and len(set(places)) == len(places):
+                return places, two
     for counters in (True, False):
         texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
@@ -118,8 +117,8 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
         readings = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
         readings = [each for each in readings if len(set(each[1])) == len(channels)]
         if readings:
-            _, places, pairs = max(readings)
-            return places, pairs
+            _, places, two = max(readings)
+            return places, two
     return None
 
 
@@ -135,10 +134,10 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
     for i, channel in channels.items():
         text = plain(channel.name)
         text = text if counters else COUNTER.sub("", text)
-        for key, letters, pairs, place, score in _marks(text):
-            label = (f"{key} {plain(channel.circuit)}" if full else key, letters, pairs)
+        for key, letters, two, place, score in _marks(text):
+            label = (f"{key} {plain(channel.circuit)}" if full else key, letters, two)
             buckets[label][place].append(i)
-            own = phase(channel)
+            own = phase(channel, (letters,)) or phase(channel)
             agrees = own == ("ab", "bc", "ca")[place] or own == "abc"[place]
             worth[label] = max(worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1))
     result, used = [], set()
@@ -150,9 +149,9 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
             if used & set(have):
                 continue
             used |= set(have)
-            pairs = label[2] or all(len(phase(channels[n])) == 2 for n in have)
+            two = label[2] or all(len(phase(channels[n])) == 2 for n in have)
             shared = shared_name([channels[n] for n in have])
-            result.append(Group(have, pairs, shared, worth[label] >= SURE, BY_NAME, missing))
+            result.append(Group(have, two, shared, worth[label] >= SURE, BY_NAME, missing))
     return result
 
 
@@ -164,28 +163,24 @@ def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]], s
 
 def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
     """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how likely)."""
-    for letters in ALPHABETS:
-        digits = letters == "123"
-        one, word = f"[{letters}]", r"\d" if digits else "[a-z]"
-        before = rf"(?:(?<!{word})|(?<=[{QUANTITY}l]))" if not digits else r"(?<!\d)"
-        for match in re.finditer(rf"{before}({one})[-_/ ]?l?({one})(?!{word}(?![ng]))", text):
-            x, y = letters.index(match[1]), letters.index(match[2])
-            if x != y and not (digits and not _quantity_before(text, match.start())):
-                place = PLACE["abc"[x] + "abc"[y]]
-                key = f"{text[: match.start()]}**{text[match.end() :]}"
-                yield f"{key}{'-' if (y - x) % 3 == 2 else ''}", letters, True, place, 6.0 - 2 * digits
+    for letters in ORDERS:
+        for mark in pairs(text, letters):
+            x, y = mark.places
+            backward = "-" if (y - x) % 3 == 2 else ""
+            key = f"{text[: mark.begin]}**{text[mark.end :]}{backward}"
+            yield key, letters, True, PLACE[mark.letters], 6.0 - 2 * (letters == DIGITS)
         yield from _single_marks(text, letters)
 
 
 def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int, float]]:
     """The readings of a name with one phase: a mark that stands alone, after a word ("HCSA"), or several times."""
-    digits = letters == "123"
+    digits = letters == DIGITS
     word, glued = (r"\d", r"(?<!\d)") if digits else ("[a-z]", "")
     marks: dict[int, list[tuple[int, float]]] = defaultdict(list)  # {place: [(where it stands, how likely)]}
     for match in re.finditer(rf"{glued}[{letters}](?!{word}(?<![ng]))", text):
         at = match.start()
         alone = digits or not text[:at][-1:].isalpha() or text[at - 1] in f"{QUANTITY}l"
-        score = 3.0 * _quantity_before(text, at) + 2 * (not digits) if alone else GLUED
+        score = 3.0 * quantity_before(text, at) + 2 * (not digits) if alone else GLUED
         marks[letters.index(match[0])].append((at, score))
     for place, several in marks.items():
         for size in range(1, min(len(several), MOST_MARKS) + 1):
@@ -194,24 +189,21 @@ def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int
                 yield key, letters, False, place, max(score for _, score in those)
 
 
-def _quantity_before(text: str, at: int) -> bool:
-    """Whether the letter of a quantity, standing alone but for an L or a line below, comes right before the mark."""
-    return bool(re.search(rf"(?<![a-z])[{QUANTITY}][_ ]?l?$", text[:at]))
-
-
 def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
-    """Groups by the file's phase column: in order, within a circuit."""
-    rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
-    for i, channel in channels.items():
-        mark = phase(channel)
-        if mark:
-            place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
-            rows[plain(channel.circuit), len(mark) == 2][place].append(i)
-    result = []
-    for (_, pairs), places in rows.items():
-        for have, missing in _sets(places, size):
-            shared = shared_name([channels[n] for n in have])
-            result.append(Group(have, pairs, shared, False, "the file's phases say so", missing))
+    """Groups by the file's phase column: in order, within a circuit; each channel in the first order that fits."""
+    result, used = [], set()
+    for letters in ORDERS:
+        rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+        for i, channel in channels.items():
+            mark = phase(channel, (letters,))
+            if mark and i not in used:
+                place = "abc".index(mark) if len(mark) == 1 else PLACE[mark]
+                rows[plain(channel.circuit), len(mark) == 2][place].append(i)
+        for (_, two), places in rows.items():
+            for have, missing in _sets(places, size):
+                shared = shared_name([channels[n] for n in have])
+                result.append(Group(have, two, shared, False, "the file's phases say so", missing))
+                used |= set(have)
     return result
 
 

@@ -1,0 +1,133 @@
+"""The marks of phases in names, one vocabulary for tables, phasors and channels: a phase, two phases, ground.
+
+A, B, C   L1, L2, L3   R, S, T   R, Y, B   R, W, B   U, V, W     AB   L1-L2   U_L1_L2   Ua-Ub   V_R-Y   V12   YB
+AN   L1N   A-G   1-PE     фаза А   A相   fase R     LL, line to line     LN, phase to ground
+"""
+
+import functools
+import re
+import unicodedata
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+ORDERS = ("abc", "rst", "uvw", "123", "ryb", "rwb")  # letters that stand for the phases, in their order
+DIGITS = "123"
+CYRILLIC = str.maketrans("авсеіо", "abceio")  # letters that look like Latin ones, as phases are often typed
+LATIN = {latin: other for other, latin in CYRILLIC.items()}
+QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
+GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
+SAID = (  # what is said in words, and the word that stands for it
+    (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])", " ll "),
+    (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])", " ln "),
+    (r"линейн\w*|междуфазн\w*|compuesta|compos[ée]e|verkettet\w*", " ll "),
+    (r"фазн\w*|strang\w*|stern", " ln "),
+    ("线电压", " ll 电压 "),
+    ("相电压", "相 ln 电压 "),
+)
+VOLTAGE = "voltage|volt|volts|spannung|tension|tensión|voltaje"
+PHASE = r"phasen?|phase|fase|фаза|фазы|фаз|相"
+LETTER = "a-zа-яёà-öø-ÿ"
+END = rf"(?=(?:rms|mag|ang|avg|max|min|m)?(?![{LETTER}\d]))"
+
+
+@dataclass(frozen=True)
+class PhaseMark:
+    """One reading of a name: which phases (0, 1, 2) a mark stands for, one or two, and where it stands."""
+
+    places: tuple[int, ...]
+    begin: int
+    end: int
+    ground: bool = False  # said to be between the phase and ground
+
+    @property
+    def letters(self) -> str:
+        """a, b, c of one phase, ab, bc, ca (or ba, cb, ac) of two."""
+        return "".join("abc"[place] for place in self.places)
+
+
+def plain(text: str) -> str:
+    """Lower case, full-width and Roman characters and look-alike Cyrillic letters as Latin ones."""
+    return unicodedata.normalize("NFKC", text).strip().lower().translate(CYRILLIC)
+
+
+@functools.cache
+def pair_pattern(letters: str) -> re.Pattern[str]:
+    """Two different phases of one order as a name writes them: AB, A-B, L1-L2, L1L2, Ua-Ub, R/Y."""
+    one, before = _beginning(letters)
+    word = r"\d" if letters == DIGITS else "[a-z]"
+    return re.compile(rf"{before}({one})(?:[-_/. ](?:[uve][_ ]?)?)?(l?)({one})(?!{word}(?![ng]))")
+
+
+def _beginning(letters: str) -> tuple[str, str]:
+    """(one letter of an order, what may stand before it) as patterns."""
+    before = r"(?<!\d)" if letters == DIGITS else rf"(?:(?<![a-z])|(?<=[{QUANTITY}l]))"
+    return f"[{letters}]", before
+
+
+def pairs(text: str, letters: str) -> Iterator[PhaseMark]:
+    """Each reading of two phases in a plain name; of two digits only where L, a quantity or a dash says so."""
+    pattern = pair_pattern(letters)
+    for match in filter(None, (pattern.match(text, at) for at in range(len(text)))):
+        places = letters.index(match[1]), letters.index(match[3])
+        if places[0] == places[1]:
+            continue
+        explicit = text[: match.start()].endswith("l") and bool(match[2])
+        dashed = match[0][1:2] in ("-", "/") and not re.search(r"[a-z\d.]$", text[: match.start()])
+        if letters != DIGITS or explicit or dashed or quantity_before(text, match.start()):
+            yield PhaseMark(places, match.start(), match.end())
+
+
+def quantity_before(text: str, at: int) -> bool:
+    """Whether a quantity, by its letter but for an L or a line below, or by its name, comes right before the mark."""
+    return bool(re.search(rf"(?<![a-z])(?:[{QUANTITY}][_ ]?l?|[uv](?:ll|rms)[_ ]?|{VOLTAGE}[_ ])$", text[:at]))
+
+
+def spell_marks(name: str, letters: str) -> tuple[str, bool]:
+    """(a name in plain letters with the mark of its phases as a, b, c or ab, bc, ca, whether ground is said).
+
+    `letters` is the order of phases of the table, in capitals where two letters side by side are no two phases (UU, UV,
+    UW); L1, L2, L3 mean the same in any.
+    """
+    name = unicodedata.normalize("NFKC", name).strip().lower()
+    for pattern, word in SAID:
+        name = re.sub(pattern, word, name)
+    one = f"[{letters.lower()}{letters.lower().translate(LATIN)}123]"
+    name = re.sub(rf"({PHASE})(?=[-_ ]?l?{one}(?![{LETTER}\d]))", " phase ", name)
+    name = re.sub(rf"(?<![a-z\d])({one})\s*相", r" phase \1 ", name)
+    text = name.translate(CYRILLIC)
+    for order in (letters, DIGITS):
+        mark = _found(text, order)
+        if mark is not None:
+            begin = mark.begin
+            if re.search(rf"(?:(?<![a-z])|(?<=(?<![a-z])[{QUANTITY}pq]))l$", text[:begin]):
+                begin -= 1
+            head = (
+                f"{name[: begin - 1]}u" if re.search(r"(?<![a-z])e$", text[:begin]) else name[:begin]
+            )  # E is a voltage
+            glue = "" if head[-1:].isascii() else " "
+            return f"{head}{glue}{mark.letters} {name[mark.end :]}", mark.ground
+    return name, False
+
+
+def _found(text: str, letters: str) -> PhaseMark | None:
+    """The mark of a name: two phases, else one to ground, else one that is no letter of a quantity by itself."""
+    digits, alone, letters = letters == DIGITS, letters.isupper(), letters.lower()
+    two = next((mark for mark in pairs(text, letters) if _ends(text, mark.end)), None)
+    two = None if alone and two is not None and two.end - two.begin == len("uv") else two
+    if two is not None:
+        return two
+    start = rf"(?:(?<![{LETTER}\d.])|(?<=(?<![a-z])[{QUANTITY}pql])|(?<=(?<![a-z])[{QUANTITY}pq]l)|(?<=rms))"
+    least = "l" if digits else ""  # "1 N" alone is no mark, "L1 N" and "U1N" are
+    if match := re.search(rf"{start}l?([{letters}])(?:[-_/]?(?:{GROUND}|0)| (?:n|g|pe|gnd)){END}", text):
+        sure = not digits or not match[0].endswith("0")
+        if sure and (not digits or least in text[: match.start() + 1] or quantity_before(text, match.start(1))):
+            return PhaseMark((letters.index(match[1]),), *match.span(), ground=True)
+    if digits:
+        return None
+    if match := re.search(rf"{start}([{letters}]){END}", text):
+        return PhaseMark((letters.index(match[1]),), *match.span())
+    return None
+
+
+def _ends(text: str, at: int) -> bool:
+    return re.compile(END).match(text, at) is not None
