@@ -133,11 +133,21 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def staged(progress: Progress = None) -> Iterator[Callable[[str], None]]:
-    """As `telling`, but a log file has a stage only once the call has taken `FIRST_LINE` seconds."""
+    """As `telling`, but a log file has a stage only once the call has taken `FIRST_LINE` seconds.
+
+    It stands with what is said of errors, so that the first line of the output is the answer.
+    """
     started = time.perf_counter()
-    with telling(progress) as show:
-        quick = not _lively() and not callable(progress)
-        yield lambda line: None if quick and time.perf_counter() - started < FIRST_LINE else show(line)
+    if _lively() or callable(progress) or progress is False:
+        with telling(progress) as show:
+            yield show
+        return
+
+    def show_late(line: str) -> None:
+        if time.perf_counter() - started >= FIRST_LINE:
+            print(f"  {shown(line)}", file=sys.stderr, flush=True)
+
+    yield show_late
 
 
 def tell(progress: Progress, lines: Iterable[str]) -> None:

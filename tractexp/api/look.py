@@ -334,7 +334,8 @@ def waves_serve(view: View, shown: Sight) -> bool:
     if view.recording is None or first is None:
         return False
     f = view.recording.frequency
-    there = next((s for s in view.recording.waveforms() if s.start <= first.start), None)
+    ends = [(s, s.start + (s.stop - s.first) / s.rate) for s in view.recording.waveforms()]
+    there = next((s for s, end in ends if s.start <= first.start and first.end <= end), None)
     fine = there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
     return fine and bool(smeared(first.end - first.start, first.U2 or 0.0, f))
 

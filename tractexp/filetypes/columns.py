@@ -165,13 +165,14 @@ def order_of(names: Sequence[str], units: Sequence[str]) -> str:
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     """What a column of that name and unit is, in a table with that order of phases; None for anything else."""
-    fractions = [word for word in (words := _words(name)) if word in FRACTIONS]
+    words = _words(name)
+    fractions = [word for word in words if word in FRACTIONS]
     for fraction in fractions:
         if not FRACTIONS[fraction] or len(words) == 1:
             return Role("frac", unit or FRACTIONS[fraction])
     kind = (meaning(unit) or ("",))[0]
-    electrical = kind in (*BY_UNIT, "angle") or any(WORDS.get(word) in BY_UNIT.values() for word in _words(name))
-    unmarked = None if electrical else _quantity(_words(name))
+    electrical = kind in (*BY_UNIT, "angle") or any(WORDS.get(word) in BY_UNIT.values() for word in words)
+    unmarked = None if electrical else _quantity(words)
     if unmarked and unmarked[0] not in BY_UNIT.values():
         return Role(unmarked[0], unit)
     spelled, ground = spell_marks(name, order)

@@ -26,14 +26,17 @@ class FileDip:
     result: Record | UserError
 
 
-def numbered(wholes: Sequence[Record], where: str, pre: float, post: float) -> list[FileDip]:
+def numbered(
+    wholes: Sequence[Record], where: str, pre: float, post: float, trigger: float | None = None
+) -> list[FileDip]:
     """The dips of records that follow each other, with at most `pre` and `post` [s] about the start of each.
 
-    A record never reaches into the dip before or after it. It is checked for an event, and not yet for its units.
+    `trigger` [s] is that of the recorder. A record never reaches into the dip before or after it. It is checked for an
+    event, and not yet for its units.
     """
     file_dips: list[FileDip] = []
     for whole in wholes:
-        t, dips = whole.t, find_dips(whole.t, whole.U)
+        t, dips = whole.t, find_dips(whole.t, whole.U, trigger)
         firsts, stops = [0, *(end for _, end in dips)], [*(start for start, _ in dips[1:]), whole.samples]
         for first, (start, end), stop in zip(firsts, dips, stops, strict=False):
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()

@@ -11,23 +11,55 @@ RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing,
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
+REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
+CERTAIN = 0.02  # s: what lasts so long at the start was before the event, and not a window that holds a part of it
+NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
 
 
-def find_dips(t: np.ndarray, U: np.ndarray) -> list[tuple[int, int]]:
+def starting_level(
+    t: np.ndarray, levels: np.ndarray, limits: np.ndarray, most: int, trigger: float | None = None
+) -> np.ndarray:
+    """The levels (K,) of voltages (K, N) at times t (N,) [s] from which the first event leaves, by more than `limits`.
+
+    That right before the recorder's trigger where it is steady; else that of the first samples, at most so many, or
+    of what precedes the first change where fewer do. Where less than a cycle does, what follows counts if it is higher.
+    """
+    if trigger is not None and CERTAIN < trigger - t[0] < NEAR_TRIGGER:
+        before = levels[:, (t < trigger - CERTAIN) & (t > trigger - CERTAIN - STEADY)]
+        last = before[:, -max(2, round(REFERENCE * (len(t) - 1) / (t[-1] - t[0]))) :]
+        middle = np.maximum(np.median(last, axis=1), 1e-12) if last.shape[1] > 1 else np.zeros(len(levels))
+        if last.shape[1] > 1 and (np.ptp(last, axis=1) <= limits * middle).all():
+            return middle
+    first = levels[:, :most]
+    middle = np.maximum(np.array([np.median(first[:, : k + 1], axis=1) for k in range(first.shape[1])]).T, 1e-12)
+    stays = (np.abs(first / middle - 1) <= limits[:, None] / 2).all(axis=0)
+    count = len(stays) if stays.all() else int(np.argmin(stays))
+    level = np.median(first[:, :count], axis=1)
+    if count == first.shape[1] or t[count - 1] - t[0] >= CERTAIN / 2 or len(t) < FEWEST_BEFORE:
+        return level
+    last = levels[:, t >= t[-1] - max(REFERENCE, (t[-1] - t[0]) / 5)]
+    middle = np.median(last, axis=1)
+    steady = (np.ptp(last, axis=1) <= limits * middle).all()
+    return np.maximum(level, middle) if steady else level
+
+
+def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> list[tuple[int, int]]:
     """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if never recovered.
 
     A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference that starts at
     the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips, and a
     swell leaves the reference where it was.
     """
-    return falls(t, U)[0]
+    return falls(t, U, trigger)[0]
 
 
-def falls(t: np.ndarray, U: np.ndarray) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
+def falls(
+    t: np.ndarray, U: np.ndarray, trigger: float | None = None
+) -> tuple[list[tuple[int, int]], list[tuple[int, int]]]:
     """(dips, swells) of a voltage (N,), both as (start, end) sample numbers."""
     margin = margin_of(U)
     block = max(FEWEST_BEFORE, round(0.1 * (len(t) - 1) / float(t[-1] - t[0])))
-    reference = float(np.median(U[:FEWEST_BEFORE]))
+    reference = float(starting_level(t, U[None], np.array([margin]), FEWEST_BEFORE, trigger)[0])
     dips: list[tuple[int, int]] = []
     swells: list[tuple[int, int]] = []
     k = 0

@@ -203,6 +203,33 @@ class Phasors:
         return np.sqrt(len(self.V)) * np.abs(self.V2)
 
 
+def joined(parts: Sequence[Phasors]) -> Phasors:
+    """Phasors that follow each other without a gap as one, evenly spaced by the widest of their steps.
+
+    The frame of each part is turned so that V1 goes on where the part before it ends; what no window saw at a change
+    of rate is interpolated.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    turned, angle = [], 1.0 + 0j
+    for part in parts:
+        if turned:
+            last, first = turned[-1].V1[-1], part.V1[0]
+            angle = np.exp(1j * (np.angle(last) - np.angle(first)))
+        turned.append(replace(part, V=part.V * angle, I=part.I * angle))
+    at = np.concatenate([part.t for part in turned])
+    step = max(float(part.t[1] - part.t[0]) for part in turned if len(part.t) > 1)
+    t = at[0] + step * np.arange(int((at[-1] - at[0]) / step + 1e-6) + 1)
+
+    def join(rows: Sequence[np.ndarray]) -> np.ndarray:
+        values = np.concatenate(rows, axis=-1)
+        return np.array([np.interp(t, at, row) for row in np.atleast_2d(values)]).reshape(*values.shape[:-1], len(t))
+
+    more = {name: join([part.more[name] for part in turned]) for name in turned[0].more}
+    V, I, f = (join([getattr(part, name) for part in turned]) for name in ("V", "I", "f"))
+    return Phasors(t, V, I, f, more)
+
+
 def measure(
     waves: WaveSource,
     rate: float,

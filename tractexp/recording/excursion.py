@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.fall import NOISE_FACTOR, RECOVERED, sample_noise
+from tractexp.record.fall import NOISE_FACTOR, RECOVERED, REFERENCE, sample_noise, starting_level
 from tractexp.record.record import DEAD
 from tractexp.recording.trace import Trace
 
@@ -22,7 +22,6 @@ TOGETHER = 1024  # half cycles that are compared with their reference at once
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
 LONGEST = 60.0  # s: what lasts longer is a new level
 ABRUPT = 3.0  # cycles within which a fault or a switch changes the voltage
-REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
 
 
 @dataclass(frozen=True)
@@ -40,8 +39,8 @@ class Excursion:
     cleared: bool = True  # a fault that ends otherwise than by opening one pole
 
 
-def excursions(trace: Trace) -> list[Excursion]:
-    """All excursions, in order of time."""
+def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
+    """All excursions, in order of time; `trigger` [s] is that of the recorder."""
     levels, limits = _levels(trace)
     if not levels.any() or len(trace.t) < 4:
         return []
@@ -53,7 +52,8 @@ def excursions(trace: Trace) -> list[Excursion]:
     if k > 0:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
         events.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
-    reference = _reference(levels, k, count)
+    reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
+    reference = np.maximum(reference, DEAD * levels.max(axis=1))
     while k < len(trace.t):
         inside, reference = _inside(levels[:, k : k + TOGETHER], limits, reference, trace.step)
         if inside:

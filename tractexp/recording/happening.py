@@ -5,13 +5,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.record.change import SMALL, Change, load_changes, runs
-from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, STEADY
+from tractexp.record.fall import FEWEST_BEFORE, REFERENCE, SHALLOWEST, STEADY
 from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.record.phasor import Phasors, WaveSource
 from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
+BEGUN = 2.0  # s from the record's beginning: what rises by more than a step within them ends a dip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
 SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
@@ -51,30 +52,29 @@ class Happening:
 
 
 def happenings(
-    waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors, with_currents: bool = True
+    waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors, trigger: float | None = None
 ) -> list[Happening]:
     """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from `start` [s] on.
 
-    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency. Where
-    no currents were recorded (not `with_currents`), those of the waveforms say nothing.
+    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency.
     """
-    trace = of_waves(waves, rate, start, nominal, phasors)
-    return _happenings(trace if with_currents else trace.without_currents())
+    return happenings_in(of_waves(waves, rate, start, nominal, phasors), trigger)
 
 
 def happenings_of(record: Record) -> list[Happening]:
     """The events in a record of t, U, P, Q and, where they are there, f and U2."""
-    return _happenings(of_record(record))
+    return happenings_in(of_record(record))
 
 
-def _happenings(trace: Trace) -> list[Happening]:
+def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]:
+    """The events in a trace, in order of time; `trigger` [s] is that of the recorder."""
     if len(trace.t) < 4:
         return []
     if _no_system(trace):
         whole = Excursion(0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True)
         return [replace(_describe(trace, "dead line", whole, []), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
-    outside = [e for e in excursions(trace) if not any(_part(trace, e, slip) for slip in slips)]
+    outside = [e for e in excursions(trace, trigger) if not any(_part(trace, e, slip) for slip in slips)]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
@@ -130,6 +130,11 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
         return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
+    if e.new_level and e.worst > STEP_AT_MOST and e.sudden and e.start * trace.step < BEGUN:
+        whole = e.reference * (1 + e.worst)  # what the voltage returns to: the record begins inside a dip
+        return [
+            ("dip", replace(e, start=0, worst=1 / (1 + e.worst) - 1, returned=True, new_level=False, reference=whole))
+        ]
     if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.new_level:
         return [("step" if e.sudden else "ramp", e)]
     if not e.sudden:
@@ -350,7 +355,8 @@ def _worth(
             "power is fed back, or the current is counted out of the load (then data.reverse_current=true makes it one)"
         )
         return False, f"{size}, but P is negative before it: {why}"
-    return True, f"{size}, {lead:.2g} s before it and the recovery are recorded"
+    short = f"; only the {1000 * lead:.0f} ms before it tell voltage and power before" if lead < REFERENCE else ""
+    return True, f"{size}, {lead:.2g} s before it and the recovery are recorded{short}"
 
 
 NO_SYSTEM = "the voltages are no three phases of this frequency: the line is dead, or other channels were meant"

@@ -12,14 +12,16 @@ from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
-from tractexp.record.phasor import Phasors
+from tractexp.record.phasor import Phasors, joined
 from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, buses_alone, propose
-from tractexp.recording.happening import OF_LOADS, Happening, happenings, happenings_of
+from tractexp.recording.happening import OF_LOADS, Happening, happenings_in, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.quality import Quality, quality, stamped
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
+from tractexp.recording.trace import joined as joined_traces
+from tractexp.recording.trace import of_waves
 from tractexp.recording.unit import check_doubt, in_doubt
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
@@ -226,24 +228,29 @@ def sight(
     if feeder.currents and any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
         return blank  # no kV, no MW
     try:
-        segments = recording.waveforms()
+        stretches = recording.stretches()
     except UserError as error:
         return replace(blank, said=(*said, str(error)))
-    for segment in segments:
-        try:
-            measured = bus.measure(recording, feeder, segment)
-        except UserError as error:
-            said.append(str(error))
-            continue
-        phasors.append(measured)
-        if events:
-            waves = FeederWaves.of(recording, feeder, segment)
-            timing = (segment.rate, segment.start, recording.frequency)
-            changes += happenings(waves, *timing, measured, with_currents=bool(feeder.currents))
+    for stretch in stretches:
+        parts, traces = [], []
+        for segment in stretch:
+            try:
+                measured = bus.measure(recording, feeder, segment)
+            except UserError as error:
+                said.append(str(error))
+                continue
+            parts.append(measured)
+            if events:
+                waves = FeederWaves.of(recording, feeder, segment)
+                trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
+                traces.append(trace if feeder.currents else trace.without_currents())
+        phasors += [joined(parts)] if parts else []
+        changes += happenings_in(joined_traces(traces), recording.trigger) if traces else []
     dips, refused = [], ""
     try:
+        streams = [(p, ()) for p in phasors]
         if changes and feeder.currents:
-            dips = reader.dips(feeder, [(p, None) for p in phasors], recording.frequency)
+            dips = reader.dips(feeder, streams, recording.frequency, recording.trigger)
     except UserError as error:
         refused = str(error)
     numbered = _numbered(changes, dips, reader.path, refused)

@@ -8,7 +8,7 @@ import functools
 import re
 import unicodedata
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 ORDERS = ("abc", "rst", "uvw", "123", "ryb", "rwb")  # letters that stand for the phases, in their order
 DIGITS = "123"
@@ -93,7 +93,7 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
         name = re.sub(pattern, word, name)
     one = f"[{letters.lower()}{letters.lower().translate(LATIN)}123]"
     name = re.sub(rf"({PHASE})(?=[-_ ]?l?{one}(?![{LETTER}\d]))", " phase ", name)
-    name = re.sub(rf"(?<![a-z\d])({one})\s*相", r" phase \1 ", name)
+    name = re.sub(rf"(?<![a-z\d])(l?{one})\s*相", r" phase \1 ", name)
     text = name.translate(CYRILLIC)
     for order in (letters, DIGITS):
         mark = _found(text, order)
@@ -110,6 +110,17 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
 
 
 def _found(text: str, letters: str) -> PhaseMark | None:
+    """The mark of a name; where U and V are phases, the first letter may be that of the quantity (U U-V, V_W)."""
+    quantity = re.search(r"(?<![a-z])[uv][ _(]*(?=[a-z])", text) if letters.lower() == "uvw" else None
+    if quantity is not None:
+        at = quantity.end()
+        mark = _first_mark(text[at:], letters)
+        if mark is not None and (letters.isupper() or mark.ground or len(mark.places) == 2):
+            return replace(mark, begin=mark.begin + at, end=mark.end + at)
+    return _first_mark(text, letters)
+
+
+def _first_mark(text: str, letters: str) -> PhaseMark | None:
     """The mark of a name: two phases, else one to ground, else one that is no letter of a quantity by itself."""
     digits, alone, letters = letters == DIGITS, letters.isupper(), letters.lower()
     two = next((mark for mark in pairs(text, letters) if _ends(text, mark.end)), None)

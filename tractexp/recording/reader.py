@@ -11,7 +11,7 @@ from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.overrides import assigned
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered
-from tractexp.record.phasor import Phasors
+from tractexp.record.phasor import Phasors, joined
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arranged, tuned
 from tractexp.recording.connection import usual
@@ -23,8 +23,9 @@ from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
 from tractexp.wording import counted
 
-Stream = tuple[Phasors, Waves | None]  # of one segment
+Stream = tuple[Phasors, Sequence[Waves]]  # of segments that follow each other without a gap
 BESIDE = 2  # cycles of waveforms stored beside a record's phasors, for the windows of its first and last
+BEFORE = 3  # cycles of one sampling rate before a dip that its waveforms have at least
 COUNT = {1: "one", 2: "two", 3: "three"}
 
 
@@ -72,19 +73,23 @@ class WaveformReader(Reader):
     def read(self) -> Events:
         recording = self.opened()
         feeder = self.feeder(recording)
-        dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency)
+        dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency, recording.trigger)
         events = chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
         identity = _identity(recording, feeder)
         groups = (events.train, events.validate)
         return Events(*([_in_memory(replace(r, identity=identity)) for r in group] for group in groups))
 
-    def dips(self, feeder: Feeder, streams: Sequence[Stream], frequency: float) -> list[FileDip]:
+    def dips(
+        self, feeder: Feeder, streams: Sequence[Stream], frequency: float, trigger: float | None = None
+    ) -> list[FileDip]:
         """The dips of one load, on one base: voltage and apparent power before the first that can be used.
 
         Raises `UserError` where there is none, and where the load carries no power.
         """
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
-        file_dips = numbered(wholes, self.path, self.pre, self.post)
+        file_dips = numbered(wholes, self.path, self.pre, self.post, trigger)
+        waves = [each for _, several in streams if len(several) > 1 for each in several]
+        file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:
             detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
         first = next((dip.result for dip in file_dips if isinstance(dip.result, Record)), None)
@@ -112,7 +117,7 @@ class WaveformReader(Reader):
             notes=plugin.chosen("connection", feeder.connection).notes,
             window=estimator_of(self.estimator).window(frequency),
             more=phasors.more,
-            waves=waves,
+            waves=waves[0] if len(waves) == 1 else None,
         )
 
     def feeder(self, recording: Recording) -> Feeder:
@@ -180,13 +185,26 @@ class WaveformReader(Reader):
         )
 
     def _streams(self, recording: Recording, feeder: Feeder) -> list[Stream]:
-        """The phasors and the waves of each segment that holds waveforms."""
-        settings, streams = (self.estimator, self.skew, self.harmonics), []
-        for segment in recording.waveforms():
-            phasors = phasors_of(recording, feeder, segment, *settings)
-            waves = FeederWaves.of(recording, feeder, segment)
-            late = waves.late if self.skew else None
-            streams.append((phasors, Waves(waves, segment.start, segment.rate, self.estimator, late)))
+        """The phasors and the waves of all that was sampled without a gap.
+
+        Raises `UserError` where no segment is long enough for phasors.
+        """
+        settings, streams, short = (self.estimator, self.skew, self.harmonics), [], []
+        for stretch in recording.stretches():
+            parts, several = [], []
+            for segment in stretch:
+                try:
+                    parts.append(phasors_of(recording, feeder, segment, *settings))
+                except UserError as error:
+                    short.append(error)
+                    continue
+                waves = FeederWaves.of(recording, feeder, segment)
+                late = waves.late if self.skew else None
+                several.append(Waves(waves, segment.start, segment.rate, self.estimator, late))
+            if parts:
+                streams.append((joined(parts), several))
+        if not streams:
+            raise short[0]
         return streams
 
     def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]) -> tuple[str, ...]:
@@ -214,6 +232,15 @@ def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
         fields[key] = ", ".join(recording.channels[i].name.strip() for i in numbers)
     fields["time"] = recording.start.isoformat() if recording.start else ""
     return {key: text for key, text in fields.items() if text}
+
+
+def _with_waves(dip: FileDip, waves: Sequence[Waves], frequency: float) -> Record | UserError:
+    """The record of a dip with the waves that show it from before its start to its end, of several sampling rates."""
+    if isinstance(dip.result, UserError) or dip.result.waves is not None:
+        return dip.result
+    lead = BEFORE / frequency
+    there = (each for each in waves if each.start + lead <= dip.start and dip.end <= each.end)
+    return replace(dip.result, waves=next(there, None))
 
 
 def _in_memory(record: Record) -> Record:

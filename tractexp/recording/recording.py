@@ -30,6 +30,7 @@ UNITS: Mapping[str, tuple[str, float]] = {
 }  # fmt: skip
 MEGA = {"MV": ("voltage", 1e3), "MA": ("current", 1e3)}  # which small letters would make milli
 CYRILLIC = str.maketrans("вВаАкКмМ", "vVaAkKmM")  # кВ, А
+UNBROKEN = 1.0  # cycle: a shorter hole between two sampling rates leaves one record
 FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitudes
 
 
@@ -163,6 +164,18 @@ class Recording:
                 f"{self.frequency:g} Hz are needed"
             )
         return fast
+
+    def stretches(self) -> list[list[Segment]]:
+        """The segments of `waveforms`, those that follow each other without a gap together."""
+        together: list[list[Segment]] = []
+        for segment in self.waveforms():
+            last = together[-1][-1] if together else None
+            end = None if last is None else last.start + (last.stop - last.first) / last.rate
+            if end is not None and abs(segment.start - end) < UNBROKEN / self.frequency:
+                together[-1].append(segment)
+            else:
+                together.append([segment])
+        return together
 
     def number(self, each: Any, where: str) -> int:
         """A channel's number, from 0, from its number or name; `where` is the setting in messages."""

@@ -1,7 +1,7 @@
 """A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers, second harmonic."""
 
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,6 +77,22 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
         np.sqrt(np.maximum(squares[K:] - offset**2, 0)),
         1 / nominal,
     )
+
+
+def joined(traces: Sequence[Trace]) -> Trace:
+    """Traces that follow each other without a gap as one; what no window saw at a change of rate is interpolated."""
+    if len(traces) == 1:
+        return traces[0]
+    at, step = np.concatenate([trace.t for trace in traces]), 0.5 * traces[0].cycle
+    t = np.arange(at[0], at[-1] + 1e-9, step)
+
+    def join(name: str) -> np.ndarray:
+        values = np.concatenate([getattr(trace, name) for trace in traces], axis=-1)
+        rows = [np.interp(t, at, row) for row in np.atleast_2d(values)]
+        return rows[0] if values.ndim == 1 else np.array(rows).reshape(len(values), len(t))
+
+    names = ("U", "phases", "U2", "P", "Q", "f", "I", "second", "content")
+    return Trace(t, **{name: join(name) for name in names}, cycle=traces[0].cycle)
 
 
 def half_cycle_rms(waves: WaveSource, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
