@@ -12,6 +12,7 @@ FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
 REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
+NO_STEP = 0.13  # of the voltage: no tap changer and no switched line raises it by more
 CERTAIN = 0.02  # s: what lasts so long at the start was before the event, and not a window that holds a part of it
 NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
 
@@ -22,7 +23,8 @@ def starting_level(
     """The levels (K,) of voltages (K, N) at times t (N,) [s] from which the first event leaves, by more than `limits`.
 
     That right before the recorder's trigger where it is steady; else that of the first samples, at most so many, or
-    of what precedes the first change where fewer do. Where less than a cycle does, what follows counts if it is higher.
+    of what precedes the first change where fewer do. Where less than a cycle does, what follows counts if it is higher;
+    and so it does where a record begins inside a dip, lower by more than a step, and most of it is at the later level.
     """
     if trigger is not None and CERTAIN < trigger - t[0] < NEAR_TRIGGER:
         before = levels[:, (t < trigger - CERTAIN) & (t > trigger - CERTAIN - STEADY)]
@@ -35,12 +37,14 @@ def starting_level(
     stays = (np.abs(first / middle - 1) <= limits[:, None] / 2).all(axis=0)
     count = len(stays) if stays.all() else int(np.argmin(stays))
     level = np.median(first[:, :count], axis=1)
-    if count == first.shape[1] or t[count - 1] - t[0] >= CERTAIN / 2 or len(t) < FEWEST_BEFORE:
-        return level
     last = levels[:, t >= t[-1] - max(REFERENCE, (t[-1] - t[0]) / 5)]
-    middle = np.median(last, axis=1)
-    steady = (np.ptp(last, axis=1) <= limits * middle).all()
-    return np.maximum(level, middle) if steady else level
+    after, usual = np.median(last, axis=1), np.median(levels, axis=1)
+    if len(t) < FEWEST_BEFORE or (np.ptp(last, axis=1) > limits * after).any():
+        return level
+    if count < first.shape[1] and t[count - 1] - t[0] < CERTAIN / 2:
+        return np.maximum(level, after)
+    begun = (np.abs(usual - after) <= limits * after).all() and (level > DEAD * after).all()
+    return after if begun and level[0] < (1 - NO_STEP) * after[0] else level
 
 
 def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> list[tuple[int, int]]:

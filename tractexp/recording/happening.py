@@ -12,7 +12,6 @@ from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
-BEGUN = 2.0  # s from the record's beginning: what rises by more than a step within them ends a dip
 STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
 SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
@@ -130,11 +129,6 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
         return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
-    if e.new_level and e.worst > STEP_AT_MOST and e.sudden and e.start * trace.step < BEGUN:
-        whole = e.reference * (1 + e.worst)  # what the voltage returns to: the record begins inside a dip
-        return [
-            ("dip", replace(e, start=0, worst=1 / (1 + e.worst) - 1, returned=True, new_level=False, reference=whole))
-        ]
     if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.new_level:
         return [("step" if e.sudden else "ramp", e)]
     if not e.sudden:
