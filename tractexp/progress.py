@@ -145,7 +145,7 @@ def staged(progress: Progress = None) -> Iterator[Callable[[str], None]]:
 
     def show_late(line: str) -> None:
         if time.perf_counter() - started >= FIRST_LINE:
-            print(f"  {shown(line)}", file=sys.stderr, flush=True)
+            print(f"  {one_line(line)}", file=sys.stderr, flush=True)
 
     yield show_late
 
