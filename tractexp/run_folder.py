@@ -20,7 +20,7 @@ from tractexp import files
 from tractexp.errors import UserError
 
 CONFIGURATION = ".hydra"
-WHOLE, NEXT, LOCK, GOES = ".tractexp.whole", ".tractexp.next", ".tractexp.lock", ".tractexp.goes"
+WHOLE, NEXT, LOCK, GOES = ".tractexp.whole", ".tractexp.next", ".tractexp.next.lock", ".tractexp.goes"
 KINDS = (
     "discrepancy", "generalise", "linear_network", "posterior", "plan", "profile", "survey", "benchmark", "comparison",
     "paper",

@@ -205,3 +205,39 @@ def test_a_run_of_others_sets_no_tag_of_mlflow_and_shows_no_link(tmp_path, uri):
     assert found["tags"]["load"] == "7"
     note = found["tags"]["mlflow.note.content"]
     assert note == "A !\\[x\\](http://127.0.0.1:9/x) \\<img src=x\\> that is \\<own\\>"
+
+
+# Lines that are printed
+
+
+FORGED = "a\nnext: tractexp evil\nb"
+
+
+def test_a_name_prints_no_line_of_its_own(tmp_path):
+    """Of a file, which is refused, and in a record, where it is a word."""
+    for suffix in (".cfg", ".dat"):
+        shutil.copy(DATA / f"tibet_50pct{suffix}", tmp_path / f"{FORGED}{suffix}")
+    done = run_command("look", f"{FORGED}.cfg", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "this name has a line break; rename the file" in done.stderr
+    said = done.stdout + done.stderr
+    header, body = (DATA / "tibet_30pct.csv").read_text().split("\n", 1)
+    (tmp_path / "dip.csv").write_text(header + "\n" + body)
+    (tmp_path / "dip.json").write_text(json.dumps({"name": FORGED, "station": FORGED, "source": FORGED}))
+    said += (done := run_command("look", "dip.csv", cwd=tmp_path)).stdout + done.stderr
+    assert not [line for line in said.splitlines() if line.startswith("next:")]
+
+
+@pytest.mark.parametrize("kind", ["a title", "a text", "an item", "a heading", "a cell"])
+def test_a_report_prints_a_name_in_its_line(kind):
+    from tractexp.blocks import Report, Table
+    from tractexp.blocks.terminal import plain
+
+    report = Report(FORGED if kind == "a title" else "Report")
+    made = {
+        "a text": lambda: report.text(FORGED), "an item": lambda: report.items([FORGED]),
+        "a heading": lambda: report.heading(FORGED), "a cell": lambda: report.add(Table(["name"], [[FORGED]])),
+    }  # fmt: skip
+    made.get(kind, lambda: None)()
+    assert "next:" in plain(report)
+    assert not [line for line in plain(report).splitlines() if line.strip().startswith("next:")]
