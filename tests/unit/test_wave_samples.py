@@ -5,7 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from tractexp.inference.blocks import blocks_of, quantile
+from tractexp.inference.blocks import blocks_of
+from tractexp.inference.interval import interval_factor
 from tractexp.record.record import Base
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import Periodic, _scale
@@ -80,5 +81,5 @@ def test_blocks_are_counted_from_the_start_of_each_dip():
     assert sum(b.stop - b.start for b in whole) == 2100
     assert sum(b.stop - b.start for b in after) == 2 * (1050 - 230)
     assert len(blocks_of(events, drive, parameters=20)) > 2 * len(whole)  # shorter ones, three for each parameter
-    assert quantile(2) == pytest.approx(12.706, rel=1e-4)
-    assert quantile(1000) == pytest.approx(1.962, rel=1e-3)
+    assert interval_factor(1) == pytest.approx(12.706, rel=1e-4)
+    assert interval_factor(999) == pytest.approx(1.962, rel=1e-3)
