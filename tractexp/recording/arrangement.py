@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -39,6 +40,10 @@ ANSWERS = (-110.0, 30.0)  # degrees of I2 / V2 of a passive load: inductive, at 
 ADDED = 0.02  # V2 over V1 that must be added before the answer in I2 counts
 FAULT = 2.5  # times the current before: more feeds a fault behind the current transformer, and says nothing of a load
 TURNED = "has the opposite polarity of the other two; mend its sign in the file (in a .cfg, that of its factor)"
+
+
+# {recording: its voltages to ground and their levels}, which are compared with those of each load
+_known_levels: WeakKeyDictionary[Recording, list[tuple[tuple[int, ...], float]]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,15 +210,34 @@ def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) ->
     fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
     if np.count_nonzero(fault) >= 2 and (_zero(live.V)[fault] < ZERO * V2[fault]).all():
         return f"the voltages add up to zero even in a fault to earth, where the currents do not: {used}"
-    volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage" and i not in feeder.voltages}
-    for group in groups(volts):
-        if len(group.numbers) == 3 and not group.pairs and _root3(recording, feeder.voltages, group.numbers):
-            others = ", ".join(_called(recording, i) for i in group.numbers)
+    size = _level(recording, feeder.voltages)
+    for numbers, other in _levels(recording):
+        alike = abs(size / max(other, 1e-12) / np.sqrt(3) - 1) < 5 * ROOT3
+        if alike and not {*numbers} & {*feeder.voltages} and _root3(recording, feeder.voltages, numbers):
+            others = ", ".join(_called(recording, i) for i in numbers)
             return f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
     level = float(np.median(V1[live.calm]))
     if is_between_phases(level) and not any(is_to_ground(recording.channels[i]) for i in feeder.voltages):
         return f"{level:.4g} kV is near a nominal voltage, and times sqrt 3 near none: {used}"
     return ""
+
+
+def _levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]:
+    """The voltages to ground of a recording, three by three, with their median positive sequence."""
+    if recording not in _known_levels:
+        volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage"}
+        three = [group.numbers for group in groups(volts) if len(group.numbers) == 3 and not group.pairs]
+        _known_levels[recording] = [(numbers, _level(recording, numbers)) for numbers in three]
+    return _known_levels[recording]
+
+
+def _level(recording: Recording, numbers: Sequence[int]) -> float:
+    """Median positive sequence of three voltages while they are alive; 0 where they have no waveform."""
+    windows = snapshots(recording, numbers)
+    if windows is None:
+        return 0.0
+    size = np.nan_to_num(np.abs(sequences(windows.of(numbers))[0]))
+    return float(np.median(size[size >= ALIVE * size.max()]))
 
 
 def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:

@@ -293,7 +293,7 @@ def _buses(
     buses = alive if alive and loaded else buses
     if len(buses) == 1:
         return [(buses[0], "the only ones alive")]
-    ties, why = _named_alike(recording, load, buses)
+    ties, why = _named_alike(recording, phasors, load, buses)
     if len(ties) == 1:
         return [(ties[0], why)]
     apart = max(_apart(phasors, a, b) for a, b in combinations(ties, 2))
@@ -309,9 +309,11 @@ def _buses(
     return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
 
 
-def _named_alike(recording: Recording, load: Group, buses: Sequence[Group]) -> tuple[list[Group], str]:
+def _named_alike(
+    recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]
+) -> tuple[list[Group], str]:
     """(the voltages whose names share most with those of the currents, what they share where it is one group)."""
-    texts = [_text(recording, each) for each in (load, *buses)]
+    texts = [phasors.remember(("text", *g.numbers), lambda g=g: _text(recording, g)) for g in (load, *buses)]
     own = sorted(texts[0])
     common = [sum(w in t for t in texts[1:]) for w in own]
     scores = [
@@ -376,6 +378,10 @@ def _single(
 
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     """Whether three voltages never turn as three phases do, in either order."""
+    return phasors.remember(("dead", *numbers), lambda: _never_turn(phasors, numbers))
+
+
+def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     if len(numbers) < 3:
         return not any(phasors.pure(i) for i in numbers)
     X = np.nan_to_num(phasors.of(numbers))

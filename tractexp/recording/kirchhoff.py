@@ -1,7 +1,6 @@
 """Feeders whose currents add up to nothing belong to one bus, as they are or with one counted the other way."""
 
 from dataclasses import replace
-from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -39,22 +38,31 @@ def _closed(phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]) -> t
     X = X[:, :, np.isfinite(X).all(axis=(0, 1))]
     if not X.size:
         return None
-    plain, each = np.ones(len(loaded)), np.arange(len(loaded))
-    tried = [plain, *(np.where(each == k, s, plain) for k in each for s in (0, -1))]
-    if len(loaded) > 4:
-        tried += [np.where(np.isin(each, pair), 0, plain) for pair in combinations(each, 2)]
-    tried = [signs for signs in tried if np.count_nonzero(signs) >= 3]
-    closes = [_closure(X, signs) for signs in tried]
-    if min(closes) >= CLOSES:
+    tried = _signs(len(loaded))
+    closes = _closures(X.reshape(len(X), -1), tried)
+    if closes.min() >= CLOSES:
         return None
-    simple = next(k for k in range(len(tried)) if closes[k] < max(CLOSES / 3, 2 * min(closes)))
-    return tried[simple], closes[simple]
+    simple = int(np.argmax(closes < max(CLOSES / 3, 2 * closes.min())))
+    return tried[simple], float(closes[simple])
 
 
-def _closure(X: np.ndarray, signs: np.ndarray) -> float:
-    """Sum of the currents over the sum of their magnitudes, root mean square over phases and time."""
-    total = np.tensordot(signs, X, axes=1)
-    return float(np.linalg.norm(total) / np.linalg.norm(np.tensordot(np.abs(signs), np.abs(X), axes=1)))
+def _signs(count: int) -> np.ndarray:
+    """Signs (T, count) that are tried: all as they are, one left out or turned round, and two left out of five."""
+    plain, each = np.ones(count), np.eye(count)
+    tried = [plain[None], *(plain - s * each[k : k + 1] for k in range(count) for s in (1, 2))]
+    if count > 4:
+        first, second = np.triu_indices(count, 1)
+        tried.append(plain - each[first] - each[second])
+    signs = np.concatenate(tried)
+    return signs[np.count_nonzero(signs, axis=1) >= 3]
+
+
+def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
+    """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean square over time."""
+    total, magnitudes = (X.conj() @ X.T).real, np.abs(X) @ np.abs(X).T
+    sums = np.maximum(((signs @ total) * signs).sum(axis=1), 0.0)
+    most = ((np.abs(signs) @ magnitudes) * np.abs(signs)).sum(axis=1)
+    return np.sqrt(sums / np.maximum(most, 1e-300))
 
 
 def _said(feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float) -> "list[Feeder]":

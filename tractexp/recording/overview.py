@@ -17,7 +17,7 @@ from tractexp.recording.arrangement import arranged
 from tractexp.recording.feeder import Feeder, buses_alone, propose
 from tractexp.recording.happening import OF_LOADS, Happening, happenings_in, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.quality import Quality, quality, stamped
+from tractexp.recording.quality import Quality, network_frequency, quality, stamped
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.trace import joined as joined_traces
@@ -137,8 +137,8 @@ class View:
         if recording is None:
             return []
         segment = max(recording.segments, key=lambda s: s.rate)
-        stamps = stamped(recording, segment)
-        return [quality(recording, number, segment, stamps) for number in range(len(recording.channels))]
+        stamps, f = stamped(recording, segment), network_frequency(recording)
+        return [quality(recording, k, segment, stamps, f) for k in range(len(recording.channels))]
 
     @functools.cached_property
     def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:

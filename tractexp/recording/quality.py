@@ -1,12 +1,13 @@
 """How well a channel was recorded, and what it is fit for."""
 
+import functools
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.record.change import runs
 from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
-from tractexp.recording.snapshot import frequency, nearest_nominal
+from tractexp.recording.snapshot import frequency, nearest_nominal, snapshots
 
 CLIPPED = 3  # samples in a row at the greatest or least value
 FLAT_TOP = 1e-4  # of the span: values so near each other are one value
@@ -45,15 +46,24 @@ class Quality:
     fit: str  # what it is fit for, one sentence
 
 
-def quality(recording: Recording, number: int, segment: Segment, stamps: tuple[float, int] | None = None) -> Quality:
-    """The quality of channel `number` in one segment of a recording, whose time stamps are as `stamped` says."""
+def quality(
+    recording: Recording,
+    number: int,
+    segment: Segment,
+    stamps: tuple[float, int] | None = None,
+    network: float | None = None,
+) -> Quality:
+    """The quality of channel `number` in one segment of a recording, whose time stamps are as `stamped` says.
+
+    `network` [Hz] is the frequency that the others show; a channel that is no wave of it is measured by itself.
+    """
     jitter, holes = stamps or stamped(recording, segment)
     channel = recording.channels[number]
     x = channel.values(segment.first, segment.stop)
     valid = np.isfinite(x)
     gaps = int(np.count_nonzero(~valid)) + holes
     step, span = _step(channel, x if valid.all() else x[valid])
-    f = _frequency(recording, number, segment)
+    f = _frequency(recording, number, segment, network)
     clipped = _clipped(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE))
     colour = _colour(lag, count, noise, step)
@@ -116,10 +126,20 @@ def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
     return 2 + int(2 * np.sqrt(2 * near / amplitude) * cycle / (2 * np.pi))
 
 
-def _frequency(recording: Recording, number: int, segment: Segment) -> float | None:
+def network_frequency(recording: Recording) -> float | None:
+    """The network's frequency [Hz] as the largest of a recording's channels shows it; None where none does."""
+    f = frequency(recording, [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"])
+    f = f or frequency(recording, range(len(recording.channels)))
+    return f if f is not None and nearest_nominal(f) is not None else None
+
+
+def _frequency(recording: Recording, number: int, segment: Segment, network: float | None) -> float | None:
     """The network's frequency [Hz] as this channel shows it, else as the others do; None for magnitudes."""
     if segment.rate < FEWEST_PER_CYCLE * 16:
         return None
+    seen = snapshots(recording, [number], network) if network else None
+    if seen is not None and seen.pure(number):
+        return network
     f = frequency(recording, [number])
     return f if f is not None and nearest_nominal(f) is not None else recording.frequency
 
@@ -145,17 +165,29 @@ def _quiet(
     part = x[first : first + n]
     if not np.isfinite(part).all():
         return none, none, none, none, 0, none
+    orders, Q, solve = _basis(n, rate, f)
+    coordinates = Q.T @ part
+    weights, rest = solve @ coordinates, part - Q @ coordinates
+    size = np.hypot(weights[2 : 2 + 2 * orders : 2], weights[3 : 3 + 2 * orders : 2]) / np.sqrt(2)
+    noise = float(np.sqrt(rest @ rest / max(n - Q.shape[1], 1)))
+    lag = float(rest[1:] @ rest[:-1] / (rest @ rest)) if rest.any() else none
+    thd = float(np.linalg.norm(size[1:]) / size[0]) if size[0] > 0 and len(size) > 1 else none
+    return float(weights[0]), float(size[0]), noise, lag, n, thd
+
+
+@functools.lru_cache(maxsize=8)
+def _basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
+    """(number of harmonics, orthonormal basis (n, K), what makes weights of coordinates in it (K, K)).
+
+    The columns before they are made orthonormal: mean, drift, cosine and sine of each harmonic, and the fundamental's
+    two with a slow change. All channels of a record share it.
+    """
     t = (np.arange(n) - (n - 1) / 2) / rate
     orders = [h for h in range(1, HARMONICS + 1) if h * f < 0.45 * rate]
     waves = [wave(2 * np.pi * h * f * t) for h in orders for wave in (np.cos, np.sin)]
     basis = np.column_stack([np.ones(n), t * rate / n, *waves, *(w * t * rate / n for w in waves[:2])])
-    weights, *_ = np.linalg.lstsq(basis, part, rcond=None)
-    rest = part - basis @ weights
-    size = np.hypot(weights[2 : 2 + 2 * len(orders) : 2], weights[3 : 3 + 2 * len(orders) : 2]) / np.sqrt(2)
-    noise = float(np.sqrt(rest @ rest / max(n - basis.shape[1], 1)))
-    lag = float(rest[1:] @ rest[:-1] / (rest @ rest)) if rest.any() else none
-    thd = float(np.linalg.norm(size[1:]) / size[0]) if size[0] > 0 and len(size) > 1 else none
-    return float(weights[0]), float(size[0]), noise, lag, n, thd
+    Q, R = np.linalg.qr(basis)
+    return len(orders), Q, np.linalg.pinv(R)
 
 
 def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
@@ -192,8 +224,9 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
         return 0
     change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
     starts = np.arange(0, len(change) - n + 1, max(cycle, 1))
-    energy = np.array([n * np.nan_to_num(x[s : s + n]).var() for s in starts])
-    changed = np.array([change[s : s + n].sum() for s in starts])
+    filled = np.nan_to_num(x)
+    energy = n * np.lib.stride_tricks.sliding_window_view(filled, n)[starts].var(axis=1)
+    changed = np.lib.stride_tricks.sliding_window_view(change, n)[starts].sum(axis=1)
     return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
 
 

@@ -1,11 +1,13 @@
 """Phasors of many channels at once, one window of a cycle after another: enough for an overview of a file."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from tractexp.recording.recording import FEWEST_PER_CYCLE, Recording, Segment
+from tractexp.recording.recording import FEWEST_PER_CYCLE, Channel, Recording, Segment
 
 NOMINAL = (50.0, 60.0, 50 / 3)  # Hz, of the networks there are
 OTHER_FREQUENCY = 0.06  # of the nominal one: what is farther off belongs to another
@@ -14,6 +16,12 @@ MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a lon
 PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
 LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
+
+
+# {recording: {(number, segment, f): (phasors, rest)}}: each load, bus and check of a file asks for the same channels
+_measured: WeakKeyDictionary[Recording, dict[tuple[int, Segment, float], tuple[np.ndarray, np.ndarray]]] = (
+    WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +33,7 @@ class Snapshots:
     X: np.ndarray  # (K, M) kV or kA; nan where samples are missing
     f: float  # Hz
     rest: np.ndarray  # (K, M) RMS of what is neither mean nor fundamental
+    remembered: dict[Any, Any] = field(default_factory=dict)  # answers that each load asks for again
 
     def of(self, numbers: Sequence[int]) -> np.ndarray:
         """The phasors (K, M) of some of the channels."""
@@ -41,6 +50,15 @@ class Snapshots:
 
     def size(self, numbers: Sequence[int]) -> float:
         """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
+        return self.remember(("size", *numbers), lambda: self._size(numbers))
+
+    def remember(self, key: Any, answer: Callable[[], Any]) -> Any:
+        """What was answered before, or the answer."""
+        if key not in self.remembered:
+            self.remembered[key] = answer()
+        return self.remembered[key]
+
+    def _size(self, numbers: Sequence[int]) -> float:
         size = np.nan_to_num(np.abs(self.of(numbers))).mean(axis=0)
         if not len(size):
             return 0.0
@@ -66,22 +84,30 @@ def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: 
     n = round(segment.rate / f)
     count = (segment.stop - segment.first) // n
     firsts = np.unique(np.linspace(0, count - 1, min(count, MOST_WINDOWS)).astype(int)) * n
-    phase = 2 * np.pi * f * np.arange(n) / segment.rate
+    start = segment.start + firsts / segment.rate
+    known = _measured.setdefault(recording, {})
+    every = [(number, segment, f) for number in numbers]
+    for each in every:
+        if each not in known:
+            X, rest = _of_channel(recording.channels[each[0]], segment, f, n, firsts, len(firsts) == count)
+            known[each] = (X * np.exp(-2j * np.pi * f * start), rest)
+    X, rest = (np.array([known[each][k] for each in every]) for k in (0, 1))
+    return start + (n - 1) / 2 / segment.rate, X, rest
+
+
+def _of_channel(
+    channel: Channel, segment: Segment, f: float, n: int, firsts: np.ndarray, whole: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Phasors (M,) and rest (M,) of one channel in windows of n samples, whose first are counted from the segment's."""
+    phase, begin = 2 * np.pi * f * np.arange(n) / segment.rate, segment.first
     basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
     inverse = np.linalg.pinv(basis)  # (3, n)
-    X, rest = np.empty((len(numbers), len(firsts)), complex), np.empty((len(numbers), len(firsts)))
-    whole = len(firsts) == count
-    for k, number in enumerate(numbers):
-        channel, begin = recording.channels[number], segment.first
-        if whole:
-            blocks = channel.values(begin, begin + count * n).reshape(count, n)
-        else:
-            blocks = np.array([channel.values(begin + i, begin + i + n) for i in firsts])
-        fitted = blocks @ inverse.T  # (M, 3)
-        X[k] = fitted[:, 1] + 1j * fitted[:, 2]
-        rest[k] = np.sqrt(np.mean((blocks - fitted @ basis.T) ** 2, axis=1))
-    start = segment.start + firsts / segment.rate
-    return start + (n - 1) / 2 / segment.rate, X * np.exp(-2j * np.pi * f * start), rest
+    if whole:
+        blocks = channel.values(begin, begin + len(firsts) * n).reshape(len(firsts), n)
+    else:
+        blocks = np.array([channel.values(begin + i, begin + i + n) for i in firsts])
+    fitted = blocks @ inverse.T  # (M, 3)
+    return fitted[:, 1] + 1j * fitted[:, 2], np.sqrt(np.mean((blocks - fitted @ basis.T) ** 2, axis=1))
 
 
 def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
