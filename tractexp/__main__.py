@@ -87,6 +87,11 @@ def _asked(arguments: list[str]) -> int:
         from tractexp.cli.again import again
 
         return _run(again(arguments[1:]))
+    if arguments[:1] and os.path.isdir(arguments[0]):
+        from tractexp.cli.folder import choose_command
+
+        survey = choose_command(*arguments)
+        return _run(survey) if survey else 0
     if arguments[:1] and _is_file(arguments[0]):
         return _command(COMMANDS["look"], arguments)
     if {"--help", "-h"} & {*arguments}:

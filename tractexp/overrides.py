@@ -18,6 +18,7 @@ OPEN = (
 NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
 MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
 MODEL = "model"  # the group
+OPTIONS = ("-", "~", "+", "")  # what begins an argument that needs no value
 CONFIG_FOLDER = ("--config-dir", "-cd")
 DEEPEST = 20  # brackets within one another
 NEEDED = ("seed", "budget", "time_limit", "target", "task", "model", "optimizer", "data", "objective", "tracking")
@@ -32,8 +33,12 @@ def overrides(arguments: Iterable[str]) -> list[str]:
 
     `model/motor=[a,b]` is several motors, for which Hydra would merge the settings of both.
     """
+    arguments = [*arguments]
+    for before, argument in itertools.pairwise(["", *arguments]):
+        if "=" not in argument and argument[:1] not in OPTIONS and before[:1] != "-":
+            _refuse_word(argument)
     result = []
-    for argument in _name_model_file([*arguments]):
+    for argument in _name_model_file(arguments):
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
             result += _several(group, value)
@@ -41,6 +46,16 @@ def overrides(arguments: Iterable[str]) -> list[str]:
             _check(argument, group, value)
             result.append(override(argument))
     return result
+
+
+def _refuse_word(word: str) -> None:
+    """Raise `UserError` for an argument that is neither KEY=VALUE nor anything else that could be meant."""
+    from tractexp.choices import elsewhere
+
+    raise UserError(
+        f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or folder that is"
+        f" there{elsewhere('', word)}; tractexp --help shows what there is"
+    )
 
 
 def _check(argument: str, key: str, value: str) -> None:

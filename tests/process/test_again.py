@@ -65,6 +65,48 @@ def test_its_result_is_exported_without_naming_it(folder):
     assert (folder / "export" / "load.dyr").is_file()
 
 
+def test_a_result_may_be_named_by_the_folder_of_its_run(folder):
+    for parameters in ("first", "first/result.json"):
+        arguments = ["task=export", "task.format=psse_dyr", f"task.parameters={parameters}", "hydra.run.dir=by_folder"]
+        done = run_command(*arguments, cwd=folder)
+        assert done.returncode == 0, done.stderr
+        assert (folder / "by_folder" / "load.dyr").is_file()
+    (folder / "empty").mkdir()
+    done = run_command("task=export", "task.format=psse_dyr", "task.parameters=empty", cwd=folder)
+    assert (done.returncode, "there is no result file empty/result.json" in done.stderr) == (2, True)
+
+
+def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_path):
+    (tmp_path / "records").mkdir()
+    for name in ("tibet_30pct", "tibet_50pct"):
+        (tmp_path / "records" / f"{name}.csv").write_bytes(
+            (Path(tractexp.data.__file__).parent / f"{name}.csv").read_bytes()
+        )
+    done = run_command("records", "tracking.enabled=false", "hydra.run.dir=table", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("that is: tractexp task=survey data.path=records")
+    assert len((tmp_path / "table" / "survey.csv").read_text(encoding="utf-8").splitlines()) == 3
+    done = run_command("table", cwd=tmp_path)
+    assert done.stdout == f"page: {tmp_path / 'table' / 'survey.html'}\n"
+    done = run_command("empty", cwd=folder)
+    assert (done.returncode, "holds no file that can be read" in done.stderr) == (2, True)
+
+
+@pytest.mark.parametrize(
+    ("word", "end"),
+    [
+        ("identify", ", but there is task=identify; tractexp --help shows what there is"),
+        ("pso", ", but there is optimizer=pso; tractexp --help shows what there is"),
+        ("nonsense", "that is there; tractexp --help shows what there is"),
+    ],
+)
+def test_a_word_that_is_nothing_is_told_what_it_looked_like(word, end, tmp_path):
+    done = run_command(word, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"tractexp: {word} is no setting (KEY=VALUE), no command, and no file or folder")
+    assert done.stderr.strip().endswith(end)
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [

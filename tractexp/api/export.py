@@ -126,14 +126,14 @@ class Export(Task, call=export, given=("fit",)):
 
     instead = {"model": "the model is that of task.parameters"}
 
-    # path of a result.json; of parameters that a model has, a task has none
+    # path of a result.json, or of its run's folder; of parameters that a model has, a task has none
     parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
     format: str = ""  # andes, psse_dyr, modelica, or a format of an installed package
 
     def run(self, job: Job) -> None:
         if self.parameters is None:
             raise UserError(
-                f"{TASK.parameters} is not given; it is the path of a result.json, which task=identify writes"
+                f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of the run that wrote it"
             )
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)

@@ -202,7 +202,7 @@ class Simulate(Task, call=simulate):
         "data": "with task.depth no record is played",
     }
 
-    # path of a result.json; of parameters that a model has, a task has none
+    # path of a result.json, or of its run's folder; of parameters that a model has, a task has none
     parameters: str | None = None  # pyright: ignore[reportIncompatibleVariableOverride]
 
     def needless(self) -> tuple[str, ...]:

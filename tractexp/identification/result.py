@@ -30,6 +30,7 @@ from tractexp.record.own_base import scaled
 TRAIN, VALIDATE = "train", "validate"
 BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady state stands on
 SMALL_Q = 0.3  # of S: with less, an epsilon_q beyond Eq. (20) may be a small error of the load
+FILE = "result.json"  # in the folder of a run
 
 
 def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float | str | None]:
@@ -243,7 +244,9 @@ def write_history(path: Path, history: History) -> Path:
 
 
 def load(path: Path) -> Result:
-    """Read a `result.json`. Raises `UserError` where it is missing or not one of ours."""
+    """Read a `result.json`, or that of a run's folder. Raises `UserError` where it is missing or not one of ours."""
+    if path.is_dir():
+        path = path / FILE
     try:
         return Result.of(files.read_json(path), str(path))
     except FileNotFoundError:

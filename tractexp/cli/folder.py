@@ -1,0 +1,22 @@
+"""`tractexp FOLDER`: the page of a run that is in it; of a folder of recordings, the table of what happened."""
+
+from pathlib import Path
+
+from tractexp import quoting
+from tractexp.cli.configuration import RESULTS
+from tractexp.overrides import assigned
+from tractexp.progress import say
+
+PAGES = tuple(name for name in (*RESULTS, "look.html") if name.endswith(".html"))
+
+
+def choose_command(folder: str, *settings: str) -> list[str]:
+    """The arguments that survey a folder by these settings; [] where it holds pages of a run, which are told instead."""
+    pages = [path for name in PAGES if (path := Path(folder, name).absolute()).is_file()]
+    for page in pages:
+        say(f"page: {page}")
+    if pages:
+        return []
+    arguments = ["task=survey", assigned("data.path", folder), *settings]
+    say(f"that is: {quoting.shell('tractexp', *arguments)}")
+    return arguments
