@@ -79,9 +79,7 @@ def test_a_result_may_be_named_by_the_folder_of_its_run(folder):
 def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_path):
     (tmp_path / "records").mkdir()
     for name in ("tibet_30pct", "tibet_50pct"):
-        (tmp_path / "records" / f"{name}.csv").write_bytes(
-            (Path(tractexp.data.__file__).parent / f"{name}.csv").read_bytes()
-        )
+        shutil.copy(Path(tractexp.data.__file__).with_name(f"{name}.csv"), tmp_path / "records")
     done = run_command("records", "tracking.enabled=false", "hydra.run.dir=table", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("that is: tractexp task=survey data.path=records")

@@ -23,6 +23,7 @@ from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
 from tractexp.errors import MODEL, UserError, check_range
+from tractexp.identification.adequacy import Grade
 from tractexp.identification.result import Result, conclude, refuse_failed
 from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
@@ -235,13 +236,14 @@ class Investigation(Written):
 
         return discrepancy.report(self.steps, self.content, self.result.identities)
 
-    def write_results(self, folder: Path) -> list[Path]:
-        """discrepancy.json and result.json.
+    def write_results(self, folder: Path, home: Path | None = None) -> list[Path]:
+        """discrepancy.json and result.json; `home` is the folder that the files will be in, by default `folder`.
 
         conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
         a term where one is proposed.
         """
         from tractexp.discrepancy import discrepancy_json
+        from tractexp.discrepancy.discrepancy_json import MODEL_FILE
 
         model = self.question.model
         known = {"bounds": model.bounds, "fixed": model.fixed, "substeps": model.substeps, "priors": model.priors}
@@ -251,7 +253,9 @@ class Investigation(Written):
             self.result.write(folder / "result.json"),
         ]
         if self.names:
-            paths.append(discrepancy_json.write_model(self.steps, base, folder / "conf" / "model" / "extended.yaml"))
+            paths.append(
+                discrepancy_json.write_model(self.steps, base, folder / MODEL_FILE, (home or folder) / MODEL_FILE)
+            )
         if not self.complete:
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
         if self.content["proposal"]:
@@ -353,6 +357,21 @@ def _estimated(question: Question, steps: "Steps") -> Result:
     return replace(result, adequacy=graded.adequacy.to_dict(), shown_effects=dict(base.shown))
 
 
+def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str]:
+    """The commands that go on from the files of an investigation, {name: path}, each with what it does."""
+    from tractexp.discrepancy.discrepancy_json import MODEL_FILE, PLUGIN, adopt_term, investigate_with, use_of
+
+    lines, domain = [], result.question.model.domain
+    if model := paths.get(MODEL_FILE.name):
+        which = f", which has {joined(result.names)}" if result.verdict == "tied" else ""
+        lines.append(f"use the extended model{which}: {use_of(domain, model)}")
+        if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
+            lines.append(f"use it as the base model: {investigate_with(domain, model)}")
+    if term := paths.get(PLUGIN):
+        lines.append(f"use the proposed term: {adopt_term(term)}")
+    return lines
+
+
 @plugin
 class Discrepancy(Task, call=investigate):
     """Investigate the training events and judge what is found on the held-out ones."""
@@ -369,10 +388,8 @@ class Discrepancy(Task, call=investigate):
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
-        from tractexp.discrepancy.discrepancy_json import use_of
-
         assert isinstance(result, Investigation)
-        results = job.write(result.write_results)
+        results = job.write(functools.partial(result.write_results, home=job.folder))
         paths = {path.name: path for path in (*results, *result.write_drawings(job.folder))}
         say()
         show(result.summary(), console())
@@ -380,10 +397,9 @@ class Discrepancy(Task, call=investigate):
             say(f"page: {page}")
         beside = sorted(str(path.relative_to(job.folder)) for name, path in paths.items() if name != result.page)
         say(f"beside it: {', '.join(beside)}")
-        conf = job.folder / "conf"
-        if model := paths.get("extended.yaml"):
-            which = f", which has {joined(result.names)}" if result.verdict == "tied" else ""
-            say(f"use the extended model{which}: {use_of(result.question.model.domain, model)}")
+        for line in _next_commands(result, paths):
+            say(line)
+        conf, model = job.folder / "conf", paths.get("extended.yaml")
         artifacts = [*(p for p in paths.values() if conf not in p.parents), *([conf] if model else [])]
         content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))

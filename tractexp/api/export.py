@@ -133,7 +133,8 @@ class Export(Task, call=export, given=("fit",)):
     def run(self, job: Job) -> None:
         if self.parameters is None:
             raise UserError(
-                f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of the run that wrote it"
+                f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of the run that"
+                " wrote it"
             )
         fit = Identification(load(Path(self.parameters)))
         exported = self.perform(job, fit=fit)

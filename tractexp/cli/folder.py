@@ -3,15 +3,15 @@
 from pathlib import Path
 
 from tractexp import quoting
-from tractexp.cli.configuration import RESULTS
 from tractexp.overrides import assigned
 from tractexp.progress import say
+from tractexp.run_folder import RESULTS
 
 PAGES = tuple(name for name in (*RESULTS, "look.html") if name.endswith(".html"))
 
 
 def choose_command(folder: str, *settings: str) -> list[str]:
-    """The arguments that survey a folder by these settings; [] where it holds pages of a run, which are told instead."""
+    """The arguments that survey a folder by these settings; [] where it holds a run's pages, which are told instead."""
     pages = [path for name in PAGES if (path := Path(folder, name).absolute()).is_file()]
     for page in pages:
         say(f"page: {page}")

@@ -24,6 +24,7 @@ from tractexp.provenance import again
 from tractexp.wording import joined
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
+MODEL_FILE = Path("conf", "model", "extended.yaml")  # beside the page
 
 
 def content(investigation: Findings) -> dict[str, Any]:
@@ -52,7 +53,7 @@ def content(investigation: Findings) -> dict[str, Any]:
         "base_adequacy": investigation.base_grade.adequacy.to_dict(),
         "adequacy": investigation.final_grade.adequacy.to_dict(),
         "held": investigation.held,
-        "extended": "conf/model/extended.yaml" if investigation.names else None,
+        "extended": MODEL_FILE.as_posix() if investigation.names else None,
         "noise": investigation.context.describe(investigation.last.noise),
         "phasor_window": None if window is None else window.window,
         "recorder_window": recorder_window(investigation),
@@ -68,9 +69,7 @@ def recommendation(investigation: Findings) -> str:
     if chosen is not None and investigation.verdict.word == TIED:
         return chosen.sentence()
     if (proposal := investigation.proposed.proposal) is not None:
-        sentence = (
-            f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model (docs/missing-effects.md)"
-        )
+        sentence = f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model"
         return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
         if investigation.by_likelihood.open:
@@ -80,7 +79,7 @@ def recommendation(investigation: Findings) -> str:
         return "look at what is left (unexplained.csv) and at what switched at that time"
     if investigation.verdict.word == NAMED:
         if investigation.final_grade.adequacy.grade is not Grade.ADEQUATE:
-            return "find what is missing still: investigate further events, or the extended model as the base model"
+            return "find what is missing still: by further events, or with the extended model as the base model"
         held = investigation.held
         rest = f"; these events cannot tell {joined(list(held))}, which it holds" if held else ""
         return f"use the extended model{rest}; judge it on further events as they come"
@@ -237,10 +236,21 @@ def use_of(domain: str, model: Path | str) -> str:
     return again(*DOMAINS[domain].setting.split(), f"model={model}", of=("data",))
 
 
-def write_model(investigation: Findings, node: Mapping[str, Any], path: Path) -> Path:
+def investigate_with(domain: str, model: Path | str) -> str:
+    """The command that investigates the model of a file as the base model, by the records and settings of this run."""
+    return again("task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task"))
+
+
+def adopt_term(plugin: Path) -> str:
+    """The command that makes a package of the plugin of a proposed term."""
+    return quoting.shell("tractexp", "new", "effect", generate.NAME, "--from", str(plugin))
+
+
+def write_model(investigation: Findings, node: Mapping[str, Any], path: Path, home: Path | None = None) -> Path:
     """Write the extended model with all that the investigation took into account, as a file that is a model by itself.
 
-    `node` is the base model: parts, bounds, fixed values and what else is not as usual.
+    `node` is the base model: parts, bounds, fixed values and what else is not as usual. `home` is the path by which its
+    first line names the file, by default where it is written.
     """
     effects = sorted({*node.get("effects", ()), *investigation.names})
     settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
@@ -255,7 +265,8 @@ def write_model(investigation: Findings, node: Mapping[str, Any], path: Path) ->
     extended |= {key: node[key] for key in ("integration", "domain", "substeps", "priors") if node.get(key)}
     if window is not None:
         extended["window"] = window
-    lines = [use_of(investigation.context.load.domain, path.absolute()), *_explain_model(investigation, node, held)]
+    command = use_of(investigation.context.load.domain, (home or path).absolute())
+    lines = [command, *_explain_model(investigation, node, held)]
     comments = "".join(f"# {quoting.comment(line)}\n" for line in lines)
     return files.write(path, comments + quoting.yaml(extended))
 

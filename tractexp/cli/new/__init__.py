@@ -18,6 +18,7 @@ KINDS = {  # {kind: (group, how the plugin is chosen)}
     "motor": ("model/motor", "model/motor={}"),
     "optimizer": ("optimizer", "optimizer={}"),
 }
+PROPOSED = "class ProposedEffect("  # in the plugin of a proposed term
 PROJECT = """\
 [build-system]
 requires = ["setuptools>=65"]
@@ -52,17 +53,22 @@ def new(arguments: list[str]) -> int:
     parser = argparse.ArgumentParser(prog="tractexp new", description=about)
     parser.add_argument("kind", choices=KINDS)
     parser.add_argument("name", metavar="NAME", help="such as motor_heating: what configurations call it")
+    parser.add_argument("--from", dest="source", type=Path, metavar="FILE", help="an effect proposed by tractexp")
     options = parser.parse_args(arguments)
-    package = written(options.kind, options.name, Path())
-    print(f"wrote {package}: the plugin is {package / package.name / options.name}.py; put your equations into it")
+    package = written(options.kind, options.name, Path(), options.source)
+    put = "read it before you use it" if options.source else "put your equations into it"
+    print(f"wrote {package}: the plugin is {package / package.name / options.name}.py; {put}")
     print(f"  cd {package} && python -m pytest        tests whether it is a sound plugin")
     print(f"  python -m pip install -e {package}      installs it; then choose it by", end=" ")
     print(KINDS[options.kind][1].format(options.name))
     return 0
 
 
-def written(kind: str, name: str, folder: Path) -> Path:
-    """Write the package of a plugin into `folder`; its own folder. Raises `UserError` as `new`."""
+def written(kind: str, name: str, folder: Path, source: Path | None = None) -> Path:
+    """Write the package of a plugin into `folder`; its own folder. Raises `UserError` as `new`.
+
+    The plugin is our example of that kind, or what stands in the file `source` of a proposed term.
+    """
     group, _ = KINDS[kind]
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise UserError(
@@ -78,8 +84,7 @@ def written(kind: str, name: str, folder: Path) -> Path:
     if place.exists():
         raise UserError(f"{place} is there already and is not overwritten; take another name, or another folder")
     title = "".join(word.capitalize() for word in name.split("_"))
-    code = Path(__file__).with_name(f"{kind}.py").read_text(encoding="utf-8")
-    code = code.replace("Example", title).replace("example", name)
+    code = _copy_proposal(source, title) if source else _copy_example(kind, name, title)
     contents = {
         "pyproject.toml": PROJECT.format(package=package), f"test_{name}.py": TEST.format(package=package),
         f"{package}/__init__.py": f'"""The plugin {name} for tractexp."""\n', f"{package}/{name}.py": code,
@@ -87,3 +92,17 @@ def written(kind: str, name: str, folder: Path) -> Path:
     for path, text in contents.items():
         files.write(place / path, text)
     return place
+
+
+def _copy_example(kind: str, name: str, title: str) -> str:
+    code = Path(__file__).with_name(f"{kind}.py").read_text(encoding="utf-8")
+    return code.replace("Example", title).replace("example", name)
+
+
+def _copy_proposal(source: Path, title: str) -> str:
+    """The text of a proposed term's plugin, its class named anew. Raises `UserError` for what is none."""
+    files.check_there(source)
+    code = files.read(source).decode(errors="replace")
+    if PROPOSED not in code:
+        raise UserError(f"{source} is no term that tractexp has proposed (task=discrepancy writes proposed_effect.py)")
+    return code.replace(PROPOSED, f"class {title}(")
