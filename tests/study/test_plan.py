@@ -231,3 +231,22 @@ def test_the_plan_task_refuses_bad_input_in_one_sentence(arguments, sentence, tm
     assert done.returncode != 0
     assert sentence in done.stderr
     assert done.stderr.count("\n") == 1, done.stderr
+
+
+def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
+    """A motor that stalls: sensitivities beyond all numbers overflow nowhere, and add nothing to what is known."""
+    from tractexp.inference.likelihood import Likelihood
+
+    (known,) = each(problem, study.TYPICAL)
+    computed = Likelihood.jacobian
+
+    def diverging(self, unit):
+        rows, J = computed(self, unit)
+        return rows, replace(J, columns=J.columns * 1e200)
+
+    monkeypatch.setattr(Likelihood, "jacobian", diverging)
+    planned = forecast(problem, study.TYPICAL, SHAPE, known)
+    alone = forecast(problem, study.TYPICAL, SHAPE)
+    monkeypatch.undo()
+    assert planned.half == pytest.approx(combined([known]).standard_errors * planned.half[0] / known.standard_errors[0])
+    assert not np.isfinite(alone.half).any()

@@ -144,7 +144,7 @@ def test_a_swell_alone_is_refused_and_said():
 
 
 def test_a_record_that_starts_inside_the_dip_is_refused():
-    with pytest.raises(UserError, match="the dip starts at sample 1 .*give a record that starts earlier"):
+    with pytest.raises(UserError, match=r"the dip starts at sample 1 .*give a record that starts earlier"):
         detect(dip(start=-0.05, sigma=0.0))
 
 

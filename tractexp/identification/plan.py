@@ -19,6 +19,7 @@ from tractexp.noise import Autoregression, Noise
 from tractexp.record import Event
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
+DIVERGED = 1e100  # whitened sensitivities beyond which a calculation has left all numbers that mean anything
 DEPTHS = np.arange(0.05, 0.951, 0.025)
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
@@ -142,7 +143,9 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
         raise UserError(f"nothing can be planned at these parameters: {refusal}")
     likelihood = Likelihood.of(problem, noise)
     _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
-    width, rows = problem.upper - problem.lower, J.without_own
+    width = problem.upper - problem.lower
+    diverges = not np.abs(J.columns).max() < DIVERGED  # a dip in which the motor stalls tells nothing
+    rows = np.zeros_like(J.columns[: J.k].T) if diverges else J.without_own
     return [Information(problem.space.names, np.asarray(values), width, rows[own]) for own in J.rows]
 
 
