@@ -37,7 +37,7 @@ from tractexp.tracking import TrackedRun, runfile, sync
 
 CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")  # of `os`: each changes what is on the disk
 URI = "sqlite:////nowhere/mlflow.db"
-SEEDS, MOMENTS = st.integers(1, 4), st.integers(1, 90)
+SEEDS, MOMENTS = st.integers(1, 4), st.integers(1, 160)
 COUNTS: collections.Counter[str] = collections.Counter()
 STATES: set[tuple[bool, ...]] = set()
 

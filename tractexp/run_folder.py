@@ -83,7 +83,7 @@ def run_folder(folder: Path, configuration: Mapping[str, str], read: frozenset[P
 
     What an ended process left is mended first; what this one leaves is removed at the end.
     """
-    with _claimed(folder):
+    with hold(folder):
         _settle(folder)
         for left in folder.glob(f"{NEXT}.*"):
             if left.is_dir() and not left.is_symlink():
@@ -105,13 +105,20 @@ def settle(folder: Path) -> bool:
     """
     if not (folder / WHOLE).is_dir():
         return False
-    with _claimed(folder):
+    with hold(folder):
         return _settle(folder)
 
 
-def _claimed(folder: Path) -> contextlib.AbstractContextManager[None]:
+@contextlib.contextmanager
+def hold(folder: Path) -> Iterator[None]:
+    """Hold a folder, created where there is none, for this process alone. Raises `UserError` where another does."""
     since = time.strftime("%Y-%m-%d %H:%M:%S")
-    return files.claimed(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}")
+    try:
+        with files.claimed(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"):
+            yield
+    finally:
+        with contextlib.suppress(OSError):  # where it is not empty
+            folder.rmdir()
 
 
 def _settle(folder: Path) -> bool:

@@ -229,3 +229,69 @@ def test_every_shape_of_a_file_is_read_left_or_refused(name, made, read, tmp_pat
         found[shape] = outcome(read, folder)
         shutil.rmtree(tmp_path / str(k))
     assert {shape: why for shape, why in found.items() if why} == {}
+
+
+# Fuzzing that knows structure: a tree as it should be, of which a few nodes are exchanged, taken out or added
+
+POOL = (
+    None, True, 0, -1, 2**70, 1e308, "", "x", "${oc.env:HOME}", "../..", "\x1b[31mred", "a\nnext: b", [], {}, [[]],
+    {"a": None}, {"_target_": "os.system"}, "x" * 10_000, [*range(1000)], "9" * 400, "sqlite:////x.db", "NaN",
+)  # fmt: skip
+TREES = [door for door in DOORS if door[0].endswith((".json", ".yaml")) and not door[0].startswith("tibet")]
+QUICK_CASES = 300
+
+
+def places(node, path=()) -> Iterator[tuple]:
+    """The paths of all nodes of a tree."""
+    yield path
+    inner = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for key, value in inner:
+        yield from places(value, (*path, key))
+
+
+def mutated(tree, rng):
+    """A tree with one node changed."""
+    paths = [*places(tree)]
+    path, other = paths[rng.integers(len(paths))], POOL[rng.integers(len(POOL))]
+    if not path:
+        return other if rng.random() < 0.2 else tree
+    node = tree
+    for key in path[:-1]:
+        node = node[key]
+    way = rng.integers(5)
+    if way == 0:
+        del node[path[-1]]
+    elif way == 1:
+        node[path[-1]] = [node[path[-1]], other]
+    elif way == 2 and isinstance(node, dict):
+        node[str(other)[:30]] = other
+    else:
+        node[path[-1]] = other
+    return tree
+
+
+def fuzzed(cases: int, seed: int, root: Path) -> dict[int, str]:
+    """{number of a case: what is wrong}: of each, one to three nodes of one file are changed."""
+    import numpy as np
+
+    found = {}
+    for k in range(cases):
+        rng = np.random.default_rng([seed, k])
+        name, made, read = TREES[rng.integers(len(TREES))]
+        folder = made(root / str(k) / "0")
+        path = folder / name
+        library = json if name.endswith(".json") else yaml
+        tree = json.loads(path.read_text()) if library is json else yaml.safe_load(path.read_text())
+        for _ in range(rng.integers(1, 4)):
+            if isinstance(tree, dict | list):
+                tree = mutated(json.loads(json.dumps(tree)), rng)
+        path.write_text(json.dumps(tree) if library is json else yaml.safe_dump(tree))
+        if why := outcome(read, folder):
+            found[k] = f"{name} {read.__name__}: {why}: {path.read_text()[:300]}"
+        shutil.rmtree(root / str(k))
+    return found
+
+
+def test_trees_with_a_few_nodes_changed_are_read_left_or_refused(tmp_path):
+    """`benchmarks/mutated_folders.py` does ten thousand."""
+    assert fuzzed(QUICK_CASES, 0, tmp_path) == {}

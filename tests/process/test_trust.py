@@ -125,6 +125,24 @@ def test_a_run_is_repeated_above_its_folder_or_here_and_nowhere_else(tmp_path, m
     assert Path.cwd() == tmp_path / "place"
 
 
+def test_a_job_of_a_sweep_is_repeated_too(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = given(tmp_path / "sweep" / "0", "seed=2", cwd=str(tmp_path))
+    (folder / ".hydra" / "hydra.yaml").write_text(yaml.safe_dump({"hydra": {"runtime": {"cwd": str(tmp_path)}}}))
+    assert again([str(folder)]) == ["seed=2"]
+
+
+def test_a_second_sweep_in_a_folder_says_who_holds_it(tmp_path):
+    from tractexp.run_folder import hold
+
+    sweep = ("-m", "seed=1,2", *QUICK[:2], "tracking.enabled=false", "hydra.sweep.dir=sweep")
+    with hold(tmp_path / "sweep"):
+        done = run_command(*sweep, cwd=tmp_path)
+        assert done.returncode == 2
+        assert f"sweep is in use by process {os.getpid()} on " in done.stderr
+    assert not (tmp_path / "sweep").exists()
+
+
 LAUGHS = "- &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"- &a{k + 1} [{', '.join(10 * [f'*a{k}'])}]\n" for k in range(9)
 )

@@ -79,9 +79,9 @@ def _stored(folder: Path) -> tuple[list[str], Path, list[str]]:
     try:
         whole, arguments = (files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml"))
         runtime = whole["hydra"]["runtime"]
-        sources = [s["path"] for s in runtime["config_sources"] if s["provider"] == "command-line"]
+        sources = [s["path"] for s in runtime.get("config_sources", []) if s["provider"] == "command-line"]
         return [str(text) for text in arguments], Path(runtime["cwd"]), [str(path) for path in sources]
-    except (FileNotFoundError, LookupError, TypeError) as error:
+    except (FileNotFoundError, LookupError, TypeError, AttributeError) as error:
         raise UserError(f"{folder} holds no run ({FOLDER} is missing or damaged); give the folder of one") from error
 
 

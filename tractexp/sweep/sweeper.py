@@ -25,6 +25,7 @@ from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
 from tractexp.progress import say
+from tractexp.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, shared
@@ -73,7 +74,13 @@ class Grid(Sweeper):
         arguments = [*(f"{key}={values}" for key, values in self.params.items()), *arguments]
         folder = Path(self.config.hydra.sweep.dir).absolute()
         comparison = self._comparison(folder)  # refused before the jobs, not after
-        jobs = place(self._composed(arguments), folder)
+        composed = self._composed(arguments)
+        with hold(folder):  # of two processes with one command, the second ends
+            jobs = place(composed, folder)
+            self._perform(jobs, folder, arguments)
+            self._conclude(jobs, comparison)
+
+    def _perform(self, jobs: list[SweepJob], folder: Path, arguments: list[str]) -> None:
         remaining = [job for job in jobs if self.redo or not finished(job)]
         say(f"sweep: {len(jobs)} jobs in {folder}")
         if done := len(jobs) - len(remaining):
@@ -85,7 +92,6 @@ class Grid(Sweeper):
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
             with parent_run(folder, jobs, arguments, afresh=self.redo):
                 self._run(remaining)
-        self._conclude(jobs, comparison)
 
     def _composed(self, arguments: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
