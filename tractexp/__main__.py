@@ -138,7 +138,7 @@ def _run(arguments: list[str]) -> int:
     from tractexp.provenance import started
     from tractexp.refusal import explained
 
-    register()
+    register(arguments)
     started(arguments)
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
     with explained():

@@ -33,10 +33,13 @@ class Option:
     module: str = ""
 
 
-def choices() -> dict[str, dict[str, Option]]:
-    """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading comment."""
+def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
+    """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading comment.
+
+    `own` are further folders of configurations, as Hydra's `-cd` names one.
+    """
     options: dict[str, dict[str, Option]] = defaultdict(dict)
-    for folder in (CONF, *configuration_folders()):
+    for folder in (CONF, *configuration_folders(), *own):
         for file in folder.rglob("*.yaml"):
             place = file.relative_to(folder).with_suffix("")
             if len(place.parts) > 1 and not any(part.startswith("_") for part in place.parts):

@@ -1,9 +1,11 @@
 """The door through which plugins and schemas enter Hydra's groups."""
 
+import argparse
 import functools
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from hydra.core.config_store import ConfigStore
 from hydra.core.object_type import ObjectType
@@ -20,12 +22,19 @@ from tractexp.schema import Config
 
 
 class PluginSearchPath(SearchPathPlugin):
-    """Puts the `conf/` folder of every installed plugin package before ours: a file of the same name replaces ours."""
+    """Puts the `conf/` folder of every installed plugin package before ours, and the user's own before all.
+
+    A file of the same name replaces ours.
+    """
+
+    own: ClassVar[list[Path]] = []  # folders that `-cd` names; Hydra itself would put them last
 
     def manipulate_search_path(self, search_path: Any) -> None:
         for folder in plugin.configuration_folders():
             search_path.prepend("tractexp", f"file://{folder}", "main")
         search_path.prepend("tractexp", f"{ModelFiles.scheme()}://", "main")
+        for folder in self.own:
+            search_path.prepend("tractexp", f"file://{folder}")
 
 
 class ModelFiles(ConfigSource):
@@ -53,8 +62,9 @@ class ModelFiles(ConfigSource):
         return []
 
 
-def register() -> None:
+def register(arguments: Sequence[str] = ()) -> None:
     """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that cannot be loaded."""
+    PluginSearchPath.own = _own_folders(arguments)
     from tractexp.sweep.launcher import Cores, CoresConfig
     from tractexp.sweep.sweeper import Grid, GridConfig
 
@@ -75,6 +85,14 @@ def register() -> None:
     register_resolver = hydra_versions.register_resolver()
     register_resolver("fingerprint", _fingerprint, replace=True)
     register_resolver("folder_name", _folder_name, replace=True)
+
+
+def _own_folders(arguments: Sequence[str]) -> list[Path]:
+    """The folder of configurations that a command names."""
+    parser = argparse.ArgumentParser(add_help=False, allow_abbrev=False)
+    parser.add_argument("-cd", "--config-dir")
+    folder = parser.parse_known_args([*arguments])[0].config_dir
+    return [Path(folder).absolute()] if folder and Path(folder).is_dir() else []
 
 
 def _configured(group: str, name: str) -> bool:

@@ -38,7 +38,7 @@ def overrides(arguments: Iterable[str]) -> list[str]:
         if "=" not in argument and argument[:1] not in OPTIONS and before[:1] != "-":
             _refuse_word(argument)
     result = []
-    for argument in _name_model_file(arguments):
+    for argument in map(_without_plus, _name_model_file(arguments)):
         group, _, value = argument.partition("=")
         if group == "model/motor" and "[" in value:
             result += _several(group, value)
@@ -56,6 +56,12 @@ def _refuse_word(word: str) -> None:
         f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or folder that is"
         f" there{elsewhere('', word)}; tractexp --help shows what there is"
     )
+
+
+def _without_plus(argument: str) -> str:
+    """`+experiment=x` as `experiment=x`: the group is there already, and Hydra would refuse to add it twice."""
+    key = argument.partition("=")[0]
+    return argument[1:] if key[:1] == "+" and key[1:] in groups() else argument
 
 
 def _check(argument: str, key: str, value: str) -> None:

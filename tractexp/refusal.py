@@ -25,6 +25,8 @@ def explained() -> Iterator[None]:
 
     try:
         yield
+    except UserError:  # of a job that Hydra has run: it is a sentence
+        raise
     except MissingConfigException as error:
         raise UserError(_missing(error)) from error
     except (HydraException, OmegaConfBaseException) as error:
@@ -78,7 +80,7 @@ def _missing(error: Any) -> str:
     group, _, choice = name.rpartition("/")
     options = [o for o in error.options or () if not o.startswith("_")]
     if not group or not options:
-        return _first_line(error)
+        return _plain(error)
     where = elsewhere(group, choice)
     return f"{group}={choice}: there is no such choice{where or describe_available(group, choice, options)}"
 
@@ -114,9 +116,30 @@ def _wrong_value(key: str, text: str) -> str:
     return ""
 
 
+# What Hydra says of an option or an argument, and our sentence with the parts it names
+SENTENCES = {
+    r"Cannot find primary config '(.*)'\.": (
+        "-cn {0}: there is no such configuration; give the folder of yours, too: -cd FOLDER, with {0}.yaml in it"
+    ),
+    r"Additional config directory '(.*)' not found": "-cd {0}: there is no such folder",
+    r"Primary config directory not found": (
+        "-cp names no folder; -cd FOLDER adds configurations of yours to those that are here"
+    ),
+    r"Could not delete from config\. '(.*)' does not exist": "~{0}: there is no such setting to take out",
+    r"Could not delete\. No match for '(.*)' in the defaults list": "~{0}: nothing is chosen there to take out",
+    r"Multiple values for (\S+)\. To override a value use 'override \1: (.*)'": (
+        "{0} is chosen already; within a file of configurations write 'override {0}: {1}'"
+    ),
+    r"Could not override '(.*)@(.*)'": "{0}@{1}: no choice of {0} stands at '{1}'; write {0}=NAME",
+}
+
+
 def _plain(error: BaseException) -> str:
     """The first line of an exception where it is in plain words, else what can be said in its place."""
     text = _first_line(error)
+    for pattern, sentence in SENTENCES.items():
+        if match := re.match(pattern, text):
+            return sentence.format(*map(_short, match.groups()))
     if match := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
         return (
             f"{_short(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"

@@ -5,6 +5,7 @@ import re
 import shutil
 import textwrap
 from collections.abc import Collection, Mapping
+from pathlib import Path
 
 from tractexp.choices import Option, choices, defaults, group_variants, sentence
 from tractexp.errors import UserError, among
@@ -80,9 +81,13 @@ def listed(arguments: list[str]) -> int:
     about = "Show what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
     parser = argparse.ArgumentParser(prog="tractexp list", description=about)
     parser.add_argument("group", nargs="*", metavar="GROUP")
-    options = choices()
+    parser.add_argument("-cd", "--config-dir", type=Path, metavar="FOLDER", help="a folder of configurations of yours")
+    given = parser.parse_args(arguments)
+    if given.config_dir is not None and not given.config_dir.is_dir():
+        raise UserError(f"tractexp list: there is no folder {given.config_dir}; -cd names one of configurations")
+    options = choices([] if given.config_dir is None else [given.config_dir])
     short = {group.rpartition("/")[2]: group for group in options}  # `static`, as `tractexp new static` has it
-    names: list[str] = [group.rstrip("/=") for group in parser.parse_args(arguments).group]
+    names: list[str] = [group.rstrip("/=") for group in given.group]
     chosen = [short.get(name) or name for name in names]
     for name in chosen:
         if name not in options and not _find_group_of_variants(name, options):

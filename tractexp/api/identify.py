@@ -451,10 +451,10 @@ class Identify(Task, call=identify):
     predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
 
     def draws(self, job: Job) -> bool:
-        return not job.in_sweep if self.figures is None else self.figures
+        return not job.of_many if self.figures is None else self.figures
 
     def logged(self, job: Job, result: Identification) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit
 
-        predictor = not job.in_sweep if self.predictor is None else self.predictor
+        predictor = not job.of_many if self.predictor is None else self.predictor
         return logged_fit(job, result, predictor)

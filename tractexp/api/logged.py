@@ -26,7 +26,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
     result = fit.result
     searched = f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
     if job.label:
-        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.in_sweep])
+        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.of_many])
     return {
         "name": searched,
         "metrics": _of_search(fit) | _errors(fit) | _estimates(fit),  # MLflow compares by the first

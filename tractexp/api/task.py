@@ -55,7 +55,7 @@ SOURCES = {
     "optimizer": Source(("optimizer",), lambda job: job.chosen),
     "seed": Source((), lambda job: job.seed),
     "fit": Source(("data", "model", *SEARCH), lambda job: job.identified()),
-    "check_intervals": Source((), lambda job: not job.in_sweep),  # of many jobs nobody reads each profile
+    "check_intervals": Source((), lambda job: not job.of_many),  # of many jobs nobody reads each profile
     "progress": Source((), lambda job: job.tell),
 } | {
     key: Source((key,), lambda job, key=key: job.config[key]) for key in ("objective", "budget", "time_limit", "target")
@@ -190,7 +190,8 @@ class Job:
     choices: Mapping[str, str]  # what was chosen in each group: {"optimizer": "issa_no_levy", ...}
     folder: Path
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
-    in_sweep: bool = False  # one of many: what only a person looks at may be left out
+    in_sweep: bool = False
+    of_many: bool = False  # in a sweep: what only a person looks at may be left out
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
     measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
     placed: Callable[[Write], list[Path]] | None = None  # how results take the place of an earlier run's

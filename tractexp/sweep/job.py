@@ -16,6 +16,7 @@ from tractexp.sweep import identity
 from tractexp.sweep.compose import Composed
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, returned
+from tractexp.sweep.surroundings import surrounded
 from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
@@ -33,7 +34,9 @@ class SweepJob:
     folder: Path
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}
     subdir: str = ""  # the folder's name within the sweep's; "": the job's number
+    alone: bool = False  # the only job of its sweep: somebody looks at it
     hydra: Any = None  # its whole configuration, where a callback or a logger of the user's reads that
+    callbacks: Any = None  # of Hydra's, where there is `hydra`
 
     @classmethod
     def of(cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()) -> "SweepJob":
@@ -43,7 +46,7 @@ class SweepJob:
         groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
         return cls(
             config, groups, tuple(overrides), identity.configuration(config, groups), identity.inputs(config), folder,
-            given(overrides, choices), composed.subdir, composed.hydra,
+            given(overrides, choices), composed.subdir, hydra=composed.hydra,
         )  # fmt: skip
 
     @property
@@ -92,10 +95,11 @@ def work(job: SweepJob) -> Status:
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
-    with output, printing_to(output):
+    with output, printing_to(output), surrounded(job) as conclude:
         message = _run(job, measured)
-    status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
-    ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
+        status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
+        ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
+        conclude(ended)
     ended.write(job.folder)
     return ended
 
@@ -126,8 +130,9 @@ def _run(job: SweepJob, measured: dict[str, float]) -> str:
     from tractexp.cli.run import perform
 
     try:
-        parent = parent_of(folder_of(job.folder))
-        perform(Job(job.config, job.choices, job.folder, parent, True, job.given, measured))
+        parent, of_many = parent_of(folder_of(job.folder)), not job.alone
+        about: Any = {"in_sweep": True, "of_many": of_many, "given": job.given, "measured": measured}
+        perform(Job(job.config, job.choices, job.folder, parent, **about))
         returned(measured, job.returns)
     except UserError as error:
         return str(error)

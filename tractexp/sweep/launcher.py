@@ -71,6 +71,8 @@ class Cores(Launcher):
     def run(self, jobs: Sequence[SweepJob]) -> list[Status]:
         """Run all jobs and return how they ended, in their order."""
         warm(jobs)
+        callbacks = self.hydra_context.callbacks
+        jobs = [job if job.hydra is None else replace(job, callbacks=callbacks) for job in jobs]
         ends: dict[Path, Status] = {}
         results = self.workers.results(work, jobs, self.tries, _trace)
         with progress(jobs) as note, contextlib.closing(results):
@@ -110,13 +112,19 @@ def warm(jobs: Sequence[SweepJob]) -> None:
             problem.residuals(middle)
 
 
+class Ended(JobReturn):
+    """How a job ended, without the line that Hydra prints beside the error."""
+
+    @property
+    def return_value(self) -> Any:
+        if self.status == JobStatus.FAILED:
+            raise self._return_value
+        return self._return_value
+
+
 def _returned(job: SweepJob, end: Status | None) -> JobReturn:
     """How a job ended, in Hydra's terms."""
-    outcome = JobReturn(overrides=job.overrides)
-    try:
-        if end is None or end.status == FAILED:
-            raise UserError(end.message if end else "its worker was killed or never started")
-        outcome.status, outcome.return_value = JobStatus.COMPLETED, job.returned(end)
-    except UserError as error:
-        outcome.status, outcome.return_value = JobStatus.FAILED, UserError(f"job {job.name}: {error}")
-    return outcome
+    if end is not None and end.status != FAILED:
+        return Ended(job.overrides, status=JobStatus.COMPLETED, _return_value=job.returned(end))
+    why = end.message if end else "its worker was killed or never started"
+    return Ended(job.overrides, status=JobStatus.FAILED, _return_value=UserError(f"job {job.name}: {why}"))

@@ -6,7 +6,7 @@ import shutil
 import sys
 import webbrowser
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -104,7 +104,7 @@ class Grid(Sweeper):
             job = SweepJob.of(compose(overrides, number), overrides)
             refuse_unread(get("task", job.config["task"]["name"]), job.given)
             jobs.setdefault(job.configuration, job)
-        return list(jobs.values())
+        return [replace(job, alone=len(jobs) == 1) for job in jobs.values()]
 
     def _comparison(self, folder: Path) -> Any:
         """The task that compares the variants at the end; None where it is not wanted."""
@@ -116,14 +116,21 @@ class Grid(Sweeper):
         """Compare the variants, where there is something to compare, and say which jobs failed."""
         if comparison is None or not comparable(jobs):
             summary(jobs)
+            for page in sorted(jobs[0].folder.glob("*.html")) if jobs[0].alone else ():
+                say(f"  {page}")
+                self._opened(page)
         else:
             folder = jobs[0].sweep
             say()
             comparison.run(Job(jobs[0].config, jobs[0].choices, folder))
-            if self.open:
-                show(folder / "comparison.html")
+            self._opened(folder / "comparison.html")
         if failed := failures(jobs):
             raise UserError(failed)
+
+    def _opened(self, page: Path) -> None:
+        """Show a page where that is wanted."""
+        if self.open:
+            show(page)
 
     def _run(self, jobs: Sequence[SweepJob]) -> None:
         for job in jobs:

@@ -177,7 +177,7 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
             get("optimizer", name)
 
     def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
-        cores = self.cores or (1 if job.in_sweep else None)
+        cores = self.cores or (1 if job.of_many else None)
         return super().perform(job, optimizers=self.optimizers(job), cores=cores, progress=None, **instead)
 
     def optimizers(self, job: Job) -> dict[str, Any]:
