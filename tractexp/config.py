@@ -97,7 +97,8 @@ def _own_folders(arguments: Sequence[str]) -> list[Path]:
 
 def _configured(group: str, name: str) -> bool:
     """Whether a file gives this plugin its defaults: it begins with the schema, as conf/task/export.yaml does."""
-    return any((folder / group / f"{name}.yaml").is_file() for folder in (plugin.CONF, *plugin.configuration_folders()))
+    folders = (plugin.CONF, *plugin.configuration_folders(), *PluginSearchPath.own)
+    return any((folder / group / f"{name}.yaml").is_file() for folder in folders)
 
 
 def _fingerprint(overrides: Any) -> str:

@@ -192,6 +192,7 @@ class Job:
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
     in_sweep: bool = False
     of_many: bool = False  # in a sweep: what only a person looks at may be left out
+    logs: bool = True  # whether it logs what it keeps for the store, which in a sweep its parent does
     given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
     measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
     placed: Callable[[Write], list[Path]] | None = None  # how results take the place of an earlier run's
@@ -357,7 +358,7 @@ class Job:
         entry = None
         try:
             entry = save(self.folder, run, self.store)
-            if self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder)):
+            if not self.logs or (self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder))):
                 return
             run_id = self._logger.log(entry.run) if "_logger" in self.__dict__ else tracking.log(entry.run, self.store)
             entry.logged(run_id)

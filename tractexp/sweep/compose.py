@@ -6,26 +6,14 @@ composed one afterwards, which is what Hydra does with it too, in well under a h
 
 import copy
 import functools
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from omegaconf import DictConfig, OmegaConf, open_dict, read_write
 
+from tractexp.sweep.job import Composed
+
 BY_NUMBER = "${hydra.job.num}"  # `hydra.sweep.subdir` as it is by default
-
-
-@dataclass(frozen=True)
-class Composed:
-    """One job of a sweep, resolved. `subdir` is "" where its number is its folder's name.
-
-    `hydra` is Hydra's own whole configuration of the job where something of the user's reads it: a callback, a logger.
-    """
-
-    config: Mapping[str, Any]
-    choices: Mapping[str, str]
-    subdir: str = ""
-    hydra: DictConfig | None = None
 
 
 class Composer:

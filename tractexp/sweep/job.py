@@ -13,13 +13,25 @@ from tractexp.api.task import Job, variant
 from tractexp.cli.chosen import given
 from tractexp.errors import UserError
 from tractexp.sweep import identity
-from tractexp.sweep.compose import Composed
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, returned
 from tractexp.sweep.surroundings import surrounded
 from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
+
+
+@dataclass(frozen=True)
+class Composed:
+    """One job of a sweep, resolved. `subdir` is "" where its number is its folder's name.
+
+    `hydra` is Hydra's own whole configuration of the job where something of the user's reads it: a callback, a logger.
+    """
+
+    config: Mapping[str, Any]
+    choices: Mapping[str, str]
+    subdir: str = ""
+    hydra: Any = None
 
 
 @dataclass(frozen=True)
@@ -85,8 +97,10 @@ def shared(jobs: Sequence[SweepJob]) -> set[str]:
     return set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
 
 
-def work(job: SweepJob) -> Status:
+def work(job: SweepJob, logs: bool = False) -> Status:
     """Run a job in its own folder, emptied before. Never raises: what goes wrong is in the status returned.
+
+    Unless it `logs`, it leaves that to who reads its folder (`recorder`): to import MLflow takes longer than many jobs.
 
     What the task prints goes to `output.txt`; an unexpected error leaves its `traceback.txt`.
     """
@@ -96,7 +110,7 @@ def work(job: SweepJob) -> Status:
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
     with output, printing_to(output), surrounded(job) as conclude:
-        message = _run(job, measured)
+        message = _run(job, measured, logs)
         status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
         ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
         conclude(ended)
@@ -119,19 +133,19 @@ def run_job(config: Any) -> float | list[float] | None:
     overrides: Any = OmegaConf.to_container(hydra.overrides.task)
     composed = Composed(plain, dict(hydra.runtime.choices), str(hydra.sweep.subdir))
     job = SweepJob.of(composed, overrides, Path(hydra.runtime.output_dir))
-    end = work(job)
+    end = work(job, logs=True)
     if end.status == FAILED and not str(hydra.sweeper.get("_target_")).startswith(NAMESPACE):
         raise UserError(f"job {job.name}: {end.message}")
     return job.returned(end)
 
 
-def _run(job: SweepJob, measured: dict[str, float]) -> str:
+def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
     """Run the task, which notes what it measures; returns what went wrong, in one line, or ""."""
     from tractexp.cli.run import perform
 
     try:
         parent, of_many = parent_of(folder_of(job.folder)), not job.alone
-        about: Any = {"in_sweep": True, "of_many": of_many, "given": job.given, "measured": measured}
+        about: Any = {"in_sweep": True, "of_many": of_many, "logs": logs, "given": job.given, "measured": measured}
         perform(Job(job.config, job.choices, job.folder, parent, **about))
         returned(measured, job.returns)
     except UserError as error:

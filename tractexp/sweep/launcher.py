@@ -19,9 +19,11 @@ from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import finished, place
 from tractexp.sweep.progress import progress
+from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, RUNNING, Status
 from tractexp.workers import Workers, backends
 
+FORKING = ("multiprocessing",)  # backends whose workers would inherit a half-done import of another thread
 SPELLINGS = {"processes": "loky"}  # of a backend in earlier versions
 
 
@@ -64,13 +66,15 @@ class Cores(Launcher):
         jobs = place([SweepJob.of(compose(texts, k), texts) for k, texts in numbered], folder)
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
-        with parent_run(folder, [*self.launched.values()], asked, afresh=False):
-            self.run([job for job in {job.folder: job for job in jobs}.values() if not finished(job)])
+        with parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder:
+            self.run([job for job in {job.folder: job for job in jobs}.values() if not finished(job)], recorder)
         return [_returned(job, status.read(job.folder)) for job in jobs]
 
-    def run(self, jobs: Sequence[SweepJob]) -> list[Status]:
-        """Run all jobs and return how they ended, in their order."""
+    def run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> list[Status]:
+        """Run all jobs, have each logged, and return how they ended, in their order."""
         warm(jobs)
+        if self.workers.backend in FORKING:
+            recorder.parent()
         callbacks = self.hydra_context.callbacks
         jobs = [job if job.hydra is None else replace(job, callbacks=callbacks) for job in jobs]
         ends: dict[Path, Status] = {}
@@ -79,6 +83,7 @@ class Cores(Launcher):
             for job, end in results:
                 ends[job.folder] = end or self._killed(job)
                 note(job, ends[job.folder])
+                recorder.log(job.folder)
         return [ends[job.folder] for job in jobs]
 
     def _killed(self, job: SweepJob) -> Status:

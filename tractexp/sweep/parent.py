@@ -1,6 +1,7 @@
 """The parent run of a sweep in MLflow."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -11,40 +12,49 @@ from tractexp.api.task import Job
 from tractexp.errors import UserError
 from tractexp.files import write_json
 from tractexp.progress import say
+from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import ESTIMATED, FAILED, FINISHED, INTERRUPTED, SEARCHED, read
 from tractexp.tracking.runfile import save
 from tractexp.tracking.sweepfile import FILE, parent_of
 
 
 @contextmanager
-def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool) -> Iterator[None]:
+def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool) -> Iterator[Recorder]:
     """Open the parent run of a sweep's jobs, or open it again, and close it with the status the sweep ends with.
 
+    It is opened while the workers start, for to import MLflow takes seconds; what is yielded logs jobs below it.
     FINISHED where every job is, KILLED where the sweep is interrupted, FAILED otherwise. What could not be logged is
     then sent, but where it is interrupted: who ends a sweep does not wait. `afresh` never opens an old one again.
     """
     node = jobs[0].config["tracking"]
     if not node["enabled"]:
         (folder / FILE).unlink(missing_ok=True)
-        yield
+        yield Recorder(folder)
         return
 
     uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
+    content = {"uri": uri, "jobs": len(jobs), "overrides": overrides}
+    with ThreadPoolExecutor(1) as thread:
+        recorder = Recorder(folder, thread.submit(_begun, folder, run, uri, afresh, content))
+        status = "FAILED"
+        try:
+            yield recorder
+            if all((s := read(job.folder)) is not None and s.status == FINISHED for job in jobs):
+                status = "FINISHED"
+        except KeyboardInterrupt:
+            status = "KILLED"
+            raise
+        finally:
+            _closed(folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri)
+            if status != "KILLED":
+                _send(folder, uri)
+
+
+def _begun(folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str, Any]) -> str | None:
+    """Open the run and note its id, by which jobs find it; None where the store cannot be used."""
     run_id = _opened(folder, run, uri, afresh)
-    write_json(folder / FILE, {"run": run_id, "uri": uri, "jobs": len(jobs), "overrides": overrides}, private=True)
-    status = "FAILED"
-    try:
-        yield
-        status = (
-            "FAILED" if any((s := read(job.folder)) is None or s.status != FINISHED for job in jobs) else "FINISHED"
-        )
-    except KeyboardInterrupt:
-        status = "KILLED"
-        raise
-    finally:
-        _closed(folder, replace(run, status=status, metrics=metrics(jobs)), run_id, uri)
-        if status != "KILLED":
-            _send(folder, uri)
+    write_json(folder / FILE, {"run": run_id, **content}, private=True)
+    return run_id
 
 
 def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:

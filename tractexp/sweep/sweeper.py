@@ -32,6 +32,7 @@ from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import finished, place, placement, settle
+from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
 from tractexp.tracking.sweepfile import MULTIRUN, PAGES
 
@@ -90,8 +91,8 @@ class Grid(Sweeper):
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
-            with parent_run(folder, jobs, arguments, afresh=self.redo):
-                self._run(remaining)
+            with parent_run(folder, jobs, arguments, afresh=self.redo) as recorder:
+                self._run(remaining, recorder)
 
     def _composed(self, arguments: list[str]) -> list[SweepJob]:
         """The jobs of the sweep, composed and without duplicates, not yet placed."""
@@ -132,15 +133,16 @@ class Grid(Sweeper):
         if self.open:
             show(page)
 
-    def _run(self, jobs: Sequence[SweepJob]) -> None:
+    def _run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> None:
         for job in jobs:
             if job.folder.exists():
                 shutil.rmtree(job.folder)
         end, problem = FAILED, "it ended without a word: its worker was killed or never started"
         try:
             if isinstance(self.launcher, Cores):
-                self.launcher.run(jobs)
+                self.launcher.run(jobs, recorder)
             else:
+                recorder.parent()  # which the jobs look up themselves
                 batch = [[*job.overrides, *placement(job)] for job in jobs]
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt as stop:
