@@ -8,6 +8,7 @@ parent that is killed; so a thread of it watches the parent.
 """
 
 import contextlib
+import importlib
 import multiprocessing
 import os
 import signal
@@ -223,8 +224,8 @@ def ray_cluster(n_jobs: int, address: str | None) -> Iterator[None]:
     Raises `UserError` where Ray is not installed or no cluster answers.
     """
     try:
-        import ray
-        from ray.util.joblib import register_ray
+        ray: Any = importlib.import_module("ray")
+        register_ray = importlib.import_module("ray.util.joblib").register_ray
     except ImportError:
         raise UserError("hydra.launcher.backend=ray needs Ray, which is not installed: pip install ray") from None
     from joblib import cpu_count

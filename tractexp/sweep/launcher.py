@@ -126,6 +126,10 @@ class Ended(JobReturn):
             raise self._return_value
         return self._return_value
 
+    @return_value.setter
+    def return_value(self, value: Any) -> None:
+        self._return_value = value
+
 
 def _returned(job: SweepJob, end: Status | None) -> JobReturn:
     """How a job ended, in Hydra's terms."""
