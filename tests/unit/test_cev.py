@@ -247,3 +247,13 @@ def test_a_column_of_bits_without_names_gives_no_status_channel(write):
     recording = cev.load(write([line.replace(BITS, "") for line in report()]))
     assert recording.status == []
     assert len(recording.channels) == 9
+
+
+@pytest.mark.parametrize("cut", [2, 4, 9, 20])  # one, a closing quote, loses nothing
+def test_a_report_that_is_cut_within_a_line_says_so_and_does_not_use_it(write, cut):
+    lines = report()
+    samples = [k for k, line in enumerate(lines) if line.count(",") > 10][3:]
+    whole = cev.load(write(lines[: samples[-1] + 1]))
+    halved = cev.load(write([*lines[: samples[-1]], lines[samples[-1]][:-cut]]))
+    assert halved.samples == whole.samples - 1
+    assert any("ends within a line" in note for note in halved.notes)

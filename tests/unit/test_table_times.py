@@ -1,4 +1,4 @@
-"""Times as tables have them: by clocks that are set, in days, in two columns, with digits in groups."""
+"""Times as tables have them: by clocks that are set, in days, in two columns, digits in groups; and cut tables."""
 
 import datetime as dt
 
@@ -224,3 +224,29 @@ def test_a_third_of_50_hz_is_read_however_it_is_written(tmp_path, written):
     (tmp_path / "r.cfg").write_text("\n".join(lines) + "\n")
     (tmp_path / "r.dat").write_text("1,0,1\n2,1000,2\n")
     assert comtrade.load(tmp_path / "r.cfg").frequency == pytest.approx(50 / 3, rel=3e-3)
+
+
+ROWS = [f"{k * 0.01:.2f},{0.7 if 60 <= k < 110 else 1.0},{0.5 if 60 <= k < 110 else 0.9},0.3456" for k in range(200)]
+
+
+@pytest.mark.parametrize("cut", [1, 2, 3, 4])
+def test_a_value_that_is_cut_is_said_and_not_read(tmp_path, cut):
+    (tmp_path / "cut.csv").write_text("\n".join(["t,U,P,Q", *ROWS])[:-cut])
+    record = build("data", {"name": "csv", "path": str(tmp_path / "cut.csv")}).table()[0]
+    assert set(record.Q) == {0.3456}
+    assert any("line 201, the last one, has no line end" in note for note in record.notes)
+
+
+@pytest.mark.parametrize("end", ["", "\n", "\r\n"])
+def test_a_whole_last_line_is_read_without_a_word(tmp_path, end):
+    (tmp_path / "whole.csv").write_text("\n".join(["t,U,P,Q", *ROWS]) + end)
+    record = build("data", {"name": "csv", "path": str(tmp_path / "whole.csv")}).table()[0]
+    assert (record.samples, record.notes) == (200, ())
+
+
+def test_a_last_value_of_unlike_digits_is_read_and_the_missing_line_end_said(tmp_path):
+    rows = [*ROWS[:-2], ROWS[-2][:-3], ROWS[-1][:-3]]
+    (tmp_path / "open.csv").write_text("\n".join(["t,U,P,Q", *rows]))
+    record = build("data", {"name": "csv", "path": str(tmp_path / "open.csv")}).table()[0]
+    assert (record.samples, record.Q[-1]) == (200, 0.3)
+    assert any("may be cut short" in note for note in record.notes)

@@ -183,6 +183,7 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     body, _, rest = re.sub(r"[\x02\x03\x1a\0]", "", text).partition('"SETTINGS"')
     report = EventReport(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
+    sums: list[bool] = []  # whether each row has its checksum
     for line, row in _joined(body):
         if line > HEAD and not report.columns:
             break
@@ -193,12 +194,15 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
                 remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
-            cells = cells[:-1]
+            cells, checked = cells[:-1], True
+        else:
+            checked = False
         if report.columns:
             if not cells or cells[0].strip() == "FID":
                 remarks.add("a second report in the file is not read", line)
                 break
             report.rows.append((line, cells))
+            sums.append(checked)
         elif any(cell.strip() == "TRIG" for cell in cells):
             report.columns = [cell.strip() for cell in cells]
         elif names is None and not report.about and "FID" not in [cell.strip() for cell in cells]:
@@ -208,6 +212,8 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
         else:
             report.about |= dict(zip(names, map(str.strip, cells), strict=False))
             names = None
+    if len(sums) > 1 and all(sums[:-1]) and not sums[-1]:
+        remarks.add("the file ends within a line, which is not used", report.rows.pop()[0])
     if not report.columns or not report.rows:
         raise UserError(
             f"{path}: no compressed event report: there is no row of column names with TRIG and samples below it; get "

@@ -42,6 +42,12 @@ class ByteRange:
             file.seek(self.first)
             return file.read(self.size if length is None else min(length, self.size))
 
+    def ends_a_line(self) -> bool:
+        """Whether its last line ends as the others do."""
+        with self.path.open("rb") as file:
+            file.seek(max(self.first, self.stop - 4096))
+            return file.read(min(self.size, 4096)).rstrip(b" \t\0\x1a").endswith((b"\n", b"\r"))
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -145,6 +151,8 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
         head[there], table[there] = block[:, :2], block[:, 2 : 2 + len(header.analogs)]
         words[there] = pack(np.nan_to_num(block[:, 2 + len(header.analogs) :]) != 0)
         filled += len(cells)
+    if not header.digitals and not place.ends_a_line():  # the state of a status channel is one digit, and whole
+        remarks.add(f"{place.path.name} ends without a line end: its last value may be cut short")
     _enough(place, header, remarks, filled, wanted, filled, "lines")
     count = header.samples
     if np.isnan(table[:count]).any():

@@ -25,6 +25,8 @@ from tractexp.wording import counted
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most
 LONGEST = 1 << 20  # bytes of a line
+LINE_END = b"\n"
+FEWEST_WHOLE = 3  # rows that a file keeps where its last line is left out
 BLOCK = 20_000  # rows read cell by cell at a time
 DELIMITERS = (";", "\t", "|", ",", " ")  # a comma may be a decimal mark, a space stand within a name: they come last
 HEADER_MARK = re.compile(r"^\s*(%|//|!)+")  # before the names, as in a comment of another language
@@ -52,6 +54,7 @@ class TextTable(TableFile):
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
         grouped = [f"digits are taken as grouped by '{self.group}', decimals marked by '{self.decimal}'"]
         self.notes = (*notes, *(grouped if self.group else []))
+        self._drop_cut_line()
         self._check_width()
 
     def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> TableHeading:
@@ -78,6 +81,26 @@ class TextTable(TableFile):
                 + ("; if the decimal mark is a comma, save the file with another delimiter, such as a semicolon"
                    if self.delimiter == "," else "")
             )  # fmt: skip
+
+    def _drop_cut_line(self) -> None:
+        """Note a last line that may be cut within its last number, half of which would be read as the value.
+
+        It is whole where the file ends with a line end, or where its last cell has as many decimals as all others; it
+        is left out where that has fewer than any other.
+        """
+        head, line_end, last = self.data.rpartition(b"\n")
+        rows = head.count(b"\n") + 1 - self.line
+        if not line_end or not last.strip() or rows < FEWEST_WHOLE:
+            return
+        before = head[-HEAD:].split(b"\n")[-SAMPLE:] if rows >= SAMPLE else head.split(b"\n")[self.line - 1 :]
+        cells = [_cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)]
+        counts = [_decimals(row[-1], self.decimal) for row in cells if len(row) == len(cells[0])]
+        shorter = len(counts) > 1 and counts[0] < min(counts[1:])
+        if len({*counts}) == 1 and counts[0] > 0:
+            return
+        said = f"line {self.data.count(LINE_END) + 1}, the last one, has no line end and may be cut short"
+        self.notes += (f"{said}: it is not used" if shorter else said,)
+        self.data = head + line_end if shorter else self.data
 
     def place(self, row: int) -> str:
         if self._lines is not None and row < len(self._lines):
@@ -222,6 +245,11 @@ def _delimiter(lines: Sequence[str]) -> str:
 
     best = max(DELIMITERS, key=alike)
     return best if alike(best)[0] > 0 else ","
+
+
+def _decimals(cell: str, mark: str) -> int:
+    """How many characters stand behind a number's decimal mark, with its exponent; 0 where there is none."""
+    return len(cell.strip().partition(mark)[2])
 
 
 def _is_value(cell: str) -> bool:

@@ -59,7 +59,7 @@ def _signs(count: int) -> np.ndarray:
 
 def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
     """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean square over time."""
-    total, magnitudes = (X.conj() @ X.T).real, np.abs(X) @ np.abs(X).T
+    total, magnitudes = np.real(X.conj() @ X.T), np.abs(X) @ np.abs(X).T
     sums = np.maximum(((signs @ total) * signs).sum(axis=1), 0.0)
     most = ((np.abs(signs) @ magnitudes) * np.abs(signs)).sum(axis=1)
     return np.sqrt(sums / np.maximum(most, 1e-300))
