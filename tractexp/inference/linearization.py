@@ -43,7 +43,7 @@ class Linearization:
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
     def whitened(self, noise: Noise) -> ScoreTest:
-        """Project under this noise; `Projection.of` puts other residuals in place of the fit's own."""
+        """Project under this noise; `ScoreTest.of` puts other residuals in place of the fit's own."""
         raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.perturbed]
         ends = np.cumsum([len(part) for part in raw])
         white = self.context.whiten(noise, np.concatenate(raw))
