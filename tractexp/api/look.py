@@ -304,13 +304,19 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         row |= {key: getattr(feeder, key) for key in ("voltages", "currents", "reverse_current", "why", "loaded")}
         row["connection"] = _name(feeder.connection)
         row["channels"] = [names[i] for i in (*feeder.voltages, *feeder.currents)]
-    U, P, Q = powers or (None, None, None)
+    U, P, Q = powers if powers and not shown.secondary else (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return row | {
         "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
-        "said": list(shown.said), "command": command(view, shown),
-        "events": [event_row(event, view.begun) for event in shown.events],
+        "said": list(shown.said), "unexamined": shown.unexamined, "secondary": shown.secondary,
+        "command": command(view, shown),
+        "events": [_without_powers(event_row(event, view.begun), shown) for event in shown.events],
     }  # fmt: skip
+
+
+def _without_powers(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
+    """The row of an event, without powers where they are those of a transformer's secondary."""
+    return row | dict.fromkeys(("P_before", "Q_before", "P_after", "Q_after")) if shown.secondary else row
 
 
 def _name(connection: Any) -> str:

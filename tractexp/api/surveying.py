@@ -14,7 +14,7 @@ from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.overview import LoadEvent, Sight, View
-from tractexp.report.survey import QUIET, UNREAD
+from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.store import key
 from tractexp.workers import Workers
 
@@ -26,6 +26,7 @@ COLUMNS = (
 )  # fmt: skip
 KILLED = "the program was killed at this file, as where the computer's memory is too small for it"
 FEW = 2  # files that this process looks at sooner than others have started
+UNRECOGNISED = "no voltages and currents of one load were recognised"
 POINTS = 48  # of a small picture
 AROUND = (0.1, 0.3)  # s before and after an event in its picture
 LONGEST = 5.0  # s of an event there
@@ -41,7 +42,7 @@ def rows_of(folder: str, file: str) -> Rows:
             for number, shown in enumerate(view.sights, 1)
             for event in shown.events
         ]
-        return files.plain(rows or [row | _common(view) | {"kind": QUIET, "why": _quiet(view)}])
+        return files.plain(rows or [row | _common(view) | _without_events(view)])
     except UserError as error:
         return [row | {"kind": UNREAD, "why": str(error)}]
     except Exception as error:  # a survey of thousands of files does not end with one of them
@@ -49,9 +50,15 @@ def rows_of(folder: str, file: str) -> Rows:
         return [row | {"kind": UNREAD, "why": why}]
 
 
+def _without_events(view: View) -> dict[str, str]:
+    """What stands in the row of a file without events: that nothing happened, or why nobody can say."""
+    unexamined = list(dict.fromkeys(shown.unexamined for shown in view.sights if shown.unexamined))
+    if not view.sights or (len(unexamined) and all(shown.unexamined or not shown.loaded for shown in view.sights)):
+        return {"kind": UNEXAMINED, "why": "; ".join(unexamined) or UNRECOGNISED}
+    return {"kind": QUIET, "why": _quiet(view)}
+
+
 def _quiet(view: View) -> str:
-    if not view.sights:
-        return "no voltages and currents of one load were recognised"
     return "; ".join(dict.fromkeys(said for s in view.sights for said in s.said)) or "the voltage stays as it is"
 
 

@@ -22,6 +22,7 @@ from tractexp.filetypes.timeline import Stretch
 from tractexp.recording.recording import Channel, Recording, StatusChannel, quantity_of
 
 LARGEST_CFG = 4 * 2**20  # bytes: fifty thousand channels
+FIRST_WITH_RATIO = 1999  # revision of the standard whose files say primary or secondary
 MISSING = {"BINARY": -32768.0, "BINARY32": -2147483648.0}  # raw values that stand for none
 MISSING_TEXT = (99999.0, 999999.0)  # of 1999 and of 1991
 _SECTION = re.compile(
@@ -143,8 +144,15 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch])
     return Channel(
         analog.name, timeline.evened(raw, stretches, missing), analog.unit, quantity_of(analog.unit),
         analog.phase, analog.circuit, analog.gain, analog.offset, analog.ratio, analog.skew * 1e-6, analog.limits,
-        missing,
+        missing, _side(header, analog),
     )  # fmt: skip
+
+
+def _side(header: Header, analog: Analog) -> str:
+    """Whether values are secondary without a ratio: S with 1 to 1; files of 1991 do not say."""
+    if analog.side == "S" and analog.ratio == 1:
+        return "S"
+    return "?" if not analog.side and header.revision < FIRST_WITH_RATIO else ""
 
 
 def _missing(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:

@@ -12,7 +12,15 @@ from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.kirchhoff import closed_sums
-from tractexp.recording.label import Group, groups, kind, other_quantity, residual, words
+from tractexp.recording.label import Group, groups, kind, other_quantity, residual, shared_name, words
+from tractexp.recording.railway import (
+    conductor_pairs,
+    contact_first,
+    direct_voltage,
+    is_opposite,
+    is_return,
+    opposite_pair,
+)  # fmt: skip
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.unit import in_doubt
@@ -65,7 +73,7 @@ def propose(recording: Recording) -> list[Feeder]:
     amps = [i for i in waves if kind(waves[i]) == "current"]
     f, strange = _frequency(recording, volts, amps)
     phasors = snapshots(recording, sorted(waves), f)
-    if not volts or not amps or phasors is None:
+    if not volts or not amps or phasors is None or direct_voltage(recording):
         return []
     buses = _groups(recording, phasors, volts)
     three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
@@ -74,7 +82,9 @@ def propose(recording: Recording) -> list[Feeder]:
     two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)  # with which two currents are enough
     fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
     options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
-    options += _single(recording, phasors, volts, amps, [*buses, *loads], level)
+    options += _conductors(recording, phasors, volts, amps, [*buses, *loads])
+    taken = [*buses, *loads, *(Group(f.channels["I"], False, "", False, "") for each in options for f in each)]
+    options += _single(recording, phasors, volts, amps, taken, level)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
     marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
@@ -86,7 +96,7 @@ def buses_alone(recording: Recording) -> list[Feeder]:
     volts = [i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == "voltage"]
     f, strange = _frequency(recording, volts, [])
     phasors = snapshots(recording, volts, f)
-    if not volts or phasors is None or strange:
+    if not volts or phasors is None or strange or direct_voltage(recording):
         return []
     grouped = [g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)]
     taken = {i for g in grouped for i in g.numbers}
@@ -112,6 +122,8 @@ def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder
 
 def can_be_named(recording: Recording) -> bool:
     """Whether settings that name voltages and currents can help: there are waves that may be one and the other."""
+    if direct_voltage(recording):
+        return False
     try:
         recording.waveforms()
     except UserError:
@@ -132,13 +144,15 @@ def unrecognised(recording: Recording) -> str:
     try:
         recording.waveforms()
     except UserError as error:
-        return str(error).removeprefix(f"{recording.source}: ")
+        return direct_voltage(recording) or str(error).removeprefix(f"{recording.source}: ")
     if 2 / recording.frequency >= seconds:
         return f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of {recording.frequency:g} Hz"
     for wanted in ("voltage", "current"):
         if wanted not in kinds:
             units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
             return f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
+    if direct := direct_voltage(recording):
+        return direct
     volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
     f = frequency(recording, volts)
     if f is not None and nearest_nominal(f) is None:
@@ -355,6 +369,30 @@ def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
     return float(np.linalg.norm(i - y * v))
 
 
+def _conductors(
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
+) -> list[list[Feeder]]:
+    """Railway feeders of two conductors: contact line and negative feeder, each with its current."""
+    used = {i for group in taken for i in group.numbers}
+    volts, amps = ([i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps))
+    pair = opposite_pair(phasors, volts)
+    if pair is None and len(volts) != 1:
+        return []
+    voltages = tuple(volts) if pair is None else contact_first(recording, pair)
+    connection = usual(len(voltages), 2)
+    feeders = []
+    for k, currents in enumerate(conductor_pairs(recording, phasors, voltages, amps), 1):
+        why = f"the currents {_names(recording, currents)} are those of its two conductors"
+        of = (
+            f"contact line and negative feeder, {_names(recording, voltages)}: opposite to each other"
+            if pair
+            else f"{_names(recording, voltages)} is the voltage between contact line and negative feeder"
+        )
+        name = shared_name([recording.channels[i] for i in currents]) or f"autotransformer feeder {k}"
+        feeders.append([Feeder(voltages, currents, connection, name=name, why=(of, why))] if connection else [])
+    return [each for each in feeders if each]
+
+
 def _single(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group],
     level: float,
@@ -371,9 +409,24 @@ def _single(
         feeders = []
         for bus, why in buses:
             said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
-            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said))
+            said += _part_of_railway(recording, phasors, volts, amps, bus.numbers[0], i)
+            loaded = not is_return(recording, i)
+            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said, loaded=loaded))
         single.append(_asked(recording, phasors, feeders))
     return single
+
+
+def _part_of_railway(
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], voltage: int, current: int
+) -> tuple[str, ...]:
+    """What is said of a current that carries a part of a load only, or brings it back."""
+    if is_return(recording, current):
+        return ("the current of a return conductor or the rail: what the contact line brings flows back in it",)
+    others = [i for i in volts if i != voltage and phasors.pure(i) and is_opposite(phasors, voltage, i)]
+    if not others:
+        return ()
+    half = "half of an autotransformer feeder: the current of the other conductor is not recorded, or not found"
+    return (f"{half}; its voltage is {_names(recording, others[:1])}",)
 
 
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
@@ -392,6 +445,8 @@ def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
 
 def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
     """The feeder, marked as unloaded where it carries no load."""
+    if not feeder.loaded:
+        return feeder
     if _dead(phasors, feeder.voltages):
         why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)

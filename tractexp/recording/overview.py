@@ -22,7 +22,7 @@ from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
 from tractexp.recording.trace import joined as joined_traces
 from tractexp.recording.trace import of_waves
-from tractexp.recording.unit import check_doubt, in_doubt
+from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
 ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
 APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
@@ -66,8 +66,15 @@ class Sight:
     feeder: Feeder | None = None
     phasors: tuple[Phasors, ...] = ()
     record: Record | None = None
+    unexamined: str = ""  # why nothing can be said of what happened to it, one sentence; "" where it was examined
+    secondary: bool = False  # its values are secondary, of an unknown ratio: no kV, no MW
     said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
     settings: Mapping[str, Any] = field(default_factory=dict)  # by which a reader reads it, without the dips
+
+    @property
+    def loaded(self) -> bool:
+        """Whether it draws more than noise; a record does."""
+        return self.feeder is None or self.feeder.loaded
 
     @property
     def dips(self) -> list[int]:
@@ -226,11 +233,14 @@ def sight(
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
     if feeder.currents and any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
-        return blank  # no kV, no MW
+        try:
+            check_doubt(recording, feeder.channels)
+        except UserError as error:
+            return replace(blank, unexamined=str(error))  # no kV, no MW
     try:
         stretches = recording.stretches()
     except UserError as error:
-        return replace(blank, said=(*said, str(error)))
+        return replace(blank, unexamined=str(error), said=(*said, str(error)))
     for stretch in stretches:
         parts, traces = [], []
         for segment in stretch:
@@ -254,14 +264,18 @@ def sight(
     except UserError as error:
         refused = str(error)
     numbered = _numbered(changes, dips, reader.path, refused)
-    shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said))
+    unexamined = "; ".join(said) if said and not phasors else ""
+    secondary = secondary_of(recording, feeder.channels)
+    shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said), unexamined=unexamined,
+                    secondary=secondary)  # fmt: skip
     return replace(shown, said=(*said, *_improbable(reader.path, shown)))
 
 
 def _improbable(where: str, shown: Sight) -> list[str]:
     """What is said of a load that no network feeds."""
     try:
-        if (load := shown.powers()) is not None and shown.feeder is not None and shown.feeder.loaded:
+        known = shown.feeder is not None and shown.feeder.loaded and not shown.secondary
+        if known and (load := shown.powers()) is not None:
             check_load(where, load[0], float(np.hypot(*load[1:])))
     except UserError as error:
         return [str(error)]

@@ -89,6 +89,7 @@ class Channel:
     skew: float = 0.0  # s that a sample is taken later than its time stamp
     limits: tuple[float, float] | None = None  # least and greatest raw value of the converter
     missing: float | None = None  # the raw value that stands for none; nan always does
+    side: str = ""  # S: secondary values whose ratio the file does not give; ?: the file cannot say which they are
     form: str = "waveform"  # or magnitude (RMS), peak, angle, value: samples that are no waveform
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:

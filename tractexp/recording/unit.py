@@ -17,6 +17,7 @@ from tractexp.recording.recording import Channel, Recording, quantity_of, unit_o
 
 PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
 GREATEST = {"U": 1500.0, "I": 100.0}  # RMS in kV, kA: no network has more, so that a larger number is in V, A
+SECONDARY = 0.04, 0.16  # kV RMS of a voltage transformer's secondary: 100 to 120 V, of lines or to ground
 LEAST_AMPERES = 1.0  # RMS: fewer beside voltages in V may as well be kA
 _AMOUNT = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*(\D.*)", re.ASCII)
 
@@ -64,7 +65,42 @@ def in_units(recording: Recording, units: Mapping[str, Any], chosen: Mapping[str
                 channels[i] = _of_unit(channels[i], quantity, small)
             taken |= {letter: bare}
         voltage = next((c.unit for c in (channels[i] for i in ours) if not in_doubt(c)), "")
-    return replace(recording, channels=channels, notes=(*recording.notes, *_note(channels, taken)))
+    channels = _sided(channels)
+    notes = (*recording.notes, *_note(channels, taken), *_secondary_note(channels))
+    return replace(recording, channels=channels, notes=notes)
+
+
+def _sided(channels: Sequence[Channel]) -> list[Channel]:
+    """The channels with S where their values are secondary: if a voltage has the size of one, and none is larger."""
+    if not any(c.side for c in channels):
+        return [*channels]
+    low, high = SECONDARY
+    sizes = [c.factor * _size(c) for c in channels if c.side and c.quantity == "voltage" and not in_doubt(c)]
+    larger, alike = any(size > high for size in sizes), any(low <= size <= high for size in sizes)
+    return [
+        replace(c, side="S" if alike or c.side == "S" else "") if not larger else replace(c, side="") for c in channels
+    ]
+
+
+def _secondary_note(channels: Sequence[Channel]) -> list[str]:
+    """What is said of secondary values, and the setting that gives their ratio; [] where there are none."""
+    ours = [c for c in channels if c.side == "S" and c.quantity in ("voltage", "current")]
+    if not ours:
+        return []
+    letters = {letter: next((c for c in ours if c.quantity == quantity), None)
+               for letter, (quantity, _, _) in PLAIN.items()}  # fmt: skip
+    examples = {"U": "1.1 kV", "I": "120 A"}
+    setting = ", ".join(f"{letter}: '{examples[letter]}'" for letter, c in letters.items() if c is not None)
+    sizes = " and ".join(f"{_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None)
+    return [
+        f"these are secondary values ({sizes}), and the file gives no ratio of the transformers: powers are not in MW; "
+        f"say what one of the file's units is on the primary side, e.g. {DATA.units}={{{setting}}}"
+    ]
+
+
+def secondary_of(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> bool:
+    """Whether a channel of {U: ..., I: ...} holds secondary values of which no ratio is known."""
+    return any(recording.channels[i].side == "S" for ours in numbers.values() for i in ours)
 
 
 def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> list[str]:
@@ -76,7 +112,7 @@ def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> li
 
 def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
     gain, offset = number * channel.gain, number * channel.offset
-    return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset)
+    return replace(channel, unit=unit, quantity=quantity, gain=gain, offset=offset, side="")
 
 
 def _plain(letter: str, size: float, stated: set[str], voltage: str) -> bool:

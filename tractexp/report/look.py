@@ -17,6 +17,8 @@ LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
 UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+NOT_EXAMINED = "not examined"
+SECONDARY = "its values are secondary, of an unknown ratio: no kV, no MW"
 NO_CURRENT = "no current is recorded"
 NO_LOAD = "no load here: what happens to the voltage is listed with the loads of its bus"
 
@@ -154,6 +156,8 @@ def _described(entry: Mapping[str, Any]) -> list[str]:
 
 def quiet(entry: Mapping[str, Any]) -> str:
     """What is said of a load without events."""
+    if entry.get("unexamined"):
+        return f"{NOT_EXAMINED}: {entry['unexamined']}"
     if entry["voltages"] and not entry["currents"]:
         return f"{NO_CURRENT}; {NOTHING}"
     return NOTHING if entry["loaded"] else NO_LOAD

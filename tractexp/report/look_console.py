@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 
 from tractexp.blocks import Report, Table
+from tractexp.recording.excursion import HYSTERESIS
+from tractexp.recording.happening import OF_LOADS
 from tractexp.report import unfitted
-from tractexp.report.look import NO_LOAD, NOTHING, channels, events, frequency, quiet, size, starts, unnamed
+from tractexp.report.look import NO_LOAD, SECONDARY, channels, events, frequency, quiet, size, starts, unnamed
 from tractexp.wording import counted, figure, joined
 
 NOTES = 3  # of a file that have room
@@ -62,8 +64,13 @@ def _answer(files: Sequence[Entry]) -> str:
         best = next(feeder for feeder in promising if feeder["command"] == best["command"])  # the one fitted by it
         first = _worth(best)[0]
         command = f"; to fit it: {best['command']}" if best["command"] else ""
-        return f"{_event(first)} of {best['name']} is worth fitting{_reservation(first['why'])}{command}"
+        secondary = f"; {SECONDARY}" if best.get("secondary") else ""
+        worth = f"is worth fitting{_reservation(first['why'])}{secondary}"
+        return f"{_event(first)} of {best['name']} {worth}{command}"
     happened = [(feeder, event) for feeder in feeders for event in feeder["events"]]
+    unexamined = [quiet(feeder) for feeder in feeders if feeder.get("unexamined")]
+    if not happened and unexamined:
+        return unexamined[0]
     if not happened:
         return f"nothing is worth fitting: {next(iter((*map(quiet, feeders), *map(unnamed, files))), '')}"
     feeder, event = max(happened, key=lambda each: _answered(each[1]))
@@ -123,13 +130,43 @@ def _common(bus: Sequence[Entry]) -> list[Entry]:
     return [event for event in each[0] if _same(event) in shared]
 
 
+def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
+    """What happened to the voltage of a bus: what its loads share, and the worst of what each of them shows.
+
+    Circuits that open at different instants divide one fault at different times: it is told from first to last.
+    """
+    shared = _common(bus)
+    loads = [feeder for feeder in bus if feeder["loaded"]] or bus
+    rest = [event for feeder in loads for event in feeder["events"] if not _beside_voltage(event)]
+    told: list[Entry] = []
+    for event in sorted(rest, key=lambda each: each["start"]):
+        if any(_overlap(event, other) for other in shared):
+            continue
+        if told and _overlap(event, told[-1]):
+            last = told.pop()
+            worst, end = max(last, event, key=lambda each: abs(each["depth"])), max(last["end"], event["end"])
+            span = {"start": last["start"], "end": end, "duration": end - last["start"]}
+            event = {**last, "depth": worst["depth"], **span}
+        told.append(event)
+    return sorted((*shared, *told), key=lambda each: each["start"])
+
+
+def _beside_voltage(event: Entry) -> bool:
+    """Whether an event is one of the currents, of which the voltage shows next to nothing."""
+    return event["kind"] in (*OF_LOADS, "inrush") or abs(event["depth"]) < HYSTERESIS
+
+
+def _overlap(a: Entry, b: Entry) -> bool:
+    return a["start"] <= b["end"] and b["start"] <= a["end"]
+
+
 def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
-    happened = [_event(event) for event in _common(bus)]
+    happened = [_event(event) for event in _of_voltage(bus)]
     more = [f"{len(happened) - LISTED} more"] * (len(happened) > LISTED)
     events = joined([*happened[:LISTED], *more]) or (
-        NOTHING if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
+        quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
     )
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])
     return f"bus {number}: {'; '.join(parts)}"

@@ -9,7 +9,7 @@ from tractexp.blocks.block import Markup
 from tractexp.blocks.style import ACTIVE, VOLTAGE
 from tractexp.files import packaged
 
-UNREAD, QUIET = "not read", "nothing"  # what stands as the kind of a file without events
+UNREAD, UNEXAMINED, QUIET = "not read", "not examined", "nothing"  # what stands as the kind of a file without events
 MOST = 10  # files that cannot be read, each with the reason
 AT_ONCE = 200  # rows that are drawn; more where they are asked for
 COLUMNS = (  # key, heading, kind of cell, digits
@@ -39,7 +39,7 @@ def summary(content: Mapping[str, Any]) -> Report:
 def kinds(content: Mapping[str, Any]) -> Table:
     """How often each kind of event is there."""
     rows = content["rows"]
-    names = sorted({row["kind"] for row in rows}, key=lambda k: (k in (UNREAD, QUIET), k))
+    names = sorted({row["kind"] for row in rows}, key=lambda k: (k in (UNREAD, UNEXAMINED, QUIET), k))
     counts = [
         [kind, sum(r["kind"] == kind for r in rows), len({r["file"] for r in rows if r["kind"] == kind}),
          sum(r["kind"] == kind and r["worth"] for r in rows)]

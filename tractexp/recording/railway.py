@@ -1,0 +1,114 @@
+"""What railways are fed by: contact line with negative feeder or return conductor, and direct current.
+
+A contact line and a negative feeder have opposite voltages; both carry a part of one load. A return conductor carries
+back what the contact line brings, and is no load. A direct voltage is no load's that is modelled here.
+"""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from tractexp.recording.label import kind, plain
+from tractexp.recording.recording import Recording
+from tractexp.recording.snapshot import Snapshots
+from tractexp.recording.unit import in_doubt
+
+OPPOSITE = 0.15  # of a phasor: two that are nearer to adding up to zero are opposite
+TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at most
+BETWEEN = (45.0, 62.0)  # kV: a voltage between contact line and negative feeder, of 2x25 kV
+RETURN = re.compile(r"return|retour|rück|(?<![a-z])(?:rc|ret|rail|rl|bt)(?![a-z])|обратн|回流|回线")
+CONTACT = re.compile(r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс")
+FEED = re.compile(r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线")
+DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
+CYCLE = 0.02  # s over which its ripple is averaged out
+FALLS = 0.03  # of it: a dip
+LONGEST = 1 << 20  # samples that are looked at
+
+
+def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] | None:
+    """The first two voltages that are opposite to each other while they are alive; None where none are."""
+    for k, first in enumerate(volts):
+        for second in volts[k + 1 :]:
+            if is_opposite(phasors, first, second):
+                return first, second
+    return None
+
+
+def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOSITE) -> bool:
+    """Whether two channels add up to next to nothing."""
+    x, y = np.nan_to_num(phasors.of((first, second)))
+    large = np.abs(x) + np.abs(y)
+    alive = large > 0.5 * large.max(initial=0.0)
+    return bool(alive.any() and np.median(np.abs(x + y)[alive] / large[alive]) < most / 2)
+
+
+def conductor_pairs(
+    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int]
+) -> list[tuple[int, int]]:
+    """(contact line, negative feeder) currents that belong to `volts`, one voltage each or the one between them."""
+    names = {i: plain(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps}
+    feeds = [i for i in amps if FEED.search(names[i]) and not RETURN.search(names[i])]
+    contacts = [i for i in amps if i not in feeds and not RETURN.search(names[i])]
+    if len(contacts) == len(feeds):
+        pairs = [*zip(contacts, feeds, strict=True)]
+    else:
+        pairs = [*zip(amps[::2], amps[1::2], strict=False)] if len(amps) % 2 == 0 else []
+    return [pair for pair in pairs if _carry_one_load(phasors, volts, pair)]
+
+
+def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, int]) -> bool:
+    """Whether two currents are opposite in angle, as those of contact line and feeder are, though not in size."""
+    if len(volts) == 1 and not BETWEEN[0] <= phasors.size(volts) <= BETWEEN[1]:
+        return False
+    x, y = np.nan_to_num(phasors.of(pair))
+    both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (np.abs(y) > 0.3 * np.abs(y).max(initial=0.0))
+    both &= (np.abs(x) > 0) & (np.abs(y) > 0)
+    return bool(both.any() and abs(np.degrees(np.angle(-np.median((x * y.conj())[both])))) < TURNED)
+
+
+def is_return(recording: Recording, number: int) -> bool:
+    """Whether the name of a current says that it is that of a return conductor or of the rail."""
+    channel = recording.channels[number]
+    return bool(RETURN.search(plain(f"{channel.name} {channel.circuit}")))
+
+
+def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int]:
+    """Two voltages, that of the contact line first, as far as their names tell."""
+    first, second = (plain(recording.channels[i].name) for i in pair)
+    swapped = FEED.search(first) and CONTACT.search(second) and not FEED.search(second)
+    return (pair[1], pair[0]) if swapped else pair
+
+
+def direct_voltage(recording: Recording) -> str:
+    """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else ""."""
+    volts = [c for c in recording.channels if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)]
+    segment = max(recording.segments, key=lambda s: s.stop - s.first)
+    n, said = max(3, round(CYCLE * segment.rate)) | 1, ""
+    for channel in volts:
+        x = channel.values(segment.first, min(segment.stop, segment.first + LONGEST))
+        x = x[np.isfinite(x)]
+        if len(x) < 4 * n:
+            continue
+        smooth = np.convolve(x, np.full(n, 1 / n), "valid")
+        ripple = float(np.median(np.abs(x[n // 2 : len(x) - n // 2] - smooth))) / 0.6745
+        mean = float(np.median(smooth))
+        if abs(mean) <= DIRECT * ripple or abs(mean) <= DIRECT * float(np.abs(x).max()) / 20:
+            if ripple > DIRECT * abs(mean):
+                return ""  # one that alternates
+            continue
+        low = int(np.argmin(smooth / mean))
+        fall = 1 - float(smooth[low]) / mean
+        below = smooth / mean < 1 - max(FALLS, fall / 2)
+        at = segment.start + (int(np.argmax(below)) + n // 2) / segment.rate
+        dip = (
+            f", and falls to {1000 * smooth[low]:.4g} V ({fall:.1%}) at {at:.3f} s for "
+            f"{1000 * np.count_nonzero(below) / segment.rate:.0f} ms"
+            if fall > FALLS
+            else ""
+        )
+        said = said or (
+            f"the voltage '{channel.name.strip()}' is direct: {1000 * mean:.4g} V in the mean with a ripple of "
+            f"{ripple / abs(mean):.1%} RMS{dip}; the models here are those of loads at alternating voltage"
+        )
+    return said
