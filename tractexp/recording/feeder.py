@@ -20,6 +20,7 @@ from tractexp.recording.railway import (
     is_opposite,
     is_return,
     opposite_pair,
+    other_conductor,
 )  # fmt: skip
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
@@ -32,6 +33,7 @@ SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
 ALONE = "no current is recorded: there is no load to fit"
+HALF = "half of an autotransformer feeder"
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
 
 
@@ -411,7 +413,8 @@ def _single(
             said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
             said += _part_of_railway(recording, phasors, volts, amps, bus.numbers[0], i)
             loaded = not is_return(recording, i)
-            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=group.name, why=said, loaded=loaded))
+            name = f"{group.name} ({HALF})" if any(HALF in each for each in said) else group.name
+            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded))
         single.append(_asked(recording, phasors, feeders))
     return single
 
@@ -423,10 +426,10 @@ def _part_of_railway(
     if is_return(recording, current):
         return ("the current of a return conductor or the rail: what the contact line brings flows back in it",)
     others = [i for i in volts if i != voltage and phasors.pure(i) and is_opposite(phasors, voltage, i)]
-    if not others:
-        return ()
-    half = "half of an autotransformer feeder: the current of the other conductor is not recorded, or not found"
-    return (f"{half}; its voltage is {_names(recording, others[:1])}",)
+    if others:
+        return (f"{HALF}: no current goes with the other voltage, {_names(recording, others[:1])}",)
+    other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
+    return () if other is None else (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
 
 
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:

@@ -61,10 +61,26 @@ def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, i
     """Whether two currents are opposite in angle, as those of contact line and feeder are, though not in size."""
     if len(volts) == 1 and not BETWEEN[0] <= phasors.size(volts) <= BETWEEN[1]:
         return False
+    return _opposite_angles(phasors, pair)
+
+
+def _opposite_angles(phasors: Snapshots, pair: tuple[int, int]) -> bool:
     x, y = np.nan_to_num(phasors.of(pair))
     both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (np.abs(y) > 0.3 * np.abs(y).max(initial=0.0))
     both &= (np.abs(x) > 0) & (np.abs(y) > 0)
     return bool(both.any() and abs(np.degrees(np.angle(-np.median((x * y.conj())[both])))) < TURNED)
+
+
+def other_conductor(recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]) -> int | None:
+    """The current of the other conductor of an autotransformer feeder, by name and angle; None where there is none."""
+    name = plain(recording.channels[current].name)
+    for other in amps:
+        names = name, plain(recording.channels[other].name)
+        feeds, contacts = [bool(FEED.search(n)) for n in names], [bool(CONTACT.search(n)) for n in names]
+        apart = feeds[0] != feeds[1] and contacts[feeds.index(False)]
+        if other != current and apart and _opposite_angles(phasors, (current, other)):
+            return other
+    return None
 
 
 def is_return(recording: Recording, number: int) -> bool:
@@ -91,7 +107,8 @@ def direct_voltage(recording: Recording) -> str:
         if len(x) < 4 * n:
             continue
         smooth = np.convolve(x, np.full(n, 1 / n), "valid")
-        ripple = float(np.median(np.abs(x[n // 2 : len(x) - n // 2] - smooth))) / 0.6745
+        rest = (x[n // 2 : len(x) - n // 2] - smooth)[: len(smooth) // n * n]
+        ripple = float(np.sqrt(np.median(rest.reshape(-1, n).var(axis=1))))
         mean = float(np.median(smooth))
         if abs(mean) <= DIRECT * ripple or abs(mean) <= DIRECT * float(np.abs(x).max()) / 20:
             if ripple > DIRECT * abs(mean):
