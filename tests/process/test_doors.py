@@ -213,7 +213,7 @@ def outcome(read: Callable[[Path], object], folder: Path) -> str:
     except UserError as error:
         return "" if str(error).strip() else "it is refused without a word"
     except BaseException as error:
-        return f"{type(error).__name__}: {error!s:.200}"
+        return f"{type(error).__name__}: {error!s:.90}"
     finally:
         os.chdir(here)
     return ""
@@ -270,12 +270,12 @@ def mutated(tree, rng):
     return tree
 
 
-def fuzzed(cases: int, seed: int, root: Path) -> dict[int, str]:
+def fuzzed(cases: int, seed: int, root: Path, first: int = 0) -> dict[int, str]:
     """{number of a case: what is wrong}: of each, one to three nodes of one file are changed."""
     import numpy as np
 
     found = {}
-    for k in range(cases):
+    for k in range(first, first + cases):
         rng = np.random.default_rng([seed, k])
         name, made, read = TREES[rng.integers(len(TREES))]
         folder = made(root / str(k) / "0")
@@ -287,9 +287,16 @@ def fuzzed(cases: int, seed: int, root: Path) -> dict[int, str]:
                 tree = mutated(json.loads(json.dumps(tree)), rng)
         path.write_text(json.dumps(tree) if library is json else yaml.safe_dump(tree))
         if why := outcome(read, folder):
-            found[k] = f"{name} {read.__name__}: {why}: {path.read_text()[:300]}"
+            found[k] = f"{name} {read.__name__}: {why}: {path.read_text()[:120]}"
         shutil.rmtree(root / str(k))
     return found
+
+
+FOUND = (368, 1177, 2396, 6277)  # of seed 1: names longer than a system takes for a file's
+
+
+def test_what_was_found_stays_mended(tmp_path):
+    assert [why for k in FOUND for why in fuzzed(1, 1, tmp_path, first=k).values()] == []
 
 
 def test_trees_with_a_few_nodes_changed_are_read_left_or_refused(tmp_path):
