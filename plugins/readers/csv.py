@@ -108,7 +108,8 @@ class CSV(Tabular, Reader):
         pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
         dips = numbered([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            return whole, [FileDip(1, float(whole.t[0]), float(whole.t[-1]), whole)]
+            spans = [(dip.start, dip.end) for dip in dips] or [(float(whole.t[0]), float(whole.t[-1]))]
+            return whole, [FileDip(1, *spans[0], whole)]
         return whole, dips
 
     def _record(self, path: str, base: Base | None = None) -> Record:

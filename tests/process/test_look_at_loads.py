@@ -123,3 +123,20 @@ def test_all_loads_of_a_bus_have_its_voltage_and_its_events(tmp_path):
     assert "load step" not in bus
     (row,) = (line for line in str(shown).splitlines() if line.strip().startswith("Q2"))
     assert "load step at 0.3" in row
+
+
+def test_a_table_that_is_fitted_is_worth_fitting_though_a_longer_ramp_follows_its_dip(tmp_path):
+    """A dip of 45 % and a slow swing after it: what `read` makes an event of, no look calls 'no dip'."""
+    t = np.arange(-240, 720) / 240.0
+    U = np.where((t >= 0) & (t < 1.29), 0.55, 1.0)
+    U = np.where(t >= 1.29, 0.99 + 0.1 * np.clip(t - 1.4, 0.0, 1.5), U)
+    path = tmp_path / "swing.csv"
+    rows = np.stack([t, U, 0.8 * U**1.5, 0.3 * U**2], axis=1)
+    np.savetxt(path, rows, delimiter=",", header="t,U,P,Q", comments="")
+    [event] = tractexp.read(path)
+    shown = tractexp.look(path)
+    [dip] = [one for one in shown.events if one["dip"] == 1]
+    assert (dip["kind"], dip["worth"]) == ("dip", True)
+    assert dip["start"] == pytest.approx(event.t_start, abs=0.02)
+    assert len(shown.commands) == 1
+    assert not any("no dip" in one["why"] for one in shown.events)
