@@ -59,7 +59,7 @@ def test_it_is_said_in_megawatts_where_the_base_is_in_them():
 )
 def test_a_motor_that_no_load_has_is_doubted_and_its_export_asked_for(parameters, doubt):
     result = fitted(**parameters)
-    result = dataclasses.replace(result, adequacy={"grade": "wrong_model", "sentence": "it fits"})
+    result = dataclasses.replace(result, adequacy={"grade": "effect_missing", "sentence": "it fits"})
     fit = Identification(result)
     assert doubt in OperatingPoint.of(result).doubt
     assert bool(doubt) == (fit.headline != "it fits")
@@ -67,6 +67,20 @@ def test_a_motor_that_no_load_has_is_doubted_and_its_export_asked_for(parameters
     with refused if doubt else nullcontext():
         tractexp.export(fit, "andes")
     assert tractexp.export(fit, "andes", doubtful=True).text
+
+
+def test_a_model_that_does_not_describe_the_load_is_exported_when_asked_for_only(tmp_path):
+    sentence = "this model does not describe this load: it leaves 45 % of its response (11 % of S)"
+    wrong = dataclasses.replace(fitted(), adequacy={"grade": "wrong_model", "sentence": sentence, "p": 0.0})
+    wrong.write(tmp_path / "result.json")
+    fit = tractexp.load(tmp_path)
+    assert (fit.grade, fit.headline) == ("wrong_model", sentence)
+    with pytest.raises(UserError) as refused:
+        tractexp.export(fit, "andes")
+    assert str(refused.value).startswith(sentence)
+    for mend in ("task=discrepancy", "task.doubtful=true exports it all the same"):
+        assert mend in str(refused.value)
+    assert tractexp.export(fit, "andes", doubtful=True).notes[0].startswith(sentence)
 
 
 def test_a_parameter_that_a_bound_holds_is_exported_when_asked_for_only():

@@ -10,10 +10,12 @@ from tractexp.api.identify import Identification
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import TASK, UserError, check_choice, check_range
+from tractexp.identification.adequacy import Grade
 from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.plugin import build, plugin
 from tractexp.progress import say
+from tractexp.provenance import again
 from tractexp.record.identity import described
 
 if TYPE_CHECKING:
@@ -58,7 +60,7 @@ def export(
     power: float | None = None,  # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
     voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
     base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
-    doubtful: bool = False,  # export also a model that is no physical load
+    doubtful: bool = False,  # export also a model that does not describe the load, or is no physical one
     playback: bool = True,  # play a dip through the file, in its simulator where that is installed
 ) -> Exported:
     """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
@@ -67,8 +69,8 @@ def export(
     default what the record says, else 100 and 110. `base` "own" writes values on the base of the fit, "file" on that of
     the record's file, where it was another. With `playback` a dip is played through the file (in ANDES where that is
     installed, else by our own simulator from the file's numbers), and the notes say how well it follows the fit.
-    Raises `UserError` where the format cannot represent a part of the model, and for a model that is no physical load
-    unless `doubtful`.
+    Raises `UserError` where the format cannot represent a part of the model, and unless `doubtful` for a model that
+    does not describe the load it was fitted to, or is no physical load.
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import played
@@ -77,10 +79,9 @@ def export(
     check_range("task.power", power, 1e-6)
     check_range("task.voltage", voltage, 1e-6)
     check_choice("task.base", base, BASES)
-    if fit.doubts and not doubtful:
-        raise UserError(
-            f"this model is no physical load: {' and '.join(fit.doubts)}; {TASK.doubtful}=true exports it all the same"
-        )
+    against = _objections(fit)
+    if against and not doubtful:
+        raise UserError(f"{'; '.join(against)}; {TASK.doubtful}=true exports it all the same")
     own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
     file_power = power or (own.file_power if own.in_mva else POWER)
     on_file = base == FILE
@@ -92,6 +93,7 @@ def export(
     form.check_parts(identified)
     text = form.text(identified)
     notes = [
+        *against,
         *filter(None, described(fit.result.identities)),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
         _powers(identified),
@@ -102,6 +104,17 @@ def export(
         more.append(agreement.said(identified.power, ("MW", "Mvar")))
     share = None if agreement is None else agreement.share
     return Exported(format, form.suffix, identified.model.title, text, (*notes, *more), share)
+
+
+def _objections(fit: Identification) -> list[str]:
+    """Why this model should not be handed on, a sentence each: by its grade, and as a physical load."""
+    against = []
+    if fit.grade == Grade.WRONG_MODEL:
+        sentence = fit.result.adequacy["sentence"]
+        against.append(f"{sentence}; find what it lacks by {again('task=discrepancy')}, or choose another model")
+    if fit.doubts:
+        against.append(f"this model is no physical load: {' and '.join(fit.doubts)}")
+    return against
 
 
 def _powers(load: "Identified") -> str:

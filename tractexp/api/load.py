@@ -11,12 +11,13 @@ from tractexp.outcome import MARK, Outcome, saved
 
 @public
 def load(path: str | Path) -> Outcome:
-    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line.
+    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line, or of its folder.
 
-    The latter holds no records: it predicts, simulates and exports, but cannot be judged again. Raises `UserError`
-    where the file is missing, damaged or of no kind known.
+    The latter holds no records: it predicts, simulates and exports, with the error and the grade that the run told, but
+    cannot be judged again. The folder of an investigation gives the model that it ended with. Raises `UserError` where
+    the file is missing, damaged or of no kind known.
     """
-    if _bare(path):
+    if Path(path).is_dir() or _bare(path):
         from tractexp.api.identify import Identification
         from tractexp.identification.result import load as read_result
 

@@ -250,7 +250,7 @@ def load(path: Path) -> Result:
     try:
         return Result.of(files.read_json(path), str(path))
     except FileNotFoundError:
-        raise UserError(f"there is no result file {path}; run an identification first, it writes result.json") from None
+        raise UserError(f"there is no result file {path}; run an identification first, it writes {FILE}") from None
 
 
 def conclude(
