@@ -4,8 +4,8 @@
 
 Were chance's draws all there is to it, the share of data sets whose best effect is as rare as a level of the draws says
 would be that level. What the search does beyond one linear step, and the noise's own estimate, make small p more
-frequent. The criterion `naming_share` is chosen by it, so that with the doubts by what is left all false alarms are at
-most `false_alarms`. Rows go to false_alarms.json; no rate is ever reported of these seeds.
+frequent. `NAMING_SHARE` is chosen by it, so that with the doubts by what is left all false alarms are at most
+`false_alarms`. Rows go to false_alarms.json; no rate is ever reported of these seeds.
 """
 
 import argparse

@@ -12,7 +12,8 @@ import oracle  # noqa: F401
 from hidden_effects.laws import MEMBERS_LAW
 
 Rows = list[dict]
-VERDICTS = ("none", "named", "tied", "unexplained")
+VERDICTS = ("none", "candidate", "named", "tied", "unexplained")
+ONE_NAME = ("named", "candidate")  # a candidate counts as the name that it is, right or wrong
 OTHERS = ("rotor_skin_effect", "stator_transients")  # orders of the model, which have no law of their own
 CHAIN = {"time_skew", "measurement_window", "load_change"}  # nuisances may be named where they are there
 MULTIPLES = (2.0, 4.0, 8.0)  # of the detection limit
@@ -103,12 +104,12 @@ PICKS = {"AIC": aic, "BIC": bic, "RMSE": rmse, "STLSQ": sparse}
 
 def wrong(row: dict) -> bool:
     """Whether one set was named and it is not the truth."""
-    return row["verdict"] == "named" and sorted(row["names"]) != row["truth"]
+    return row["verdict"] in ONE_NAME and sorted(row["names"]) != row["truth"]
 
 
 def right(row: dict) -> bool:
     """Whether the truth alone was named."""
-    return row["verdict"] == "named" and sorted(row["names"]) == row["truth"]
+    return row["verdict"] in ONE_NAME and sorted(row["names"]) == row["truth"]
 
 
 def in_set(row: dict) -> bool:
@@ -152,7 +153,7 @@ def _answers(rows: Rows) -> tuple[list[str], list[list]]:
     """Verdicts, beside what AIC, BIC, the error alone and sparse regression pick among the same candidates."""
     lines = []
     for what, members in _groups(rows).items():
-        named = [r for r in members if r["verdict"] == "named"]
+        named = [r for r in members if r["verdict"] in ONE_NAME]
         tied = [r for r in members if r["verdict"] == "tied"]
         allowed = CHAIN if what.startswith("faults") else set()
         good = [right(r) or (bool(allowed) and {*r["names"]} <= allowed) for r in named]
@@ -186,7 +187,9 @@ def _strangers(rows: Rows) -> tuple[list[str], list[list]]:
             made = [r for r in own if r["proposal"]]
             true = "-" if own is left_out else sum(map(_is_right, made))
             lines.append([what, len(own), share(_count(own, "unexplained"), len(own)),
-                          *(_count(own, v) for v in ("tied", "named", "none")), len(made), true])  # fmt: skip
+                          _count(own, "tied"),
+                          sum(r["verdict"] in ONE_NAME for r in own), _count(own, "none"), len(made),
+                          true])  # fmt: skip
     head = ["hidden, non-centrality left by the best effect", "data sets", "unexplained", "tied", "one name", "none",
             "a term proposed", "the right term"]  # fmt: skip
     return head, lines
@@ -202,7 +205,7 @@ def _pairs(rows: Rows) -> tuple[list[str], list[list]]:
     for multiple in MULTIPLES:
         full = [r for r in rows if r["group"] == f"pairs {multiple:g} x" and reached(r, multiple)]
         if full:
-            partly = [r for r in full if r["verdict"] == "named" and {*r["names"]} < {*r["truth"]}]
+            partly = [r for r in full if r["verdict"] in ONE_NAME and {*r["names"]} < {*r["truth"]}]
             lines.append([
                 f"two effects, {multiple:g} x", len(full), sum(map(right, full)), sum(map(in_set, full)),
                 len(partly), _count(full, "unexplained"), sum(map(wrong, full)) - len(partly),
@@ -226,7 +229,7 @@ def _partly(rows: Rows) -> str:
 
 
 def _proposals(rows: Rows) -> str:
-    named = [r for r in rows if r["group"].startswith("null") or r["verdict"] == "named"]
+    named = [r for r in rows if r["group"].startswith("null") or r["verdict"] in ONE_NAME]
     made = sum(bool(r["proposal"]) for r in named)
     return f"A term was proposed in {made} of the {len(named)} data sets with nothing missing or with one name."
 
@@ -280,7 +283,7 @@ def _hidden(row: dict) -> str:
 
 
 def _column(row: dict, names: Iterable[str]) -> str:
-    if row["verdict"] == "named":
+    if row["verdict"] in ONE_NAME:
         return row["names"][0] if len(row["names"]) == 1 and row["names"][0] in names else "another, or several"
     if row["verdict"] == "tied":
         return "tied, truth among" if in_set(row) else "tied, truth not"

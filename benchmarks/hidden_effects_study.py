@@ -166,12 +166,10 @@ def _counted(found) -> dict:
 def _predicted(found) -> list[tuple[list[str], float]]:
     """Sets that were fitted by least squares, the best first, and the model's error with each on held-out events; the
     base model last. None where names went by the deviance."""
-    from tractexp.discrepancy.prediction import ErrorPredictions
-
-    if not isinstance(predicted := found.held_out.predictions, ErrorPredictions):
+    if found.evidence.there is None:
         return []
-    every = sorted(predicted.sets.values(), key=lambda one: one.left)
-    return [([*one.names], one.error) for one in (*every[:5], predicted.bare)]
+    every = sorted(found.evidence.every, key=lambda row: row.prediction.left)
+    return [([*row.names], row.prediction.error) for row in (*every[:5], found.evidence.base)]
 
 
 def _refits(found) -> list[tuple[list[str], float, int]]:

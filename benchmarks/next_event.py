@@ -103,7 +103,7 @@ def row(seed: int) -> dict | None:
 def table(rows: Sequence[dict]) -> str:
     """Predicted and seen, as docs/missing-effects.md has it."""
     ties = [r for r in rows if r["verdict"] == "tied"]
-    gone = [r for r in ties if r["after"] == "named"]
+    gone = [r for r in ties if r["after"] in ("named", "candidate")]
     right = [r for r in gone if r["sets_after"] == [[r["effect"]]]]
     lines = ["| predicted for the truth | ties | predicted, mean | truth alone left |", "| --- | --- | --- | --- |"]
     for low, high in itertools.pairwise(BINS):

@@ -91,7 +91,7 @@ def test_an_investigation_names_what_is_missing_and_gives_a_model_again(found, f
 
 def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
     """A base model under the name of an extended one would pass for an answer."""
-    found = tractexp.investigate(dips[:2], effects=["speed_dependent_torque"], criteria={"naming_share": 0.0})
+    found = tractexp.investigate(dips[:2], effects=["speed_dependent_torque"], criteria={"adequate_p": 1.0})
     assert found.names == ()
     with pytest.raises(UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"):
         _ = found.extended

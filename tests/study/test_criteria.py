@@ -7,23 +7,30 @@ import numpy as np
 import pytest
 from test_discrepancy import FEW, base, events, steady
 
+from tractexp.discrepancy import criteria, disagreement, judgement
 from tractexp.discrepancy.criteria import CHOSEN, DERIVED, Criteria
+from tractexp.discrepancy.decide import beats, decide, holds
 from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, SetEvidence
 from tractexp.discrepancy.families import worth
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import Assessment
-from tractexp.discrepancy.incomplete import PredictedDeviance
+from tractexp.discrepancy.held_out import closes_enough
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.judgement import assessment
+from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import EventTrial, mildest
 from tractexp.discrepancy.next_event.imagined import ImaginedDip
 from tractexp.discrepancy.next_event.separation import Chances
+from tractexp.discrepancy.proposal import judge
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.errors import UserError
+from tractexp.inference import catalogue, chance
 from tractexp.inference.catalogue import candidate, missing_channel
 from tractexp.inference.chance import Chance
+from tractexp.inference.context import FAULT_PRIOR
 from tractexp.inference.fitting import Refit
 from tractexp.inference.free_set import FreeSet
+from tractexp.inference.noise_in_quiet import WALK_SEEN
 from tractexp.inference.score_test import Score
 from tractexp.noise.random_walk import Rest, find
 from tractexp.parameter import Box
@@ -52,10 +59,16 @@ def refitted(deviance, parameters):
     return Refit(("one",), np.zeros(0), deviance, parameters)
 
 
-def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0, explained=0.0):
+def judged_by(c, closed=1.0, gain=100.0, expected=100.0, p_left=1.0):
     """What held-out events say of an explanation."""
-    gap = GapTest(None, None, gain, abs(gain) * (1 / closed - 1), expected, c.shown, None)
-    return Assessment(gap, SimpleNamespace(criteria=c), (), explained, p_left=p_left)
+    gap = measured_gap(c, closed, gain, expected)
+    return SetEvidence(None, ("one",), ("one",), gap=gap, p_of_all=p_left)
+
+
+def measured_gap(c, closed=1.0, gain=100.0, expected=100.0):
+    """A gap of which so much of what exceeds the noise is closed."""
+    left = abs(gain) * (1 / closed - 1)
+    return GapTest(None, None, gain, left, expected, c.shown, None, SimpleNamespace(criteria=c))
 
 
 def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
@@ -73,109 +86,137 @@ def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
 
 def deviance(left):
     """What a set leaves of held-out events."""
-    return PredictedDeviance(refitted(0.0, 1), left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)
+    prediction = PredictedDeviance(left, SimpleNamespace(deviance=1000.0 + left), False, 10.8)
+    return SetEvidence(refitted(0.0, 1), ("one",), ("one",), prediction=prediction)
 
 
-def named_of_all(c, lowered, word="named"):
-    """An investigation of all events whose name lowers the deviance by so much."""
-    verdict = SimpleNamespace(word=word, chosen=SimpleNamespace(lowered=lowered))
-    return SimpleNamespace(verdict=verdict, context=SimpleNamespace(criteria=c))
+def word_of(c, row, base_p=0.0):
+    """The verdict on one set alone that leaves nothing of the fitted events."""
+    base = SetEvidence(refitted(1000.0, 0), (), (), p_left=base_p)
+    row = dataclasses.replace(row, fit=refitted(0.0, 1), behind=0.0, p_left=1.0)
+    return decide(Evidence(base, (row,)), c).word
 
 
-def wandering(c, seed, rests=(), walk=0.0):
+def closes_share(c, closed, kept=1):
+    """Whether an investigation of all events that keeps so many sets closes a share of the model's error."""
+    errors = {"before": 1.0, "after": 1.0 - closed}
+    graded = {"base_grade": "before", "final_grade": "after", "context": SimpleNamespace(criteria=c)}
+    judged = {"judged": lambda which: SimpleNamespace(error=SimpleNamespace(square=errors[which]))}
+    verdict = SimpleNamespace(kept=("one",) * kept)
+    return Findings.closes_share.fget(SimpleNamespace(verdict=verdict, **graded, **judged))
+
+
+def wandering(seen, seed, rests=(), walk=0.0):
     """How a load wanders that shows noise and a random walk before its event; None where it is not said to."""
     rng = np.random.default_rng(seed)
     before = rng.normal(size=(2, 250)) + np.cumsum(rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1)
-    return find([before], 0.002, steady(1000), rests, seen=c.wandering)
+    return find([before], 0.002, steady(1000), rests, seen=seen)
 
 
-def wandering_within(c):
+def wandering_within(seen):
     """The same with what is left of the event, which shows a little more than the stretch before it."""
     rng = np.random.default_rng(24)
     left = rng.normal(size=(2, 1000)) + np.cumsum(rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1)
-    return wandering(c, 73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
+    return wandering(seen, 73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
 
 
-def prior_of_skew(c):
+def prior_of_skew(prior):
     """How far clocks are believed to be off [s]."""
     skew = candidate(get("effect", "time_skew")())
     known = {"of_measurement": ("time_skew",), "members": (), "__getitem__": lambda self, name: skew}
     catalogue = type("One", (), known)()
     one = np.array([0.0])
     box = Box(one - 0.01, one + 0.01, ("skew",))
-    at = FreeSet(box, one, one, one, 1, catalogue, c.measurement_prior)
+    at = FreeSet(box, one, one, one, 1, catalogue, prior)
     return at.prior_deviation[0] * at.width("skew")
 
 
-def swinging(c, swing=0.045):
+def swinging(swing=0.045):
     """Why an effect of the frequency cannot be tested where it swings by so much."""
     record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
-    return missing_channel(
-        get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))], c.frequency_swing
-    )
+    return missing_channel(get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))])
 
 
-def status(c):
+def status():
     """Of an effect that would be seen with a probability of 0.75 at its smallest relevant size."""
     one = candidate(get("effect", "stator_resistance")())
     score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.01 / (1.6449 + 0.6745)}, {})
-    return assessment(one, score, 0.05, c.testable)[0]
+    return assessment(one, score, 0.05)[0]
 
 
-def chosen_dip(c):
+def chosen_dip():
     tried = [
         EventTrial(ImaginedDip(depth, 0.1), Chances(np.array([p]), np.ones((1, 1))))
         for depth, p in ((0.2, 0.93), (0.6, 0.99))
     ]
-    return mildest(tried, c.decided).event.depth
+    return mildest(tried, choose.DECIDED).event.depth
 
 
 def with_a_member(c, **assessment):
     """An explanation of several effects that is shown, and what held-out events say of one of them."""
-    return dataclasses.replace(judged_by(c), of_member={"one": judged_by(c, **assessment)})
+    return dataclasses.replace(judged_by(c), without={"one": measured_gap(c, **assessment)})
 
 
 def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
     """A term that would be proposed; with the pushes it explains the `whole`."""
-    judged = judged_by(c, closed=explained, gain=explained * whole, expected=whole)
+    judged = measured_gap(c, closed=explained, gain=explained * whole, expected=whole)
     return TermAssessment(None, judged, judged, p)
 
 
 def test_what_only_gets_worse_explains_nothing():
-    assert [judged_by(Criteria(), gain=gain).gap.explained for gain in (-5.0, 0.0, 5.0)] == [0.0, 0.0, 1.0]
+    assert [measured_gap(Criteria(), gain=gain).explained for gain in (-5.0, 0.0, 5.0)] == [0.0, 0.0, 1.0]
 
 
 CASES = {  # criterion: a looser value, the decision, what it is by default
     "false_alarms": (0.06, lambda c: at_fit(c, 0.022).asks_for_more, False),
-    "naming_share": (0.45, lambda c: at_fit(c, 0.021).asks_for_more, False),
     "adequate_p": (0.0006, lambda c: at_fit(c, 1.0, left=0.0008).adequate, False),
     "further_name_p": (3e-5, lambda c: at_fit(c, 2e-5, names=("one",)).asks_for_more, False),
     "rejected": (0.06, lambda c: c.rejects(5.9), False),
-    "mended": (0.04, lambda c: c.stands_out(45.0, 1000.0), False),
-    "shown": (9.0, lambda c: judged_by(c, gain=10.0).helps, False),
-    "evident": (90.0, lambda c: judged_by(c, gain=5.0, expected=6.0, explained=95.0).helps, False),
-    "divides": (2.0, lambda c: judged_by(c, closed=0.78).convincing, False),
-    "ahead": (1.4, lambda c: deviance(100.0).ahead_of(deviance(200.0), c.ahead), False),
-    "window_share": (0.4, lambda c: c.least_window(best=1000.0) < 450.0, False),
-    "blurred": (0.7, lambda c: at_fit(c, 1.0, fault_p=1e-9, blur=0.6).faults, ()),
-    "quiet_worth": (100.0, lambda c: c.knows_noise(120.0), False),
-    "wandering": (1.5, lambda c: wandering(c, 73) is not None, False),
-    "measurement_prior": (6.0, lambda c: prior_of_skew(c) < 0.0051, True),
-    "frequency_swing": (0.04, lambda c: "moves by less than" in swinging(c), True),
-    "testable": (0.7, status, "not testable"),
-    "proposal_p": (0.02, lambda c: proposed(c, p=0.011).stands(c), False),
-    "decided": (0.9, chosen_dip, 0.6),
+    "shown": (9.0, lambda c: word_of(c, judged_by(c, gain=10.0, expected=11.0)), "candidate"),
+    "divides": (2.0, lambda c: closes_enough(judged_by(c, closed=0.78)), False),
+    "ahead": (1.4, lambda c: beats(deviance(100.0), deviance(200.0), c), False),
 }
 FURTHER = [  # decisions by a criterion that has one above, too
-    ("adequate_p", 0.0006, lambda c: judged_by(c, p_left=0.0008).helps, False),
-    ("shown", 9.0, lambda c: c.least_window(best=0.0) < 9.5, False),
-    ("shown", 9.0, lambda c: with_a_member(c, gain=10.0).helps, False),
-    ("evident", 90.0, lambda c: with_a_member(c, gain=5.0, expected=6.0, explained=95.0).helps, False),
-    ("evident", 90.0, lambda c: Findings.evident.fget(named_of_all(c, lowered=95.0)), False),
-    ("wandering", 1.5, lambda c: wandering_within(c) is not None, False),
+    ("adequate_p", 0.0006, lambda c: holds(judged_by(c, p_left=0.0008), c), False),
+    ("adequate_p", 0.0006, lambda c: word_of(c, judged_by(c, gain=-99.0), base_p=0.0008), "unexplained"),
+    ("shown", 9.0, lambda c: word_of(c, with_a_member(c, gain=10.0, expected=11.0)), "candidate"),
     ("ahead", 1.45, lambda c: proposed(c, explained=0.54).stands(c), False),
+    ("ahead", 1.45, lambda c: closes_share(c, 0.54), False),
     ("shown", 9.0, lambda c: proposed(c, whole=11.0).stands(c), False),
 ]
+NUMBERS = [  # of one algorithm alone: where it stands, a looser value, what it decides, what that is by default
+    (criteria, "NAMING_SHARE", 0.45, lambda: at_fit(Criteria(), 0.021).asks_for_more, False),
+    (disagreement, "BLURRED", 0.7, lambda: at_fit(Criteria(), 1.0, fault_p=1e-9, blur=0.6).faults, ()),
+    (chance, "QUIET_WORTH", 100.0, lambda: is_known(120.0), False),
+    (catalogue, "LEAST_SWING", 0.04, lambda: "moves by less than" in swinging(), True),
+    (judgement, "TESTABLE", 0.7, status, "not testable"),
+    (judge, "PROPOSED_P", 0.02, lambda: proposed(Criteria(), p=0.011).stands(Criteria()), False),
+    (choose, "DECIDED", 0.9, chosen_dip, 0.6),
+]
+
+
+def is_known(worth):
+    """Whether quiet stretches worth so many independent samples tell the noise exactly enough."""
+    problem = SimpleNamespace(quiet=())
+    context = SimpleNamespace(problem=problem, domain=SimpleNamespace(noise_from_model=False))
+    return chance.is_noise_exact(context, SimpleNamespace(worth=lambda samples: worth))
+
+
+@pytest.mark.parametrize(("module", "name", "looser", "decide", "by_default"), NUMBERS)
+def test_a_looser_number_of_an_algorithm_decides_otherwise(monkeypatch, module, name, looser, decide, by_default):
+    assert decide() == by_default
+    monkeypatch.setattr(module, name, looser)
+    assert decide() != by_default
+
+
+def test_a_wider_prior_lets_clocks_be_farther_off():
+    assert prior_of_skew(FAULT_PRIOR) < 0.0051 < prior_of_skew(6.0)
+
+
+@pytest.mark.parametrize("walk", [lambda seen: wandering(seen, 73), wandering_within])
+def test_a_lower_likelihood_lets_a_load_wander(walk):
+    assert walk(WALK_SEEN) is None
+    assert walk(1.5) is not None
 
 
 def test_every_criterion_has_a_case_and_an_origin():
@@ -187,9 +228,12 @@ def test_every_criterion_has_a_case_and_an_origin():
         assert told["why"], name
 
 
-@pytest.mark.parametrize(("word", "evident"), [("named", True), ("tied", False)])
-def test_what_no_held_out_event_shows_is_told_without_a_rival_only(word, evident):
-    assert Findings.evident.fget(named_of_all(Criteria(), 1e3, word)) == evident
+@pytest.mark.parametrize(
+    ("kept", "closed", "told"), [(1, 0.9, True), (2, 0.9, False), (1, 0.5, False), (1, np.nan, False)]
+)
+def test_what_only_all_events_show_closes_a_share_of_the_error_and_has_no_rival(kept, closed, told):
+    """A name closed 7 % of the gap once, because its deviance was beyond a hundred."""
+    assert closes_share(Criteria(), closed, kept) == told
 
 
 def test_a_member_of_a_family_pays_as_a_second_name_does():

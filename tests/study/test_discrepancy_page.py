@@ -11,13 +11,14 @@ import pytest
 from pages import charts, read
 from test_discrepancy import FEW, base, events
 
-from tractexp.discrepancy import verdict
 from tractexp.discrepancy.discrepancy_json import content
-from tractexp.discrepancy.evidence import CHOSEN, beside, chance_level, evidence, why_not_the_most_helpful
+from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.explain import explain_rest
 from tractexp.discrepancy.investigate import investigate
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, overlay
+from tractexp.report.candidate_rows import CHOSEN, beside, chance_level, list_candidates, why_not_the_most_helpful
 from tractexp.report.events import WITHIN
 from tractexp.wording import joined
 
@@ -109,10 +110,10 @@ def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
 
 
 def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
-    rows = evidence(named)
+    rows = list_candidates(named)
     assert rows[0].names == ("stator_resistance",)
     assert rows[0].status == CHOSEN
-    assert rows[0].drop == pytest.approx(named.survivors.rivals[0].lowered)
+    assert rows[0].drop == pytest.approx(named.evidence.rows[0].lowered)
     (size,) = rows[0].sizes
     assert size.parameter.name == "R_s"
     assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
@@ -130,7 +131,8 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
 def promising(named, score):
     """The investigation with another score first."""
     first = replace(named.first, scores=[score, *named.first.scores])
-    return replace(named, held_out=replace(named.held_out, first=first))
+    base = replace(named.evidence.base, tests=first)
+    return replace(named, evidence=replace(named.evidence, base=base))
 
 
 def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named):
@@ -210,27 +212,25 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
 )
 def test_faults_of_the_measurement_are_not_counted_among_the_effects_together(names, faults, told):
     catalogue = SimpleNamespace(spoken=lambda name: name, candidates=range(19))
-    bench = SimpleNamespace(catalogue=catalogue)
-    tests = SimpleNamespace(context=bench, p_left=0.001, loudest="pushes into the balances")
-    best = SimpleNamespace(fit=SimpleNamespace(names=names), tests=tests)
-    explained = SimpleNamespace(faults=faults, base=SimpleNamespace(context=bench))
-    left = SimpleNamespace(retained=[best], explanations=explained)
-    weighed = SimpleNamespace(survivors=left, faults=faults, first=tests)
-    assert told in verdict._unexplained(weighed, SimpleNamespace(closed=(0.66, 0.5)))
-    assert "nan" not in verdict._unexplained(weighed, SimpleNamespace(closed=(np.nan, np.nan)))
+    context = SimpleNamespace(catalogue=catalogue)
+    tests = SimpleNamespace(loudest="pushes into the balances")
+    best = SetEvidence(SimpleNamespace(names=names), names, names, p_left=0.001, tests=tests)
+    evidence = Evidence(None, (best,), faults=faults)
+    assert told in explain_rest(evidence, SimpleNamespace(closed=(0.66, 0.5)), context)
+    assert "nan" not in explain_rest(evidence, SimpleNamespace(closed=(np.nan, np.nan)), context)
 
 
 def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path):
     """It says what was tested, not what the catalogue holds, and numbers that can be pictured."""
-    reason = unexplained.verdict.reason
+    reason = unexplained.reason
     tested = len(unexplained.catalogue.candidates)
     assert tested == len(FEW) + 3
     assert f"none of the {tested} effects tested" in reason
     assert "catalogue" not in reason
     assert not re.search(r"e-\d\d", reason)
-    near = unexplained.verdict.nearest
+    near = unexplained.nearest
     assert near is not None
-    before, after = (in_percent(unexplained.held_out.predictions.sets[names].error) for names in ((), near.names))
+    before, after = (in_percent(unexplained.evidence.row_of(names).prediction.error) for names in ((), near.names))
     assert re.search(
         rf"the nearest, miss(es)? {after} of the response there, where the base model misses {before}", reason
     )

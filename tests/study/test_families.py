@@ -10,17 +10,18 @@ from scipy.optimize import least_squares
 from test_discrepancy import FAST, LOUD, base, bench, events
 
 import tractexp.discrepancy.investigate as investigating
-from tractexp.discrepancy import families, held_out, survivors
+from tractexp.discrepancy import families, held_out, rival_sets
 from tractexp.discrepancy.all_events import AllEvents, JointFit
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.decide import Verdict, decide, find_adequate, holds
 from tractexp.discrepancy.discrepancy_json import recommendation
+from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import worth_another
 from tractexp.discrepancy.families import against_members, open_settings, starts, worth
 from tractexp.discrepancy.forms import forms
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import Assessment, HeldOut, assess
+from tractexp.discrepancy.held_out import assess
 from tractexp.discrepancy.investigate import investigate
-from tractexp.discrepancy.verdict import Verdict
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, plugin
 from tractexp.inference import fit_effort, fitting
@@ -120,7 +121,7 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     at = made.context.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.explained > 0.9
-    there = tangent(made.context, made.extended, made.held_out.noise)  # its instants are no parameters of each event:
+    there = tangent(made.context, made.extended, made.evidence.noise)  # its instants are no parameters of each event:
     assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
 
 
@@ -199,26 +200,26 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     bare = fit(1000.0, 0)
     rows = np.array([[0.0, 0.0], [2.0, 0.0], [14.0, 0.0]])
     at = SimpleNamespace(
-        criteria=Criteria(), catalogue=SimpleNamespace(of_measurement=(), of_load=("chosen", "better", "far")),
+        criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names),
         effort=Effort(),
         coordinates=SimpleNamespace(parameters=lambda names: []), rows=lambda *_: rows,
     )  # fmt: skip
     monkeypatch.setattr(
-        survivors, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
+        rival_sets, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
     )
-    monkeypatch.setattr(survivors, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, adequate=False))
-    last = SimpleNamespace(fit=chosen, noise=None, adequate=True)
+    monkeypatch.setattr(rival_sets, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0))
+    last = SimpleNamespace(fit=chosen, noise=None, p_left=1.0)
     explained = SimpleNamespace(
-        base=SimpleNamespace(context=at, quiet=None), last=last, chosen=chosen, steps=[SimpleNamespace(fit=bare)],
-        refits={f.names: f for f in (bare, better, chosen, far)},
+        base=SimpleNamespace(context=at, quiet=None), last=last, chosen=chosen, faults=(),
+        steps=[SimpleNamespace(fit=bare, p_left=0.0)], refits={f.names: f for f in (bare, better, chosen, far)},
     )  # fmt: skip
-    left = survivors.survivors(explained, 0)
-    assert [(r.fit.names, r.behind, r.tests.fit.names) for r in left.retained] == [
+    evidence = rival_sets.compare_rivals(explained, 0)
+    assert [(row.fit.names, row.behind, row.tests and row.tests.fit.names) for row in evidence.rows] == [
         (("chosen",), 0.0, ("chosen",)),
         (("better",), -4.0, ("better",)),
+        (("far",), 196.0, None),
     ]
-    assert [r.fit.names for r in left.adequate] == [("chosen",)]
-    assert [r.rejected for r in left.rivals] == [False, False, True]
+    assert [row.fit.names for row in find_adequate(evidence, Criteria())] == [("chosen",)]
 
 
 def test_a_saturation_with_a_knee_is_named_by_its_family_though_the_textbooks_law_is_far_behind_a_compensator():
@@ -243,14 +244,14 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
     fits = [fit(0.0, 1, name) for name in ("one", "other")]
     joint = [JointFit(replace(f, deviance=cost - 2), 10.0, p) for f, cost, p in zip(fits, costs, p_left, strict=True)]
     both = SimpleNamespace(
-        fitted=at, events=(), bare=fit(500.0, 0), plain=SimpleNamespace(cost=500.0), compared=lambda *_: joint,
-        undoubted=lambda fits: False, without_each=lambda fit: {}, fitted_to_all=lambda fits: fits,
+        fitted=at, events=(), bare=fit(500.0, 0), plain=SimpleNamespace(cost=500.0), compare=lambda *_: joint,
+        is_undoubted=lambda fits: False, without_each=lambda fit: {}, fit_to_all=lambda fits: fits,
     )  # fmt: skip
     gains = {f.names: 100.0 if good else -100.0 for f, good in zip(fits, helps, strict=True)}
     judged = lambda context, events, bare, fits: {  # noqa: E731
-        f.names: Assessment(GapTest(None, None, gains[f.names], 10.0, 100.0, 10.8, None), at, ()) for f in fits
+        f.names: GapTest(None, None, gains[f.names], 10.0, 100.0, 10.8, None) for f in fits
     }
-    return both, {f.names: f for f in fits}, judged
+    return both, [SetEvidence(f, f.names, f.names) for f in fits], judged
 
 
 @pytest.mark.parametrize(
@@ -259,16 +260,15 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
         ((100.0, 105.0), (1.0, 1.0), (True, True), ["one", "other"], []),
         ((100.0, 107.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
         ((107.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
-        ((100.0, 105.0), (1.0, 0.0008), (True, False), ["one"], []),  # it leaves something of all events
         ((100.0, 105.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
     ],
 )
 def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
-    both, extended, judged = compared(costs, p_left, helps)
-    monkeypatch.setattr(held_out, "judged_on", judged)
-    assessments, fits = assess(both, extended, 0)
-    assert [names[0] for names, one in assessments.items() if one.helps] == standing
-    assert [f.names[0] for f in fits] == again
+    both, rows, judged = compared(costs, p_left, helps)
+    monkeypatch.setattr(held_out, "compare_on", judged)
+    assessed = assess(both, rows, 0)
+    assert [row.names[0] for row in assessed if holds(row, Criteria())] == standing
+    assert [row.names[0] for row in assessed if row.is_fitted_to_all] == again
 
 
 @pytest.mark.parametrize(
@@ -276,8 +276,7 @@ def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, hel
     [
         (20.0, 100.0, 30.0, []),
         (5.0, 100.0, 30.0, ["other"]),
-        (5.0, 6.0, 30.0, ["other"]),  # the held-out events are too mild, and the fitted ones leave a doubt
-        (5.0, 6.0, 130.0, []),
+        (5.0, 6.0, 30.0, []),  # the held-out events are too mild to show or to deny it
         (-5.0, 100.0, 130.0, ["other"]),
     ],
 )
@@ -285,18 +284,22 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, ex
     """The pair gains 200 over the base model, and as much over the other one of them."""
     both, _, _ = compared((100.0, 100.0))
     pair, fewer = fit(0.0, 2, "one", "other"), {"one": fit(200.0, 1, "other"), "other": fit(alone, 1, "one")}
-    joint = SimpleNamespace(fit=pair, p_left=1.0, confirmed=lambda criteria: False)
-    both = SimpleNamespace(**{**vars(both), "without_each": lambda fit: fewer, "compared": lambda *_: [joint]})
+    joint = SimpleNamespace(fit=pair, p_left=1.0, is_confirmed=lambda criteria: False)
+    both = SimpleNamespace(**{**vars(both), "without_each": lambda fit: fewer, "compare": lambda *_: [joint]})
 
     def judged(context, events, bare, fits):
         gap = (gain, 0.0, expected) if bare.names == ("one",) else (200.0, 0.0, 200.0)
-        return {f.names: Assessment(GapTest(None, None, *gap, 10.8, None), both.fitted, ()) for f in fits}
+        return {f.names: GapTest(None, None, *gap, 10.8, None) for f in fits}
 
-    monkeypatch.setattr(held_out, "judged_on", judged)
-    (assessment,) = assess(both, {pair.names: pair}, 0)[0].values()
-    assert assessment.evident
-    assert assessment.needless == needless
-    assert assessment.helps == (not needless)
+    monkeypatch.setattr(held_out, "compare_on", judged)
+    (row,) = assess(both, [SetEvidence(pair, pair.names, pair.names)], 0)
+    assert row.gap.is_shown
+    assert [name for name, gap in row.without.items() if gap.is_denied] == needless
+    assert holds(row, Criteria()) == (not needless)
+    verdict = decide(
+        Evidence(SetEvidence(fit(0.0, 0), (), (), p_left=0.0), (replace(row, behind=0.0, p_left=1.0),)), Criteria()
+    )
+    assert verdict.word == ("unexplained" if needless else "named" if gain >= 10.8 else "candidate")
 
 
 @pytest.mark.parametrize(
@@ -309,16 +312,13 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, ex
     ],
 )
 def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, kept):
-    at = SimpleNamespace(criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names))
-    told = {("chosen",): chosen, ("rival",): rival}
-    judged = {
-        names: Assessment(GapTest(None, None, 100.0, 5.0, 100.0, 10.8, None), at, (), p_left=p)
-        for names, p in told.items()
-    }
-    adequate = [SimpleNamespace(fit=fit(0.0, 1, *names)) for names in told]
-    surviving = SimpleNamespace(adequate=adequate, explanations=SimpleNamespace(base=SimpleNamespace(context=at)))
-    made = HeldOut(surviving, None, None, None, (), None, {}, judged)
-    assert [r.fit.names[0] for r in made.retained] == kept
+    gap = GapTest(None, None, 100.0, 5.0, 100.0, 10.8, None)
+    rows = [
+        SetEvidence(fit(0.0, 1, name), (name,), (name,), behind=0.0, p_left=1.0, gap=gap, p_of_all=p)
+        for name, p in (("chosen", chosen), ("rival", rival))
+    ]
+    verdict = decide(Evidence(SetEvidence(fit(0.0, 0), (), (), p_left=0.0), tuple(rows)), Criteria())
+    assert [row.names[0] for row in verdict.kept] == kept
 
 
 @pytest.mark.parametrize(
@@ -367,13 +367,15 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
     told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
     doubtful, of_all = investigations
     assert told.names == of_all.names == ("undervoltage_trip",)
-    assert "only all events together show it, so all were fitted, and none is left to confirm it" in told.verdict.reason
+    assert told.verdict.word == "candidate"
+    assert told.closes_share
+    assert "only all events together show it, so all were fitted, and none is left to confirm it" in told.reason
     assert told.fitted_to_both
     assert not of_all.fitted_to_both
     assert (len(told.context.events), told.withheld, told.validate) == (4, (), None)
     assert doubtful.first.adequate
     assert doubtful.verdict.word == "unexplained"
-    assert "the fitted events alone show no disagreement, but all events together do" in doubtful.verdict.reason
+    assert "the fitted events alone show no disagreement, but all events together do" in doubtful.reason
     assert recommendation(doubtful) == "fit the held-out events, too (data.train)"
     assert (
         doubtful.final_grade.adequacy.grade == "adequate"
@@ -384,28 +386,27 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
 
 
 @pytest.mark.parametrize(
-    ("word", "evident", "chosen"),
+    ("word", "closes", "chosen"),
     [("unexplained", True, "of all"), ("unexplained", False, "as asked"), ("named", True, "as asked")],
 )
-def test_all_events_are_fitted_where_nothing_is_named_and_their_name_leaves_no_doubt(
-    monkeypatch, word, evident, chosen
-):
+def test_all_events_are_fitted_where_nothing_is_named_and_their_name_closes_a_share(monkeypatch, word, closes, chosen):
     """A name that predicts the held-out events is kept: that of all events predicts none."""
-    held = SimpleNamespace(shows_more=True, open=True)
+    mild = SetEvidence(None, (), (), gap=GapTest(None, None, 1.0, 0.0, 1.0, 10.8, None))  # so that no term is sought
+    held = Evidence(SetEvidence(None, (), (), p_of_all=0.0), (mild,))
     empty = dict.fromkeys(item.name for item in dataclasses.fields(investigating.Findings))
 
     def findings_of(base, validate, seed, grader):
-        verdict = Verdict(word, "as asked" if validate else "of all", (), (), None, None, None, complete=False)
-        return investigating.Findings(**empty | {"held_out": held, "by_likelihood": held, "verdict": verdict})
+        found = {"evidence": held, "by_likelihood": held, "verdict": Verdict(word, (), complete=False)}
+        return investigating.Findings(**empty | found | {"withheld": "as asked" if validate else "of all"})
 
-    monkeypatch.setattr(investigating.Findings, "evident", evident)
+    monkeypatch.setattr(investigating.Findings, "closes_share", closes)
     monkeypatch.setattr(investigating.Findings, "base_values", None)
     monkeypatch.setattr(Kernels, "too_coarse", lambda *_: False)
     monkeypatch.setattr(investigating, "base_fit", lambda context: None)
     monkeypatch.setattr(investigating, "_findings", findings_of)
     made = events(count=2)
     told = investigate(base(), made[:1], made[1:], {}, {}, only=TRIPS[:1])
-    assert told.verdict.reason.startswith(chosen)
+    assert told.withheld == chosen
     assert bool(told.all_fitted) == (chosen == "of all")
 
 

@@ -128,7 +128,7 @@ def test_of_waveforms_they_refuse_and_say_what_to_take(name):
 def test_the_order_that_the_load_has_is_named(higher, own, expected):
     made = drawn(higher, **own)
     found = investigate(model("electromechanical"), made[:2], made[2:], only=FEW)
-    assert (found.verdict.word, found.names) == ("named", expected), found.verdict.reason
+    assert (found.verdict.word, found.names) == ("named", expected), found.reason
     assert found.validate.explained > 0.95
     assert abs(found.validate.closed - 1) < 0.1
 

@@ -12,13 +12,14 @@ import tractexp
 from hidden_effects import Case, Recorder, make
 from tractexp.blocks import Report
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.incomplete import PredictedDeviance
+from tractexp.discrepancy.decide import beats, decide, find_nearest, find_predicting
+from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, PredictedError, SetEvidence
+from tractexp.discrepancy.explain import explain, find_nearest_sets
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.least_squares import least_squares_tests, residual_noise
 from tractexp.discrepancy.precision import standard_errors
-from tractexp.discrepancy.prediction import SHARING, ErrorPredictions, PredictionError, Predictions
+from tractexp.discrepancy.prediction import SHARING
 from tractexp.discrepancy.proposal.library import term
-from tractexp.discrepancy.verdict import verdict
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
@@ -37,23 +38,21 @@ BLOCKS = 20
 SAMPLES, STEP = 400, 2e-3  # of a generated dip
 
 
-class Catalogue:
-    """Every effect is its own textbook's."""
-
-    def textbook(self, names):
-        return names
-
-
 def off(*names, error, uneven=0.0):
     """A set whose squared error is so large, equal in all blocks or `uneven` among them."""
     pattern = 1 + uneven * np.cos(np.arange(BLOCKS) * (1 + len("".join(names))))
     nothing = np.zeros(BLOCKS)
-    return PredictionError(Refit(names, nothing, 0.0, 1), nothing, error**2 * pattern, nothing, np.ones(BLOCKS))
+    prediction = PredictedError(error**2 * pattern, nothing, np.ones(BLOCKS), nothing)
+    return SetEvidence(Refit(names, nothing, 0.0, 1), names, names, prediction=prediction)
+
+
+def table(*sets, term=None):
+    """Evidence of these sets; the first is the base model."""
+    return Evidence(sets[0], sets[1:], term=term)
 
 
 def named(*sets):
-    found = Predictions(Catalogue(), {one.names: one for one in sets}).explaining(Criteria())
-    return [one.names for one in found]
+    return [row.names for row in find_predicting(table(*sets), Criteria())]
 
 
 def test_the_set_that_divides_the_error_and_leaves_all_others_behind_is_named():
@@ -65,24 +64,24 @@ def test_a_stranger_s_best_imitation_is_not():
 
 
 def test_a_name_must_be_ahead_of_the_base_model_though_it_need_not_divide_the_error_by_more():
-    sets = {one.names: one for one in (off(error=1.0), off("a", error=0.8))}
-    assert Predictions(Catalogue(), sets).explaining(Criteria(divides=1.2)) == []
-    assert Predictions(Catalogue(), sets).explaining(Criteria(divides=1.2, ahead=1.2)) == [sets["a",]]
+    near = off("a", error=0.8)
+    sets = table(off(error=1.0), near)
+    assert find_predicting(sets, Criteria(divides=1.2)) == []
+    assert find_predicting(sets, Criteria(divides=1.2, ahead=1.2)) == [near]
 
 
 def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
     """The best pair owes its lead to the one block in which the base model is far off."""
     bare, best = off(error=1.0), off("a", "b", error=0.3)
-    bare.squares[3] += 60.0
-    best.squares[4] += 3.0
+    bare.prediction.squares[3] += 60.0
+    best.prediction.squares[4] += 3.0
     clear = off("a", "c", error=0.42)
-    clear.squares[3] += 1.5
-    assert best.left < clear.left
-    assert not best.clear_of(bare)
+    clear.prediction.squares[3] += 1.5
+    assert best.prediction.left < clear.prediction.left
+    assert not best.prediction.is_clear_of(bare.prediction)
     assert named(bare, best, clear) == [("a", "c")]
-    sets = {one.names: one for one in (bare, best)}
-    assert Predictions(Catalogue(), sets).nearest(Criteria()) is best
-    assert Predictions(Catalogue(), {(): off(error=0.1), ("a",): off("a", error=0.2)}).nearest(Criteria()).names == ()
+    assert find_nearest(table(bare, best), Criteria()) is best
+    assert find_nearest(table(off(error=0.1), off("a", error=0.2)), Criteria()).names == ()
 
 
 def test_sets_that_predict_alike_are_tied_the_better_one_first():
@@ -117,20 +116,20 @@ def test_of_sets_that_share_nothing_the_smallest_are_tied():
 
 def test_a_pair_needs_both_of_its_members_though_the_lead_of_one_may_be_chance():
     bare, one, pair = off(error=1.0), off("a", error=0.3), off("a", "b", error=0.42)
-    bare.squares[3] += 60.0
-    one.squares[4] += 3.0
-    pair.squares[3] += 1.5
-    assert [p.ahead_of(bare, 1.5) for p in (one, pair)] == [False, True]
+    bare.prediction.squares[3] += 60.0
+    one.prediction.squares[4] += 3.0
+    pair.prediction.squares[3] += 1.5
+    assert [beats(row, bare, Criteria()) for row in (one, pair)] == [False, True]
     assert named(bare, pair) == [("a", "b")]
     assert named(bare, one, pair) == []
 
 
 def test_what_one_block_decides_is_chance():
     """Without its loudest block the rival is as good."""
-    one, other = off("a", error=0.1), off("b", error=0.1)
+    one, other = off("a", error=0.1).prediction, off("b", error=0.1).prediction
     other.squares[3] += 1.0
-    assert not one.clear_of(other)
-    assert one.clear_of(off("c", error=0.2, uneven=0.5))
+    assert not one.is_clear_of(other)
+    assert one.is_clear_of(off("c", error=0.2, uneven=0.5).prediction)
 
 
 def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
@@ -138,60 +137,51 @@ def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
 
     def first(one, blocks):
         rows = (getattr(one, name)[:blocks] for name in ("squares", "noise", "response"))
-        return PredictionError(one.fit, one.unit, *rows)
+        return PredictedError(*rows, one.unit)
 
-    one, other = off("a", error=0.1), off("b", error=0.2, uneven=0.8)
-    assert [first(one, blocks).clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [False, False, True]
+    one, other = off("a", error=0.1).prediction, off("b", error=0.2, uneven=0.8).prediction
+    assert [first(one, blocks).is_clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [False, False, True]
 
 
 def test_a_model_that_diverges_is_behind_any_that_does_not():
-    lost = off("b", error=0.1)
+    lost, sound = off("b", error=0.1).prediction, off("a", error=0.5).prediction
     lost.squares[2] = np.inf
-    assert off("a", error=0.5).clear_of(lost)
-    assert not lost.clear_of(off("a", error=0.5))
-
-
-class Families:
-    """`trip` has a member of two stages."""
-
-    def textbook(self, names):
-        return tuple(name.removesuffix("_in_stages") for name in names)
+    assert sound.is_clear_of(lost)
+    assert not lost.is_clear_of(sound)
 
 
 @pytest.mark.parametrize(("error", "name"), [(0.09, "trip"), (0.05, "trip_in_stages")])
 def test_of_one_family_a_larger_member_must_be_ahead(error, name):
     one, other = off("trip", error=0.1), off("trip_in_stages", error=error)
-    other = replace(other, fit=replace(other.fit, parameters=5))
-    sets = {p.names: p for p in (off(error=1.0), one, other)}
-    (chosen,) = Predictions(Families(), sets).explaining(Criteria())
+    other = replace(other, family=("trip",), fit=replace(other.fit, parameters=5))
+    (chosen,) = find_predicting(table(off(error=1.0), one, other), Criteria())
     assert chosen.names == (name,)
 
 
 @pytest.mark.parametrize(("error", "stays"), [(0.3, True), (0.2 / 1.45, True), (0.2 / 1.55, False)])
 def test_a_term_of_the_library_that_is_ahead_takes_a_name(error, stays):
     """What has no name predicts better then. One that only imitates the name's effect does not."""
-    sets = {one.names: one for one in (off(error=1.0), off("a", error=0.2), off("b", error=0.9))}
-    found = ErrorPredictions(Catalogue(), sets, None, None, off("term", error=error))
-    assert [one.names for one in found.explaining(Criteria())] == [("a",)] * stays
-    assert [one.names for one in found.beaten(Criteria())] == [("a",)] * (not stays)
+    sets = table(off(error=1.0), off("a", error=0.2), off("b", error=0.9), term=off("term", error=error))
+    assert [row.names for row in find_predicting(sets, Criteria())] == [("a",)] * stays
+    assert [row.names for row in find_predicting(replace(sets, term=None), Criteria())] == [("a",)]
 
 
 def test_contributions_begin_with_the_member_that_helps_most():
     sets = [off(error=1.0), off("a", error=0.5), off("b", error=0.3), off("a", "b", error=0.1)]
-    steps = Predictions(Catalogue(), {one.names: one for one in sets}).contributions(("a", "b"))
-    assert [one.names for one in steps] == [(), ("b",), ("a", "b")]
+    assert [row.names for row in table(*sets).contributions(("a", "b"))] == [(), ("b",), ("a", "b")]
 
 
 def by_deviance(*names, left, rejected=False):
     """A set that leaves so much of the deviance on held-out events, beyond chance."""
     curves = SimpleNamespace(deviance=900.0 + left)
-    return PredictedDeviance(Refit(names, np.zeros(0), 0.0, 1), left, curves, rejected, Criteria().shown)
+    prediction = PredictedDeviance(left, curves, rejected, Criteria().shown)
+    return SetEvidence(Refit(names, np.zeros(0), 0.0, 1), names, names, prediction=prediction)
 
 
 def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not():
-    one, other = by_deviance("a", left=50.0), by_deviance("b", left=50.0, rejected=True)
-    assert one.clear_of(other)
-    assert not other.clear_of(one)
+    one, other = (by_deviance("a", left=50.0, rejected=rejected).prediction for rejected in (False, True))
+    assert one.is_clear_of(other)
+    assert not other.is_clear_of(one)
 
 
 @pytest.mark.parametrize(
@@ -253,60 +243,64 @@ def inexact(investigation):
 
 def test_a_name_that_leaves_more_than_noise_is_named_and_what_it_leaves_is_told(inexact):
     verdict = inexact.verdict
-    assert (verdict.word, inexact.names) == ("named", ("undervoltage_trip",)), verdict.reason
+    assert (verdict.word, inexact.names) == ("named", ("undervoltage_trip",)), inexact.reason
     assert not verdict.complete
     assert inexact.validate.closed > 1 - 1 / inexact.context.criteria.divides**2
     assert inexact.remainder
     assert "beside undervoltage_trip this is left" in inexact.headline
 
 
+def reason_of(found, evidence):
+    """The sentence on another table of the same investigation."""
+    verdict, context = decide(evidence, Criteria()), found.context
+    return explain(verdict, evidence, find_nearest_sets(verdict, evidence, found.withheld), context)
+
+
 def test_the_sentence_says_what_the_best_term_misses_and_takes_the_name_where_that_is_less(inexact):
-    made = inexact.held_out.predictions
-    words = f"the best term of the library ({term(made.term.names[0]).words})"
-    assert f"{words} {in_percent(made.term.error)}" in inexact.verdict.reason
-    ahead = replace(made.term, squares=made.term.noise + 1e-3 * (made.sets["undervoltage_trip",].squares))
-    weighed = replace(inexact.held_out, predictions=replace(made, term=ahead))
-    weighed = replace(weighed, survivors=replace(weighed.survivors, retained=()))
-    reason = verdict(weighed, inexact.withheld).reason
+    evidence = inexact.evidence
+    words = f"the best term of the library ({term(evidence.term.names[0]).words})"
+    assert f"{words} {in_percent(evidence.term.prediction.error)}" in inexact.reason
+    best, trip = evidence.term.prediction, evidence.row_of(("undervoltage_trip",)).prediction
+    ahead = replace(best, squares=best.noise + 1e-3 * trip.squares)
+    reason = reason_of(inexact, replace(evidence, term=replace(evidence.term, prediction=ahead)))
     assert "undervoltage_trip would be named, but misses" in reason
     assert f"{words} {in_percent(ahead.error)}" in reason
 
 
 def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
-    made, (first, *_) = inexact.held_out.predictions, inexact.held_out.survivors.rivals
-    fit = made.sets["undervoltage_trip",].fit
+    fit = inexact.evidence.row_of(("undervoltage_trip",)).fit
 
     def reason(*sets):
-        own = [replace(one, fit=replace(fit, names=one.names)) for one in sets]
-        told = replace(made, term=None, sets={one.names: one for one in own})
-        surviving = replace(
-            inexact.held_out.survivors, retained=(), rivals=(replace(first, fit=told.nearest(Criteria()).fit),)
-        )
-        return verdict(replace(inexact.held_out, predictions=told, survivors=surviving), inexact.withheld).reason
+        base, *rows = (replace(row, fit=replace(fit, names=row.names)) for row in sets)
+        own = replace(base, tests=inexact.first)
+        rows = sorted(rows, key=lambda row: row.prediction.left)
+        return reason_of(inexact, replace(inexact.evidence, base=own, rows=tuple(rows), others=(), term=None))
 
     bare, trip = off(error=1.0), off("undervoltage_trip", error=0.3)
     pair = off("stator_resistance", "undervoltage_trip", error=0.25)
     assert "a name must divide that by 2.25" in reason(bare, off("undervoltage_trip", error=0.6))
-    bare.squares[3] += 60.0
-    trip.squares[4] += 3.0
+    bare.prediction.squares[3] += 60.0
+    trip.prediction.squares[4] += 3.0
     assert "that may be chance in so few blocks" in reason(bare, trip)
-    assert "one of them alone does hardly worse" in reason(bare, trip, replace(pair, squares=pair.squares + 0.1))
+    louder = replace(pair.prediction, squares=pair.prediction.squares + 0.1)
+    assert "one of them alone does hardly worse" in reason(bare, trip, replace(pair, prediction=louder))
 
 
 def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
-    made, near = inexact.held_out.predictions, "all sets that come near have it"
-    assert near not in inexact.verdict.reason
-    trip = made.sets["undervoltage_trip",]
-    louder = replace(trip, squares=trip.squares * made.bare.left / trip.left / 2.0**2)
-    pair = replace(trip, fit=replace(trip.fit, names=("dc_link_lag", "undervoltage_trip")))
-    told = replace(made, sets={(): made.bare, trip.names: louder, pair.names: pair})
-    reason = verdict(replace(inexact.held_out, predictions=told), inexact.withheld).reason
-    assert f"; dc_link_lag and undervoltage_trip miss {in_percent(pair.error)}, the least, and {near};" in reason
+    evidence, near = inexact.evidence, "all sets that come near have it"
+    assert near not in inexact.reason
+    trip, left = evidence.row_of(("undervoltage_trip",)), evidence.base.prediction.left
+    own = trip.prediction
+    louder = replace(trip, prediction=replace(own, squares=own.squares * left / own.left / 2.0**2))
+    names = ("dc_link_lag", "undervoltage_trip")
+    pair = replace(trip, fit=replace(trip.fit, names=names), names=names, family=names)
+    reason = reason_of(inexact, replace(evidence, rows=(louder, pair), others=()))
+    assert f"; dc_link_lag and undervoltage_trip miss {in_percent(own.error)}, the least, and {near};" in reason
 
 
 def test_leads_are_told_by_blocks_that_share_the_response(inexact):
     """A dip of 0.15 s in 0.7 s has two of the seven blocks of a tenth of a second, and fourteen of 20 ms."""
-    response = inexact.held_out.predictions.bare.response
+    response = inexact.evidence.base.prediction.response
     assert len(response) == 35
     assert response.sum() ** 2 >= SHARING * np.sum(response**2)
     tenths = response.reshape(-1, 5).sum(axis=1)
@@ -360,18 +354,18 @@ def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least
 
 def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
     """By least squares its members fit a swing that none of them has, too; they are told by one name."""
-    predicted = inexact.held_out.predictions
-    best = predicted.explaining(inexact.context.criteria)
-    assert [inexact.catalogue.textbook(one.names) for one in best] == [("undervoltage_trip",)]
-    assert {n for names in predicted.sets for n in names} - set(inexact.catalogue.of_load)
-    assert best[0].error * inexact.context.criteria.divides < predicted.bare.error
+    evidence = inexact.evidence
+    best = find_predicting(evidence, inexact.context.criteria)
+    assert [row.family for row in best] == [("undervoltage_trip",)]
+    assert {name for row in evidence.every for name in row.names} - set(inexact.catalogue.of_load)
+    assert best[0].prediction.error * inexact.context.criteria.divides < evidence.base.prediction.error
 
 
 def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identification_has_it():
     """No coordinate of such a fit is of one event only: P0 and Q0 are none."""
     events = dips((0.5, 0.35, 0.6, 0.4))
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
-    missing = catalogue(model, events, ("dc_link_lag",), 0.05)
+    missing = catalogue(model, events, ("dc_link_lag",))
     context = Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort(lambda line: None))
     noise = Noise(Noise.white(0.01, 0.01).pairs, np.eye(2))
     alone = tractexp.identify(events, progress=False).result
@@ -385,11 +379,11 @@ def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identifi
 def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where_all_diverge(
     inexact, tmp_path, monkeypatch
 ):
-    def page_of(predictions):
-        predicted(page := Report("candidates", ""), inexact, predictions)
+    def page_of(evidence):
+        predicted(page := Report("candidates", ""), replace(inexact, evidence=evidence))
         return page.save(tmp_path / "page.html").read_text(encoding="utf-8")
 
-    made = inexact.held_out.predictions
+    made = inexact.evidence
     monkeypatch.setattr("tractexp.report.predicted.MOST", 0)
     shown = page_of(made)
     assert "undervoltage_trip" in shown
@@ -397,8 +391,12 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert "dc_link_lag" not in shown
     assert "the best term of the library" in shown
     assert term(made.term.names[0]).words in shown
-    lost = {names: replace(one, squares=np.full_like(one.squares, np.inf)) for names, one in made.sets.items()}
-    assert "No set has a steady state on the held-out events" in page_of(replace(made, sets=lost, term=None))
+
+    def lose(row):
+        return replace(row, prediction=replace(row.prediction, squares=np.full_like(row.prediction.squares, np.inf)))
+
+    lost = replace(made, base=lose(made.base), rows=tuple(map(lose, made.rows)), others=(), term=None)
+    assert "No set has a steady state on the held-out events" in page_of(lost)
 
 
 def test_without_held_out_events_nothing_incomplete_is_named():

@@ -126,15 +126,15 @@ def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_
     at = lambda name: own[name] if name in own else context.coordinates.value(name, fit.unit)  # noqa: E731
     values = np.array([[at(name) for name in model.names]])
     drawn = model.simulate(context.drive, values, context.problem.step.substeps).outputs[:, 0]
-    with_it, without = proposal.train.gap.after.calculated, proposal.train.gap.before.calculated
+    with_it, without = proposal.train.after.calculated, proposal.train.before.calculated
     # all but the power before the dip, which the fit leaves free
     assert np.abs((drawn - with_it) * context.valid).max() < 0.1 * np.abs(without - with_it).max()
 
 
 def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     steps = planted.steps
-    bench, noise, kept = steps.context, steps.held_out.noise, steps.survivors.retained[0].fit
-    other = next(r.fit for r in steps.survivors.rivals if r.fit.names != kept.names)
+    bench, noise, kept = steps.context, steps.evidence.noise, steps.evidence.rows[0].fit
+    other = next(row.fit for row in steps.evidence.rows if row.fit.names != kept.names)
     chosen = next_event(bench, noise, steps.bare, [kept, other], ["a", "b"])
     assert 0.04 <= chosen.best.event.duration <= 0.32
     assert {np.sign(t.event.jump) for t in chosen.tried} == {-1.0, 0.0, 1.0}

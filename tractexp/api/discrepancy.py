@@ -92,7 +92,7 @@ class Investigation(Written):
 
     @property
     def verdict(self) -> str:
-        """`none`, `named`, `tied` or `unexplained`."""
+        """`none`, `candidate`, `named`, `tied` or `unexplained`."""
         return self.content["verdict"]
 
     @property
@@ -429,7 +429,8 @@ class Discrepancy(Task, call=investigate):
             for row in result.sets
         ]
         return {
-            "name": f"{result.verdict} {' '.join(result.names)}".strip(), "metrics": metrics, "children": children,
+            "name": f"{result.verdict} {' '.join(result.names)}".strip(), "tags": {"verdict": result.verdict},
+            "metrics": metrics, "children": children,
             "description": quoting.markdown(result.reason), "model": job.folder / "result.json",
             "records": result.result.records,
         }  # fmt: skip

@@ -31,7 +31,7 @@ class JointFit:
     louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
     p_left: float  # how often chance leaves as much as it does
 
-    def confirmed(self, criteria: Criteria) -> bool:
+    def is_confirmed(self, criteria: Criteria) -> bool:
         """Whether all events bear it out: they speak louder for it than the fitted ones, and it leaves nothing."""
         return self.louder > 0 and self.p_left >= criteria.adequate_p
 
@@ -69,25 +69,25 @@ class AllEvents:
         """The base model, fitted to all events."""
         return refit(self.context, self.level, [((), self.context.coordinates.widened(self.bare.unit))], faults=())[0]
 
-    def together(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
+    def fit_jointly(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
         """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
         by_name, effort = {fit.names: fit for fit in alone}, self.context.effort
         _ = self.plain  # once, before processes are forked
-        refitted = each_apart(lambda fit: self._refitted(fit, anew=anew), alone, effort)
+        refitted = each_apart(lambda fit: self._refit(fit, anew=anew), alone, effort)
         fits = best_of(itertools.chain(*refitted))
-        return each_apart(lambda fit: self._joint_fit(fit, by_name[fit.names], seed), fits, effort)
+        return each_apart(lambda fit: self._measure(fit, by_name[fit.names], seed), fits, effort)
 
-    def undoubted(self, fits: Sequence[Refit]) -> bool:
+    def is_undoubted(self, fits: Sequence[Refit]) -> bool:
         """Whether there is one explanation only, a single effect by the textbook's law."""
         names = fits[0].names
         return len(fits) == 1 and len(names) + len(self.faults) == 1 and names == self.fitted.catalogue.textbook(names)
 
-    def compared(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
+    def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
         """Explanations fitted to all events from where they were, and what leaves something there from every setting,
         too."""
-        joint = {t.fit.names: t for t in self.together(alone, seed)}
+        joint = {t.fit.names: t for t in self.fit_jointly(alone, seed)}
         doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.false_alarms]
-        better = [t for t in self.together(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
+        better = [t for t in self.fit_jointly(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
     def without_each(self, fit: Refit) -> dict[str, Refit]:
@@ -101,10 +101,10 @@ class AllEvents:
         fits = {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)} if wanted else {}
         return {left: fits[names] for left, names in rest.items()}
 
-    def fitted_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
+    def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
         """These, fitted to all events."""
-        joint = {key: best_of(self._refitted(fit, anew=False))[0] for key, fit in fits.items()}
-        return {key: replace(fit, unit=self._narrowed(fit)) for key, fit in joint.items()}
+        joint = {key: best_of(self._refit(fit, anew=False))[0] for key, fit in fits.items()}
+        return {key: replace(fit, unit=self._narrow(fit)) for key, fit in joint.items()}
 
     def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
         """How often chance leaves as much as the base model does of all events; 1 where it has no steady state there.
@@ -116,17 +116,17 @@ class AllEvents:
         wide = [self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
         return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
 
-    def _refitted(self, alone: Refit, *, anew: bool) -> list[Refit]:
+    def _refit(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])
         if anew:  # from every setting of the scanned parameters of one of the effects, too
             settings += itertools.chain.from_iterable(self.context.catalogue[name].settings for name in alone.names)
         wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
         return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 
-    def _narrowed(self, fit: Refit) -> np.ndarray:
+    def _narrow(self, fit: Refit) -> np.ndarray:
         return fit.unit[: self.fitted.coordinates.dimension]
 
-    def _joint_fit(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
+    def _measure(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
         p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
-        return JointFit(replace(fit, unit=self._narrowed(fit)), louder, p_left)
+        return JointFit(replace(fit, unit=self._narrow(fit)), louder, p_left)

@@ -8,7 +8,7 @@ import numpy as np
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.blocks import blocks_of
-from tractexp.inference.chance import Chance, chance_at, is_noise_exact, scales
+from tractexp.inference.chance import BLURRED, Chance, chance_at, is_noise_exact, scales
 from tractexp.inference.context import Context
 from tractexp.inference.fit_effort import NOISE_ROUNDS, QUIETER
 from tractexp.inference.fitting import Refit, refit
@@ -125,7 +125,7 @@ class Disagreement:
 
         None where the voltage is noisy: whatever smooths the calculated power would seem to be there.
         """
-        if self.noise.loudest_input_mode > self.criteria.blurred:
+        if self.noise.loudest_input_mode > BLURRED:
             return ()
         return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < self.level))
 

@@ -5,16 +5,20 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from tractexp import files, quoting
+from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, is_too_mild, shows_more
+from tractexp.discrepancy.evidence import SetEvidence
+from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import Curves, GapTest, closed, share_closed
+from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, closed, share_closed
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
-from tractexp.discrepancy.prediction import ErrorPredictions
 from tractexp.discrepancy.proposal import generate
+from tractexp.discrepancy.proposal.library import term
 from tractexp.discrepancy.proposal.propose import to_dict as proposal_dict
-from tractexp.discrepancy.verdict import NAMED, TIED, UNEXPLAINED
 from tractexp.domain import DOMAINS
 from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
@@ -33,7 +37,7 @@ def content(investigation: Findings) -> dict[str, Any]:
     return {
         "verdict": investigation.verdict.word,
         "complete": investigation.verdict.complete,
-        "reason": investigation.verdict.reason,
+        "reason": investigation.reason,
         "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
         "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
         "forms": by_name(forms(investigation)),
@@ -72,18 +76,37 @@ def recommendation(investigation: Findings) -> str:
         sentence = f"ask what on site acts like {proposal.term.words}; {PLUGIN} adds it to a model"
         return sentence if chosen is None else f"{sentence}; {chosen.sentence()}"
     if investigation.verdict.word == UNEXPLAINED:
-        if investigation.by_likelihood.open:
+        if is_too_mild(investigation.by_likelihood):
             return "hold out a deeper dip, one of those fitted or a new one"
-        if investigation.by_likelihood.shows_more:
+        if shows_more(investigation.by_likelihood, investigation.context.criteria):
             return f"fit the held-out events, too ({DATA.train})"
         return "look at what is left (unexplained.csv) and at what switched at that time"
-    if investigation.verdict.word == NAMED:
-        if investigation.final_grade.adequacy.grade is not Grade.ADEQUATE:
+    grade = investigation.final_grade.adequacy.grade
+    if investigation.verdict.word == CANDIDATE and grade is not Grade.WRONG_MODEL:
+        return recommend_confirmation(investigation)
+    if investigation.verdict.word in (NAMED, CANDIDATE):
+        if grade is not Grade.ADEQUATE:
             return "find what is missing still: by further events, or with the extended model as the base model"
         held = investigation.held
         rest = f"; these events cannot tell {joined(list(held))}, which it holds" if held else ""
         return f"use the extended model{rest}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
+
+
+def recommend_confirmation(findings: Findings) -> str:
+    """Which event would confirm a candidate, as a sentence."""
+    names, evidence = joined(findings.names), findings.evidence
+    if evidence.is_predicted:
+        return f"record a further event and hold it out, too: those held out took part in choosing {names}"
+    expected = np.array(findings.train.by_event)
+    most, shown = float(expected.max()), findings.context.criteria.shown
+    deepest = findings.context.events[int(expected.argmax())].record.name
+    if most - SPREAD * most**0.5 < shown:
+        return f"record a deeper dip than those fitted and hold it out: none of them shows {names} by itself"
+    gain = f"{names}, if right, gains a deviance of about {most:.0f} there, and {shown:g} confirms it"
+    if len(expected) > 1 and not findings.all_fitted:
+        return f"hold out {deepest}, or a further dip as deep: {gain}"
+    return f"record a further dip as deep as {deepest} and hold it out: {gain}"
 
 
 def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
@@ -123,11 +146,11 @@ def _gap(before: Curves, after: Curves) -> dict[str, Any]:
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
     """The set that comes nearest where nothing explains the disagreement, and what it makes of the gap."""
-    near = investigation.verdict.nearest
+    near = investigation.nearest
     if near is None:
         return None
-    assert near.rival.tests is not None
-    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
+    assert near.row.tests is not None
+    by_name = {e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)}
     on = {"train": near.curves, "validate": near.carried}
     return {
         "effects": list(near.names),
@@ -143,7 +166,7 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
     """
     if investigation.verdict.complete:
         return None
-    near, tests = investigation.verdict.nearest, investigation.tests
+    near, tests = investigation.nearest, investigation.tests
     nearest = near and (near.carried or near.curves)[1].error
     before, after = (investigation.judged(one) for one in (investigation.base_grade, investigation.final_grade))
     return {
@@ -161,10 +184,10 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
 
 def _best_term(investigation: Findings) -> dict[str, Any] | None:
     """The term of the library that predicts the held-out events best, where it was a rival of names."""
-    predicted = investigation.held_out.predictions
-    if not isinstance(predicted, ErrorPredictions) or predicted.term is None:
+    best = investigation.evidence.term
+    if best is None or best.prediction is None:
         return None
-    return {"words": predicted.term.words, "model_error": files.plain(predicted.term.error)}
+    return {"words": term(best.names[0]).words, "model_error": files.plain(best.prediction.error)}
 
 
 def _error(error: ModelError) -> dict[str, Any]:
@@ -173,7 +196,7 @@ def _error(error: ModelError) -> dict[str, Any]:
 
 def write_left(investigation: Findings, path: Path) -> Path:
     """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each channel."""
-    drive, nearest = investigation.context.drive, investigation.verdict.nearest
+    drive, nearest = investigation.context.drive, investigation.nearest
     near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
@@ -198,19 +221,26 @@ def _curves(curves: Curves) -> dict[str, Any]:
 def sets(investigation: Findings) -> list[dict[str, Any]]:
     """The refitted sets that were compared, with the model's error on held-out events where that decided."""
     rows, at = [], investigation.context.coordinates
-    predicted = investigation.held_out.predictions
-    for rival in investigation.survivors.rivals:
-        names = rival.fit.names
+    for set_evidence in investigation.evidence.rows:
+        names = set_evidence.fit.names
         if not names:
             continue
-        status = "rejected" if rival.rejected else "adequate" if rival.adequate else "not adequate"
         own = investigation.catalogue.parameters(names)
-        values = {p.name: {"value": at.value(p.name, rival.fit.unit), "standard_error": None} for p in own}
-        ratio = files.plain(rival.lowered)
+        values = {p.name: {"value": at.value(p.name, set_evidence.fit.unit), "standard_error": None} for p in own}
+        ratio = files.plain(set_evidence.lowered)
+        status = find_status(set_evidence, investigation.verdict, investigation.evidence, investigation.context)
         row = {"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values}
-        error = {"model_error": predicted.sets[names].error} if predicted and names in predicted.sets else {}
-        rows.append(row | files.plain(error))
+        predicted = set_evidence.prediction
+        error = {} if predicted is None else {"model_error": predicted.error}
+        rows.append(row | files.plain(error | {"evidence": _evidence(set_evidence)}))
     return rows
+
+
+def _evidence(row: SetEvidence) -> dict[str, Any]:
+    """The numbers of a set by which `decide` decides; None where a step did not ask."""
+    held_out = None if row.gap is None else {"gain": row.gap.gain, "expected": row.gap.expected}
+    of_all = None if row.gap is None else {"p_left": row.p_of_all, "behind": row.behind_of_all}
+    return {"behind": row.behind, "p_left": row.p_left, "held_out": held_out, "of_all": of_all}
 
 
 def _singles(investigation: Findings) -> list[dict[str, Any]]:

@@ -1,141 +1,178 @@
-"""Every candidate by its evidence: how much it explains, what became of it, how large it is, and why."""
+"""What is known of every set of effects: a table with a row for each set, whose columns the steps fill.
 
-from dataclasses import dataclass
+`rival_sets` fills `fit`, `lowered`, `behind`, `p_left`: the fit to the fitted events, what it gains, how far behind the
+best set it is, and how often chance leaves as much. `held_out` fills `final`, `gap`, `without`, `p_of_all` and
+`behind_of_all`: the fit that is told, what it and each of its members gain on the held-out events, and the same as
+before of a fit to all events. `incomplete` fills `prediction`: what it leaves of the held-out events, where every set
+leaves more than noise.
+
+`decide` reads the numbers of this table and nothing else.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.precision import effect_sizes
-from tractexp.discrepancy.survivors import Rival
-from tractexp.discrepancy.verdict import NONE, TIED, UNEXPLAINED
-from tractexp.inference.chance import by_draws
-from tractexp.inference.interval import ParameterEstimate
-from tractexp.wording import joined
+from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.gap import Curves, GapTest
+from tractexp.inference.blocks import reach
+from tractexp.inference.context import Context
+from tractexp.inference.fitting import Names, Refit
+from tractexp.noise import Noise
 
-CHOSEN = "added"
-FITTED, ONE_STEP = "refitted", "one step"
+FINEST = 0.1  # of the noise: a model's squared error is told no finer
+SMALLEST = 1e-12  # pu^2, the least squared error of a model without noise
 
 
-@dataclass(frozen=True)
-class Evidence:
-    """One candidate, of one or more effects. `drop` is by how much it lowers the deviance of the base model, nan where
-    that cannot be told; `how` tells whether it was refitted for that or estimated in one linear step.
+@dataclass(frozen=True, eq=False)
+class PredictedError:
+    """What a fit leaves of the held-out events in S, in blocks of time.
+
+    `squares` (b,) is what is left in each block [pu^2], noise included; `noise` (b,) of that is expected of the noise,
+    and `response` (b,) is what the load did. `unit` (D,) are the coordinates on the held-out events.
     """
 
-    names: tuple[str, ...]
-    drop: float
-    how: str
-    status: str
-    sizes: tuple[ParameterEstimate, ...]
-    why: str
+    squares: np.ndarray
+    noise: np.ndarray
+    response: np.ndarray
+    unit: np.ndarray
 
     @property
-    def standing(self) -> int:
-        """0 for what was added, 1 for what is tied with it, 2 for the rest."""
-        return {CHOSEN: 0, TIED: 1}.get(self.status, 2)
+    def left(self) -> float:
+        """The squares beyond the noise, no less than can be told of them."""
+        noise = float(self.noise.sum())
+        return max(float(self.squares.sum()) - noise, FINEST * noise, SMALLEST)
+
+    @property
+    def error(self) -> float:
+        """The model's error, of the response."""
+        return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
+
+    def is_clear_of(self, other: "Prediction") -> bool:
+        """Whether it leaves less by more than chance: a jackknife of the ratio's logarithm over the blocks."""
+        assert isinstance(other, PredictedError)
+        own_sum, other_sum = self.squares.sum(), other.squares.sum()
+        if not np.isfinite(own_sum):
+            return False
+        if not np.isfinite(other_sum):
+            return True
+        own_rest, other_rest = own_sum - self.squares, other_sum - other.squares
+        without = np.log(np.maximum(other_rest, 1e-300) / np.maximum(own_rest, 1e-300))
+        lead = float(np.log(other_sum / own_sum))
+        return lead > reach(without, lead)
 
 
-def evidence(findings: Findings) -> list[Evidence]:
-    """All candidates: what was added first, then what is tied with it, then the others; the most helpful first."""
-    sets = [_of_set(findings, rival) for rival in findings.survivors.rivals if findings.held_out.names_of(rival)]
-    tested = {row.names for row in sets}  # of the chosen size
-    rows = [*sets, *(row for row in _singles(findings) if row.names not in tested)]
-    return sorted(rows, key=lambda row: (row.standing, -np.nan_to_num(row.drop, nan=-1.0), row.names))
+@dataclass(frozen=True, eq=False)
+class PredictedDeviance:
+    """What a fit leaves of the deviance on the held-out events, where the base model leaves no more than the noise.
+
+    `beyond_chance` is what pushes into the balances would still gain; up to `least` that may be chance.
+    `is_rejected` tells whether the fitted events reject the set.
+    """
+
+    beyond_chance: float
+    curves: Curves
+    is_rejected: bool
+    least: float
+
+    @property
+    def left(self) -> float:
+        return self.beyond_chance if self.beyond_chance > self.least else 0.0
+
+    @property
+    def error(self) -> float:
+        """The model's error, of the response."""
+        return self.curves.error.value
+
+    def is_clear_of(self, other: "Prediction") -> bool:
+        """Whether it leaves less by more than chance, or the fitted events reject the other alone."""
+        assert isinstance(other, PredictedDeviance)
+        gain = other.curves.deviance - self.curves.deviance
+        return gain >= self.least or (other.is_rejected and not self.is_rejected)
 
 
-def chance_level(findings: Findings) -> float:
-    """The drop of the deviance that chance gives to the most helpful candidate as often as false alarms are allowed."""
-    from scipy.special import chdtri
-
-    return float(chdtri(1, findings.first.chance.critical_p(findings.context.criteria.false_alarms)))
+Prediction = PredictedError | PredictedDeviance
 
 
-def why_not_the_most_helpful(findings: Findings) -> str:
-    """Where the verdict is not the effect that a single linear step favours: one sentence why; "" otherwise."""
-    scores = findings.first.scores
-    if not scores or scores[0].drop < chance_level(findings) or findings.names == (scores[0].name,):
-        return ""
-    best = scores[0]
-    promise = f"{best.name} promises most in one linear step from the base model"
-    row = next((r for r in evidence(findings) if r.names == (best.name,) and r.how == FITTED), None)
-    if row is not None:
-        promise += f" (deviance lowered by {best.drop:.0f}; refitted, by {row.drop:.0f})"
-    if findings.verdict.word == TIED and (best.name,) in findings.verdict.sets:
-        return f"{promise}, and is one of the tied explanations."
-    if findings.verdict.word in (NONE, UNEXPLAINED):
-        return f"{promise}, but that does not make it an explanation: {_verdict_on(findings, best.name)}."
-    chosen = next(r for r in evidence(findings) if r.standing == 0)
-    return (
-        f"{promise}, yet the verdict is {joined(findings.names)}, which lowers the deviance by {chosen.drop:.0f}:"
-        f" {_verdict_on(findings, best.name)}."
-    )
+@dataclass(frozen=True, eq=False)
+class SetEvidence:
+    """What is known of one set of effects. A column that no step has filled has its default.
+
+    `names` are its effects with the faults of the measurement beside them, `family` its effects by the names of the
+    catalogue.
+    """
+
+    fit: Refit
+    names: Names
+    family: Names
+    lowered: float = np.nan  # by how much its deviance is below that of the base model
+    behind: float = np.nan  # the best set of its size, of Akaike's criterion
+    p_left: float = np.nan  # how often chance leaves as much of the fitted events; nan where that was not asked
+    gap: GapTest | None = None  # on the held-out events
+    without: Mapping[str, GapTest] = field(default_factory=dict)  # against the set without each of several effects
+    p_of_all: float = 1.0  # how often chance leaves as much as a fit to all events does
+    behind_of_all: float = 0.0  # the best fit to all events, of Akaike's criterion
+    is_fitted_to_all: bool = False  # whether `final` is the fit to all events
+    prediction: Prediction | None = None
+    grade: str = ""  # of the model with it, where one set alone is kept
+    tests: Disagreement | None = None  # at its fit
+    final: Refit | None = None  # without the faults of the measurement that do not help
+
+    @property
+    def gaps(self) -> tuple[GapTest, ...]:
+        """What held-out events say of the set and of each of several effects; none where that was not asked."""
+        return () if self.gap is None else (self.gap, *self.without.values())
+
+    @property
+    def predicted(self) -> Prediction:
+        """What it leaves of the held-out events, where that was asked."""
+        assert self.prediction is not None
+        return self.prediction
+
+    @property
+    def told(self) -> Refit:
+        """The fit that is told of it."""
+        return self.fit if self.final is None else self.final
 
 
-def beside(findings: Findings) -> str:
-    """Why an effect that helps the base model may be called not testable: one sentence; "" where nothing is added."""
-    chosen = findings.last.fit.names
-    if not chosen:
-        return ""
-    return (
-        f"With {joined(chosen)} in the model there is less left for the others to explain: one that helps the"
-        " base model alone may here be irrelevant, or not testable because a size that matters would stay in the noise."
-    )
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """The table. `base` is the row of the base model alone, `rows` are those of the sets that are compared: the one
+    chosen by the search first, or those kept, then the best. `others` were fitted beside them, but are not told.
+    """
 
+    base: SetEvidence
+    rows: tuple[SetEvidence, ...]
+    others: tuple[SetEvidence, ...] = ()
+    term: SetEvidence | None = None  # that predicts best of the library of terms, where a set predicts well enough
+    faults: Names = ()  # of the measurement, in every set
+    noise: Noise | None = None  # under which all were fitted
+    last: Disagreement | None = None  # the tests of the best set
+    there: Context | None = None  # the held-out events, where sets are compared by the model's error
 
-def _verdict_on(findings: Findings, name: str) -> str:
-    """What became of one effect, as the end of a sentence."""
-    row = next((r for r in evidence(findings) if r.names == (name,)), None)
-    if row is None:
-        return "it was not refitted alone"
-    return f"it is {row.why}" if row.status == "relevant" else f"it is {row.status}: {row.why}"
+    @property
+    def every(self) -> Iterator[SetEvidence]:
+        """The base model's row and all others."""
+        yield from (self.base, *self.rows, *self.others)
 
+    @property
+    def is_predicted(self) -> bool:
+        """Whether every set leaves more than noise, so that sets are judged by what they predict."""
+        return self.base.prediction is not None
 
-def _of_set(findings: Findings, rival: Rival) -> Evidence:
-    """A refitted set of the chosen size; the faults of the measurement where they alone explain."""
-    outcome, names = findings.held_out, rival.fit.names or findings.held_out.faults
-    drop = rival.lowered if rival.fit.names else outcome.bare.deviance - outcome.extended[()].deviance
-    status, why = _fate(findings, rival)
-    fit = outcome.extended.get(rival.fit.names, rival.fit)
-    sizes = effect_sizes(findings.context, fit, names, rival.tests)
-    return Evidence(names, max(drop, 0.0), FITTED, status, tuple(sizes), why)
+    def row_of(self, names: Names) -> SetEvidence | None:
+        """The row of these effects, None where they were not fitted."""
+        return next((row for row in self.every if row.fit.names == tuple(names)), None)
 
-
-def _fate(findings: Findings, rival: Rival) -> tuple[str, str]:
-    """What became of a refitted set, and why."""
-    names = findings.held_out.names_of(rival)
-    assessment = findings.held_out.assessments.get(rival.fit.names)
-    if names in findings.verdict.sets:
-        helps = " and helps on the held-out events" if assessment is not None and assessment.gap.gain > 0 else ""
-        left = f"leaves {'more' if findings.held_out.leaves_more else 'no more'} than chance does{helps}"
-        return (CHOSEN, left) if names == findings.names else (TIED, left)
-    if rival.rejected:
-        names = findings.held_out.names_of(findings.survivors.rivals[0])
-        best = names[0] if len(names) == 1 else "the best set"
-        return "rejected", f"{best} is better by {rival.behind:.0f} of Akaike's criterion"
-    if rival.tests is None:
-        return "not rejected", "among too many that fit alike to be tested further"
-    if not rival.adequate:
-        p = by_draws(rival.tests.p_left)
-        return "not adequate", f"chance leaves as much as it does with a probability of {p}"
-    return "denied", "does not hold on the held-out events"
-
-
-def _singles(findings: Findings) -> list[Evidence]:
-    """Every effect of the catalogue by itself: refitted where it was, else in one linear step from the base model."""
-    refits, scores = findings.explanations.refits, {s.name: s for s in findings.first.scores}
-    base, at = findings.first.fit.deviance, findings.context.coordinates
-    rows = []
-    for j in judgements(findings):
-        score, fit = scores.get(j.name), refits.get((j.name,))
-        drop = base - fit.deviance if fit else score.drop if score else np.nan
-        sizes: list[ParameterEstimate] = []
-        for p in findings.catalogue[j.name].sizes if fit or score else ():
-            if fit:
-                sizes.append(ParameterEstimate(p, at.value(p.name, fit.unit), np.nan))
-            elif score and score.deviation[p.name] < np.ptp(p.bounds):  # else these events say nothing of it
-                sizes.append(ParameterEstimate(p, p.absent + score.size[p.name], score.deviation[p.name]))
-        how = FITTED if fit else ONE_STEP if score else ""
-        status = CHOSEN if j.name in findings.names else j.status
-        rows.append(Evidence((j.name,), max(drop, 0.0), how, status, tuple(sizes), j.why))
-    return rows
+    def contributions(self, names: Names) -> list[SetEvidence]:
+        """The base model, then with one member more at a time, the one that helps most: what each is good for."""
+        steps, missing = [self.base], set(names)
+        while missing:
+            wanted = [tuple(sorted((*steps[-1].fit.names, name))) for name in missing]
+            found = [row for row in map(self.row_of, wanted) if row is not None and row.prediction is not None]
+            if not found:
+                break
+            steps.append(min(found, key=lambda row: row.predicted.left))
+            missing -= set(steps[-1].fit.names)
+        return steps

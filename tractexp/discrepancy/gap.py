@@ -14,6 +14,7 @@ from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise
 from tractexp.noise.span import spanned
 
+SPREAD = 2 * 1.645  # roots of what is expected: in 95 % of cases no more than so many are lacking of it
 SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
@@ -41,6 +42,8 @@ class GapTest:
     `gain` is the deviance gained, `expected` what a true explanation would gain, the squared distance of both curves
     in standard deviations; a true one scatters about it by twice its root. `left` is what pushes into the balances
     would still gain beyond chance: a measure sharper than the model's error where the gap is no larger than the noise.
+    `by_event` (E,) is what of that is expected of each event. `units` (2, D) are the coordinates of both models in
+    `context`.
     """
 
     before: Curves
@@ -50,6 +53,9 @@ class GapTest:
     expected: float
     shown: float  # the criterion
     noise: Noise  # by which both are judged
+    context: Context | None = None
+    units: tuple[np.ndarray, ...] = ()
+    by_event: tuple[float, ...] = ()
 
     @property
     def closed(self) -> float:
@@ -63,14 +69,20 @@ class GapTest:
         return self.gain / whole if whole > 0 else 0.0
 
     @property
-    def helps(self) -> bool:
+    def is_shown(self) -> bool:
         """Whether these events show that the extension helps."""
         return self.gain >= self.shown
 
     @property
-    def open(self) -> bool:
+    def is_denied(self) -> bool:
+        """Whether they gain less than a true explanation does in 95 % of cases."""
+        least = self.expected - SPREAD * self.expected**0.5
+        return not self.is_shown and not self.gain >= least  # of no steady state neither is a number
+
+    @property
+    def is_mild(self) -> bool:
         """Whether these events are too mild to show that, and to deny it."""
-        return not self.helps and (self.gain > 0 or self.expected < self.shown)
+        return not self.is_shown and not self.is_denied
 
 
 def share_gone(factor: float) -> float:
@@ -124,9 +136,10 @@ def gap(
     changes = pushed(context, extended, names, noise) if changes is None else changes
     left = beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
-    rows = context.whiten(noise, apart)[0]
-    expected = float(np.nan_to_num(rows @ rows, nan=np.inf))
-    return GapTest(before, after, float(gained), left, expected, context.criteria.shown, noise)
+    rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(context.drive.channels, -1)
+    by_event = tuple(float(np.sum(rows[:, context.drive.part(e)] ** 2)) for e in range(len(context.events)))
+    shown, units = context.criteria.shown, (base, extended)
+    return GapTest(before, after, float(gained), left, float(np.sum(rows**2)), shown, noise, context, units, by_event)
 
 
 def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:

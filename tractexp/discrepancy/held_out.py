@@ -2,16 +2,15 @@
 
 import itertools
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
 from tractexp.discrepancy.all_events import AllEvents
-from tractexp.discrepancy.disagreement import Disagreement
+from tractexp.discrepancy.decide import find_adequate, holds
+from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed, share_gone
-from tractexp.discrepancy.prediction import Predictions
-from tractexp.discrepancy.survivors import Rival, Survivors
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Names, Refit, refit, settled
 from tractexp.inference.noise_in_quiet import QuietNoise, white
@@ -19,195 +18,121 @@ from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-
-@dataclass(frozen=True, eq=False)
-class Assessment:
-    """The gap of one explanation on the held-out events, and the coordinates of both models there.
-
-    `explained` is the deviance that it explains of the fitted events. `of_member` is the same against the explanation
-    without each of several effects. Where it was fitted to all events, `p_left` tells how often chance leaves as much,
-    and `behind` whether the best explanation there rejects it.
-    """
-
-    gap: GapTest
-    context: Context
-    units: tuple[np.ndarray, np.ndarray]
-    explained: float = 0.0
-    of_member: Mapping[str, "Assessment"] = field(default_factory=dict)
-    p_left: float = 1.0
-    behind: bool = False
-
-    @property
-    def evident(self) -> bool:
-        """Whether the held-out events show it, or are too mild to and the fitted ones leave no doubt."""
-        return self.gap.helps or (self.gap.open and self.explained >= self.context.criteria.evident)
-
-    @property
-    def needless(self) -> list[str]:
-        """Those of several effects without which it explains as much."""
-        return [name for name, one in self.of_member.items() if not one.evident]
-
-    @property
-    def borne_out(self) -> bool:
-        """Whether it and each of its effects are evident."""
-        return self.evident and not self.needless
-
-    @property
-    def helps(self) -> bool:
-        """Whether the explanation is worth having beyond the events it was fitted to."""
-        return self.borne_out and self.p_left >= self.context.criteria.adequate_p and not self.behind
-
-    @property
-    def convincing(self) -> bool:
-        """Whether it closes as much of the gap there as a true explanation does."""
-        return self.gap.explained >= share_gone(self.context.criteria.divides)
+MENDED = 0.05  # of what an effect explains: no formula is exact to this, and a fault of the measurement mends it
 
 
-@dataclass(frozen=True, eq=False)
-class HeldOut:
-    """The explanations that remain, as fitted without the faults of the measurement that do not help.
-
-    `bare` is the base model alone, `extended` each explanation, `assessments` are of held-out events; `first` and
-    `last` have the tests of the base model and of the best set. Where none helped as it was fitted, `together` are
-    those that were fitted to all events instead. Where none leaves noise only, the survivors are those that predict the
-    held-out events well (`leaves_more`), by their `predictions`.
-    """
-
-    survivors: Survivors
-    first: Disagreement
-    last: Disagreement
-    noise: Noise  # under which all were fitted
-    faults: Names  # of the measurement, in every explanation
-    bare: Refit
-    extended: Mapping[Names, Refit]
-    assessments: Mapping[Names, Assessment] = field(default_factory=dict)
-    together: tuple[Refit, ...] = ()
-    predictions: Predictions | None = None
-    p_of_all: float = 1.0  # how often chance leaves as much as the base model does of all events, where that was asked
-
-    @property
-    def leaves_more(self) -> bool:
-        """Whether what is retained leaves more than noise."""
-        return self.predictions is not None
-
-    @property
-    def shows_more(self) -> bool:
-        """Whether all events show something where the fitted ones show nothing."""
-        return self.p_of_all < self.first.criteria.adequate_p
-
-    @property
-    def open(self) -> bool:
-        """Whether the held-out events are too mild for all that explains the fitted ones."""
-        return bool(self.assessments) and all(one.gap.open for one in self.assessments.values())
-
-    @property
-    def retained(self) -> tuple[Rival, ...]:
-        """The adequate explanations that the held-out events do not deny, or those that predict them best."""
-        if self.leaves_more:
-            return self.survivors.retained
-        assessments, adequate = self.assessments, self.survivors.adequate
-        helping = {s.fit.names for s in adequate if s.fit.names not in assessments or assessments[s.fit.names].helps}
-        of_family: dict[Names, Rival] = {}
-        for rival in (s for s in adequate if s.fit.names in helping):  # places and laws of a family: by the best's name
-            of_family.setdefault(self.survivors.explanations.base.context.catalogue.textbook(rival.fit.names), rival)
-        return tuple(of_family.values())
-
-    def names_of(self, rival: Rival) -> Names:
-        """The effects of an explanation, with the faults of the measurement beside it."""
-        return tuple(sorted((*rival.fit.names, *self.faults)))
-
-
-def held_out(surviving: Survivors, events: Sequence[Event], seed: int) -> HeldOut:
-    """Refit the survivors without needless faults of the measurement, and judge them on held-out events, if any."""
-    explained = surviving.explanations
-    context, noise = explained.base.context, explained.last.noise
+def judge_held_out(evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
+    """The table with the sets that leave nothing refitted without needless faults of the measurement, and judged on
+    held-out events, if any."""
+    context, noise, criteria = explained.base.context, explained.last.noise, explained.last.criteria
     at = context.coordinates
     bare = refit(context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
-    faults = telling(explained, bare)
-    wanted = [
-        (s.fit.names, at.without_faults(s.fit.unit, faults)) for s in (surviving.adequate or surviving.retained[:1])
+    faults = find_telling_faults(explained, bare)
+    adequate = find_adequate(evidence, criteria)
+    wanted = adequate or [row for row in evidence.rows if not criteria.rejects(row.behind)][:1]
+    starts = [(row.fit.names, at.without_faults(row.fit.unit, faults)) for row in wanted]
+    finals = {fit.names: fit for fit in refit(context, noise, starts, faults=faults)}
+    rows = [
+        replace(row, final=finals.get(row.fit.names), names=tuple(sorted((*row.fit.names, *faults))))
+        for row in evidence.rows
     ]
-    exact = {f.names: f for f in refit(context, noise, wanted, faults=faults)}
-    extended = {names: exact[names] for names, _ in wanted}
-    as_fitted = HeldOut(surviving, explained.steps[0], explained.last, noise, faults, bare, extended)
+    base = replace(evidence.base, fit=bare)
+    evidence = replace(evidence, base=base, rows=tuple(rows), faults=faults)
     if not events:
-        return as_fitted
+        return evidence
     both = AllEvents(context, events, noise, faults, bare, explained.refits)
-    if not any(s.fit.names or faults for s in surviving.adequate):
-        silent = context.domain.calibrated and explained.empty and explained.steps[0].adequate
-        if silent and exceeds_noise(both):
-            return replace(as_fitted, p_of_all=both.p_left(explained.base.local_minima, seed))
-        return as_fitted
-    count = len(surviving.adequate)
-    context.effort.say(f"judging {count} explanation{'s' * (count > 1)} on the held-out events")
-    assessments, again = assess(both, extended, seed)
-    joint = {fit.names: fit for fit in again}
-    return replace(as_fitted, assessments=assessments, together=tuple(again), extended={**extended, **joint})
+    if not any(row.fit.names or faults for row in adequate):
+        is_silent = context.domain.calibrated and explained.empty and base.p_left >= criteria.adequate_p
+        if is_silent and exceeds_noise(both):
+            base = replace(base, p_of_all=both.p_left(explained.base.local_minima, seed))
+        return replace(evidence, base=base)
+    context.effort.say(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
+    judged = {row.fit.names: row for row in assess(both, find_adequate(evidence, criteria), seed)}
+    return replace(evidence, rows=tuple(judged.get(row.fit.names, row) for row in evidence.rows))
 
 
-def telling(explained: Explanations, bare: Refit) -> Names:
+def find_telling_faults(explained: Explanations, bare: Refit) -> Names:
     """The faults of the measurement that stand out, but for those that only mend the formula of an effect.
 
     Beside an effect of the load they must explain more, together with those left out before, than the part of all that
-    is explained to which no formula is exact (`mended`).
+    is explained to which no formula is exact (`MENDED`).
     """
     context, noise, fit, faults = explained.base.context, explained.last.noise, explained.chosen, explained.faults
     if not fit.names:
         return faults
 
-    def left(retained: Names) -> float:
+    def fit_with(retained: Names) -> float:
         unit = context.coordinates.without_faults(fit.unit, retained)
         return refit(context, noise, [(fit.names, unit)], faults=retained)[0].deviance
 
-    most = left(faults) if faults else 0.0
+    most = fit_with(faults) if faults else 0.0
     while faults:
-        fewer = {left(rest): rest for rest in itertools.combinations(faults, len(faults) - 1)}
-        if context.criteria.stands_out(min(fewer) - most, bare.deviance - most):
+        fewer = {fit_with(rest): rest for rest in itertools.combinations(faults, len(faults) - 1)}
+        if min(fewer) - most > MENDED * (bare.deviance - most):
             break
         faults = fewer[min(fewer)]
     return faults
 
 
-def assess(both: AllEvents, extended: Mapping[Names, Refit], seed: int) -> tuple[dict[Names, Assessment], list[Refit]]:
-    """Judge explanations on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
+def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetEvidence]:
+    """Rows judged on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
 
     Of several effects each is judged against the others alone as the whole is against the base model. A single textbook
     effect that has no rival stands if it closes as much of the gap there as a true one does. Any other must leave
     nothing in a fit to all events and not be rejected there by the best one. That fit may also bear out what does not
-    help as it was fitted, or leaves more than chance does, since the fitted events may leave a part of it open; it is
-    returned as fitted to all.
+    help as it was fitted, or leaves more than chance does, since the fitted events may leave a part of it open; such a
+    row is judged and told as fitted to all.
     """
-    context, criteria, fits = both.fitted, both.fitted.criteria, list(extended.values())
+    criteria, fits = both.fitted.criteria, [row.told for row in rows]
     without = {fit.names: both.without_each(fit) for fit in fits}
-
-    def against(bare: Refit, alone: Refit, some: Sequence[Refit]) -> dict[Names, Assessment]:
-        there = judged_on(context, both.events, bare, some)
-        return {n: replace(one, explained=alone.deviance - extended[n].deviance) for n, one in there.items()}
-
-    def judged(some: Sequence[Refit], fewer: Mapping[Names, Mapping[str, Refit]]) -> dict[Names, Assessment]:
-        there = against(both.bare, both.bare, some)
-        for fit in some:
-            alone, rest = without[fit.names], fewer[fit.names]
-            of_member = {name: against(rest[name], alone[name], [fit])[fit.names] for name in rest}
-            there[fit.names] = replace(there[fit.names], of_member=of_member)
-        return there
-
-    assessments = judged(fits, without)
-    if both.undoubted(fits) and assessments[fits[0].names].convincing and assessments[fits[0].names].helps:
-        return assessments, []
-    joint = {t.fit.names: t for t in both.compared(fits, seed)}
-    best = min(t.fit.cost for t in joint.values())
-    helping = {names for names, one in assessments.items() if one.borne_out}
-    sufficing = {names for names in helping if assessments[names].gap.left <= criteria.shown}
-    for names, fitted in joint.items():
-        behind = criteria.rejects(fitted.fit.cost - best)
-        assessments[names] = replace(assessments[names], p_left=fitted.p_left, behind=behind)
+    judged = judge_fits(both, rows, fits, without)
+    if both.is_undoubted(fits) and closes_enough(judged[0]) and holds(judged[0], criteria):
+        return judged
+    joint = {one.fit.names: one for one in both.compare(fits, seed)}
+    best = min(one.fit.cost for one in joint.values())
+    assessed = {}
+    for row in judged:
+        own = joint[row.fit.names]
+        assessed[row.fit.names] = replace(row, p_of_all=own.p_left, behind_of_all=own.fit.cost - best)
     again = [
-        fitted.fit for names, fitted in joint.items()
-        if names not in sufficing and not assessments[names].behind and fitted.confirmed(criteria)
+        one.fit for names, one in joint.items()
+        if one.is_confirmed(criteria) and not _suffices(assessed[names])
+        and not criteria.rejects(assessed[names].behind_of_all)
     ]  # fmt: skip
-    joint_without = {fit.names: both.fitted_to_all(without[fit.names]) for fit in again}
-    return assessments | (judged(again, joint_without) if again else {}), again
+    if again:
+        without_of_all = {fit.names: both.fit_to_all(without[fit.names]) for fit in again}
+        chosen = [row for fit in again for row in rows if row.fit.names == fit.names]
+        for row in judge_fits(both, chosen, again, without_of_all):
+            assessed[row.fit.names] = replace(row, is_fitted_to_all=True)
+    return [assessed[row.fit.names] for row in rows]
+
+
+def _suffices(row: SetEvidence) -> bool:
+    """Whether a set is shown as it was fitted, and leaves nothing of the held-out events."""
+    assert row.gap is not None
+    return all(gap.is_shown for gap in row.gaps) and row.gap.left <= row.gap.shown
+
+
+def judge_fits(
+    both: AllEvents, rows: Sequence[SetEvidence], fits: Sequence[Refit], without: Mapping[Names, Mapping[str, Refit]]
+) -> list[SetEvidence]:
+    """Rows with what held-out events say of their fits (one a row), and of each of several effects.
+
+    `without` {names: {member: fit}} are the sets without each member.
+    """
+    gaps, judged = compare_on(both.fitted, both.events, both.bare, fits), []
+    for row, fit in zip(rows, fits, strict=True):
+        fewer = without[fit.names]
+        members = {name: compare_on(both.fitted, both.events, fewer[name], [fit])[fit.names] for name in fewer}
+        judged.append(replace(row, final=fit, gap=gaps[fit.names], without=members))
+    return judged
+
+
+def closes_enough(row: SetEvidence) -> bool:
+    """Whether a set closes as much of the gap on the held-out events as a true explanation does."""
+    assert row.gap is not None
+    assert row.gap.context is not None
+    return row.gap.explained >= share_gone(row.gap.context.criteria.divides)
 
 
 def exceeds_noise(both: AllEvents) -> bool:
@@ -217,15 +142,15 @@ def exceeds_noise(both: AllEvents) -> bool:
     return left > both.fitted.criteria.shown
 
 
-def judged_on(
+def compare_on(
     context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
-) -> dict[Names, Assessment]:
+) -> dict[Names, GapTest]:
     """Compare a model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
     other, units, noise = carried(context, events, [bare, *extended])
     before = other.coordinates.before
     return {
-        fit.names: Assessment(gap(other, units[0], u, fit.names, noise, before, bare.names), other, (units[0], u))
-        for fit, u in zip(extended, units[1:], strict=True)
+        fit.names: gap(other, units[0], unit, fit.names, noise, before, bare.names)
+        for fit, unit in zip(extended, units[1:], strict=True)
     }
 
 

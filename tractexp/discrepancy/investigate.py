@@ -7,20 +7,22 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.decide import NONE, UNEXPLAINED, Verdict, decide, is_too_mild, shows_more
 from tractexp.discrepancy.disagreement import Disagreement, disagreement
+from tractexp.discrepancy.evidence import Evidence, PredictedError
+from tractexp.discrepancy.explain import Nearest, choose_next_event, explain, find_nearest_sets
 from tractexp.discrepancy.explanations import Explanations, explanations
-from tractexp.discrepancy.gap import GapTest, gap
+from tractexp.discrepancy.gap import GapTest, gap, share_closed, share_gone
 from tractexp.discrepancy.grades import Grader
-from tractexp.discrepancy.held_out import Assessment, HeldOut, held_out
-from tractexp.discrepancy.incomplete import incomplete
+from tractexp.discrepancy.held_out import judge_held_out
+from tractexp.discrepancy.incomplete import predict_held_out
 from tractexp.discrepancy.next_event.choose import NextEvent
 from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.discrepancy.survivors import Survivors, survivors
-from tractexp.discrepancy.verdict import NAMED, NONE, UNEXPLAINED, Verdict, verdict, word_of
+from tractexp.discrepancy.rival_sets import compare_rivals
 from tractexp.discrepancy.window_search import behind_recorder
 from tractexp.domain import domain_of
 from tractexp.identification.grade import GradedModel, Misfit
@@ -31,6 +33,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
 from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
+from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
@@ -45,14 +48,15 @@ class Findings:
     base: BaseFit
     places: tuple[DisagreementInterval, ...]  # where it is; none where the verdict is none
     explanations: Explanations
-    survivors: Survivors
-    by_likelihood: HeldOut
-    held_out: HeldOut  # the same, or by least squares where names go by the model's error
+    by_likelihood: Evidence
+    evidence: Evidence  # the same, or by what sets predict where none leaves noise only
     verdict: Verdict
+    nearest: Nearest | None  # where nothing explains
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
     grader: Grader
     proposed: ProposalResult = field(default_factory=ProposalResult)  # of a term, where nothing explains
+    tie_breaker: NextEvent | None = None  # that would tell tied sets apart
     all_fitted: bool = False  # whether the held-out events were fitted like the others, since only all show something
 
     @property
@@ -68,15 +72,24 @@ class Findings:
         """The effects added."""
         return self.verdict.names
 
+    @functools.cached_property
+    def reason(self) -> str:
+        """The sentence behind the verdict."""
+        return explain(
+            self.verdict, self.evidence, self.nearest, self.explanations.base.context, all_fitted=self.all_fitted
+        )
+
     @property
     def first(self) -> Disagreement:
         """The tests of the base model."""
-        return self.held_out.first
+        assert self.evidence.base.tests is not None
+        return self.evidence.base.tests
 
     @property
     def last(self) -> Disagreement:
         """The tests once the chosen effects are in."""
-        return self.held_out.last
+        assert self.evidence.last is not None
+        return self.evidence.last
 
     @property
     def tests(self) -> Disagreement:
@@ -89,37 +102,39 @@ class Findings:
         """Names, from none to all of them, one more at a time, and the model's error with them."""
         if not self.names:
             return []
-        predicted, ends = self.held_out.predictions, [(), self.names]
-        sets = ends if predicted is None else [one.names for one in predicted.contributions(self.names)]
-        return [(names, self.judged(self.grade_of(names)).error.value) for names in sets]
+        steps: list[tuple[str, ...]] = [(), self.names]
+        if self.evidence.is_predicted:
+            steps = [row.fit.names for row in self.evidence.contributions(self.names)]
+        return [(names, self.judged(self.grade_of(names)).error.value) for names in steps]
 
     @property
     def bare(self) -> Refit:
         """The base model alone."""
-        return self.held_out.bare
+        return self.evidence.base.fit
 
     @property
     def extended(self) -> Refit:
         """The model with the names of the verdict added; the base model where there are none."""
         chosen = self.verdict.chosen
-        return self.bare if chosen is None else self.held_out.extended[chosen.fit.names]
+        return self.bare if chosen is None else chosen.told
 
     @property
     def next_event(self) -> NextEvent | None:
         """What to record next, where explanations are tied or the proposed term has near-synonyms."""
         proposal = self.proposed.proposal
-        return self.verdict.next_event or (proposal and proposal.next_event)
+        return self.tie_breaker or (proposal and proposal.next_event)
 
-    @property
-    def assessment(self) -> Assessment | None:
-        """What the held-out events say of the names."""
-        chosen = self.verdict.chosen
-        return chosen and self.held_out.assessments.get(chosen.fit.names)
-
-    @property
+    @functools.cached_property
     def validate(self) -> GapTest | None:
-        """The gap on the held-out events."""
-        return None if self.assessment is None else self.assessment.gap
+        """The gap on the held-out events; None without any, or where nothing is named."""
+        chosen, there = self.verdict.chosen, self.evidence.there
+        if chosen is None or there is None:
+            return chosen and chosen.gap
+        predictions = [row.prediction for row in (self.evidence.base, chosen)]
+        units = [one.unit for one in predictions if isinstance(one, PredictedError)]
+        left = there.residuals(units[1][None], chosen.fit.names)[0]
+        noise = QuietNoise.at(there, units[1]).of(units[1], left)
+        return gap(there, units[0], units[1], chosen.fit.names, noise, there.coordinates.before)
 
     @functools.cached_property
     def held(self) -> dict[str, float]:
@@ -182,10 +197,10 @@ class Findings:
     @functools.cached_property
     def overlays(self) -> list[Overlay]:
         """Measured, before and after of every event, the fitted ones first."""
-        near, extended = self.verdict.nearest, bool(self.names)
+        near, extended = self.nearest, bool(self.names)
         return [
             *on_fitted(self.context, self.train, near, self.places, extended=extended),
-            *on_held_out(self.context, self.withheld, self.assessment, self.bare, near),
+            *on_held_out(self.context, self.withheld, self.validate, self.bare, near),
         ]
 
     @functools.cached_property
@@ -206,8 +221,8 @@ class Findings:
         if self.names:
             return []
         alone = [self._left([replace(overlay, nearest=None) for overlay in self.overlays])]
-        if self.by_likelihood is not self.held_out:
-            alone.append(self._left(of_fit(self.context, self.by_likelihood.bare, self.last.noise)))
+        if self.by_likelihood is not self.evidence:
+            alone.append(self._left(of_fit(self.context, self.by_likelihood.base.fit, self.last.noise)))
         return max(alone, key=_share_of)
 
     @property
@@ -222,7 +237,7 @@ class Findings:
             return ""
         shapes, base = max(remainders_left, key=lambda item: _share_of(item[0]))
         held_out = shapes[0].event in {event.record.name for event in self.withheld}
-        base |= self.verdict.nearest is None
+        base |= self.nearest is None
         whose = "the base model misses this" if base else "the nearest candidates miss this"
         return f"{whose}{' on the held-out events' * held_out}: {shapes[0]}"
 
@@ -240,13 +255,15 @@ class Findings:
     @property
     def fitted_to_both(self) -> bool:
         """Whether the extended model was fitted to the held-out events, too."""
-        return self.all_fitted or bool(self.held_out.together and self.held_out.retained)
+        return self.all_fitted or any(row.is_fitted_to_all for row in self.verdict.kept)
 
     @property
-    def evident(self) -> bool:
-        """Whether one set of names explains so much of the fitted events that no held-out one need show it."""
-        word, chosen = self.verdict.word, self.verdict.chosen
-        return word == NAMED and chosen is not None and chosen.lowered >= self.context.criteria.evident
+    def closes_share(self) -> bool:
+        """Whether one set alone is kept and closes a share of the model's error on the fitted events."""
+        if len(self.verdict.kept) != 1:
+            return False
+        before, after = (self.judged(one).error for one in (self.base_grade, self.final_grade))
+        return share_closed(before, after) >= share_gone(self.context.criteria.ahead)
 
 
 def investigate(
@@ -278,7 +295,7 @@ def investigate(
     check_events(train, validate)
 
     def findings_of(train: Sequence[Event], validate: Sequence[Event]) -> Findings:
-        missing = catalogue(model, train, only, criteria.frequency_swing)
+        missing = catalogue(model, train, only)
         some, others = len(missing.candidates), len(missing.untestable)
         effort.say(f"testing {some} effects, {others} more cannot be tested on these events")
 
@@ -296,50 +313,59 @@ def investigate(
 
     with Effort(tell).audible() as effort:
         findings = findings_of(train, validate)
-        if findings.verdict.word == UNEXPLAINED and findings.held_out.shows_more:
+        if findings.verdict.word == UNEXPLAINED and shows_more(findings.evidence, criteria):
             effort.say("only all events together show something: again, fitted to all of them")
             of_all = findings_of([*train, *validate], ())
-            findings = _without_confirmation(of_all, findings) if of_all.evident else findings
+            findings = replace(of_all, grader=findings.grader, all_fitted=True) if of_all.closes_share else findings
         return replace(findings, proposed=_proposal(findings, seed))
-
-
-def _without_confirmation(findings: Findings, before: Findings) -> Findings:
-    """The same, where events were fitted that were to be held out, as they were `before`."""
-    why = "only all events together show it, so all were fitted, and none is left to confirm it"
-    said = replace(findings.verdict, reason=f"{findings.verdict.reason}; {why}")
-    return replace(findings, verdict=said, grader=before.grader, all_fitted=True)
 
 
 def _findings(base: BaseFit, validate: Sequence[Event], seed: int, grader: Grader) -> Findings:
     """The investigation from the base model's fit to the verdict."""
     base, first = behind_recorder(base, disagreement(base, seed), seed)
     explained = explanations(base, first, seed)
-    outcome = by_likelihood = held_out(survivors(explained, seed), validate, seed)
-    if word_of(outcome) == UNEXPLAINED and not outcome.open:
-        outcome = incomplete(outcome, validate, seed)
-    said = verdict(outcome, validate)
-    return Findings(
+    criteria = explained.last.criteria
+    evidence = compare_rivals(explained, seed)
+    evidence = by_likelihood = judge_held_out(evidence, explained, validate, seed)
+    verdict = decide(evidence, criteria)
+    if verdict.word == UNEXPLAINED and not is_too_mild(evidence):
+        evidence = predict_held_out(evidence, explained, validate, seed)
+        verdict = decide(evidence, criteria)
+    tests = evidence.base.tests
+    assert tests is not None
+    findings = Findings(
         base=explained.base,
-        places=() if said.word == NONE else tuple(places(outcome.first)),
+        places=() if verdict.word == NONE else tuple(places(tests)),
         explanations=explained,
-        survivors=outcome.survivors,
         by_likelihood=by_likelihood,
-        held_out=outcome,
-        verdict=said,
-        train=_gap(outcome.first.context, outcome, said),
+        evidence=evidence,
+        verdict=verdict,
+        nearest=find_nearest_sets(verdict, evidence, validate),
+        train=_gap(tests.context, evidence, verdict),
         withheld=tuple(validate),
         grader=grader,
+        tie_breaker=choose_next_event(verdict, evidence, explained.base.context),
     )
+    return _with_grade(findings) if len(verdict.kept) == 1 else findings
+
+
+def _with_grade(findings: Findings) -> Findings:
+    """The findings decided anew with the grade of the model that has the one set kept."""
+    evidence, chosen = findings.evidence, findings.verdict.kept[0]
+    graded = replace(chosen, grade=str(findings.final_grade.adequacy.grade))
+    rows = tuple(graded if row is chosen else row for row in evidence.rows)
+    evidence = replace(evidence, rows=rows)
+    return replace(findings, evidence=evidence, verdict=decide(evidence, findings.context.criteria))
 
 
 def _proposal(findings: Findings, seed: int) -> ProposalResult:
     """The term that an unexplained disagreement asks for."""
-    base, explained, outcome = findings.base, findings.explanations, findings.by_likelihood
+    base, explained, evidence = findings.base, findings.explanations, findings.by_likelihood
     if findings.verdict.word != UNEXPLAINED:
         return ProposalResult()
-    if outcome.open:
+    if is_too_mild(evidence):
         return ProposalResult(why="the held-out events are too mild to show a term")
-    return propose(base, explained.steps[0], outcome.bare, explained.last.noise, findings.withheld, seed)
+    return propose(base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld, seed)
 
 
 def _share_of(shapes: Sequence[Remainder]) -> float:
@@ -347,11 +373,11 @@ def _share_of(shapes: Sequence[Remainder]) -> float:
     return sum(shape.share for shape in shapes)
 
 
-def _gap(context: Context, outcome: HeldOut, said: Verdict) -> GapTest:
+def _gap(context: Context, evidence: Evidence, verdict: Verdict) -> GapTest:
     """The gap on the fitted events before and after."""
-    at = context.coordinates
-    chosen = said.chosen
-    after = outcome.extended[chosen.fit.names] if chosen else outcome.bare
-    noise = ((chosen and chosen.tests) or outcome.last).noise
-    fitted = [*at.base, *at.before, *at.parameters(said.names)]
-    return gap(context, outcome.bare.unit, after.unit, after.names, noise, fitted)
+    at, chosen, base = context.coordinates, verdict.chosen, evidence.base.fit
+    after = chosen.told if chosen else base
+    tests = (chosen and chosen.tests) or evidence.last
+    assert tests is not None
+    fitted = [*at.base, *at.before, *at.parameters(verdict.names)]
+    return gap(context, base.unit, after.unit, after.names, tests.noise, fitted)

@@ -11,6 +11,7 @@ from tractexp.inference.score_test import Score
 from tractexp.wording import in_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
+TESTABLE = 0.8  # power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class Judgement:
 def judgements(investigation: Findings) -> list[Judgement]:
     """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
     criteria = investigation.context.criteria
-    critical = investigation.first.chance.critical_p(criteria.false_alarms)
+    critical = investigation.first.chance.critical_p(criteria.naming)
     scores = {s.name: s for s in investigation.last.scores}
     judged_effects = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
     for candidate in investigation.catalogue.candidates:
@@ -38,11 +39,11 @@ def judgements(investigation: Findings) -> list[Judgement]:
         elif score is None:
             judged_effects.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
         else:
-            judged_effects.append(Judgement(name, *assessment(candidate, score, critical, criteria.testable), score))
+            judged_effects.append(Judgement(name, *assessment(candidate, score, critical), score))
     return sorted(judged_effects, key=lambda j: j.name)
 
 
-def assessment(candidate: Candidate, score: Score, critical: float, testable: float) -> tuple[str, str]:
+def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str, str]:
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"
@@ -53,6 +54,6 @@ def assessment(candidate: Candidate, score: Score, critical: float, testable: fl
         return "not testable", "these events cannot show it"
     limit = abs(size) + ONE_SIDED * deviation
     below = f"{main.name} within {limit:.2g}{unit} of its null"
-    if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < testable:
+    if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < TESTABLE:
         return "not testable", f"a size of {relevant:g}{unit} would stay in the noise on these events ({below})"
     return ("ruled out" if limit < relevant else "irrelevant"), below

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import Assessment, carried
+from tractexp.discrepancy.held_out import carried
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
-from tractexp.discrepancy.verdict import Nearest
 from tractexp.domain import domain_of
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
@@ -50,17 +50,15 @@ def on_fitted(
 
 
 def on_held_out(
-    context: Context, withheld: Sequence[Event], assessment: Assessment | None, bare: Refit, nearest: Nearest | None
+    context: Context, withheld: Sequence[Event], gap: GapTest | None, bare: Refit, nearest: Nearest | None
 ) -> list[Overlay]:  # fmt: skip
-    """The held-out events: by the `assessment` of the names on them or, without any, the base model carried over."""
+    """The held-out events: by the `gap` of the names on them or, without any, the base model carried over."""
     if not withheld:
         return []
-    if assessment is not None:
-        gap = assessment.gap
-        return _each(
-            assessment.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True
-        )
-    fits = [bare, *([nearest.rival.fit] if nearest else [])]
+    if gap is not None:
+        assert gap.context is not None
+        return _each(gap.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
+    fits = [bare, *([nearest.row.fit] if nearest else [])]
     other, units, noise = carried(context, withheld, fits)
     before, *near = [
         other.residuals(unit[None], fit.names)[0] + other.drive.measured for unit, fit in zip(units, fits, strict=True)

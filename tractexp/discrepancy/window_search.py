@@ -12,12 +12,15 @@ from dataclasses import dataclass
 
 from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
 from tractexp.inference.base_fit import BaseFit, fitted_from
+from tractexp.inference.chance import BLURRED
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit, rough_refit
 from tractexp.inference.noise_in_quiet import QuietNoise
 from tractexp.inference.recorder_window import windows_of
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
+
+WINDOW_SHARE = 0.5  # of what the best effect explains, that a window must: what lacks much takes a wrong one for a part
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         return base, first
     if context.drive.windows:  # the model is of a kind that is always looked at through what the records say
         return base, first
-    if noise.loudest_input_mode > context.criteria.blurred:  # noise of the voltage would pass for a window
+    if noise.loudest_input_mode > BLURRED:  # noise of the voltage would pass for a window
         return base, first
     tried: list[WindowFit] = []
     for window in windows_of(context.events):
@@ -67,7 +70,7 @@ def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | No
     window = best.behind.records.window
     if window is not None and window.said:  # that the recorder has a window it says is no guess
         return best if best.gained > 0 else None
-    return best if best.gained > criteria.least_window(most) else None
+    return best if best.gained > max(criteria.shown, WINDOW_SHARE * most) else None
 
 
 def behind_window(base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int) -> BaseFit | None:

@@ -21,6 +21,12 @@ from tractexp.noise import Noise
 from tractexp.wording import in_words
 
 DRAWS = 199
+# Independent quiet samples below which every draw estimates its noise anew: the error of the estimate then is a tenth
+# of the noise, as large as what a level of 5 % allows.
+QUIET_WORTH = 150.0
+# Variance from noise of the voltage, over that of the power, from which faults of the measurement are not judged:
+# whatever smooths the calculated power would seem to be there.
+BLURRED = 0.5
 MORE = 10  # times as many are drawn for the scales alone
 
 
@@ -113,12 +119,12 @@ def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarr
 def is_noise_exact(context: Context, noise: Noise) -> bool:
     """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
     samples = sum(part.stop - part.start for part in context.problem.quiet)
-    return context.domain.noise_from_model or context.criteria.knows_noise(noise.worth(samples))
+    return context.domain.noise_from_model or noise.worth(samples) >= QUIET_WORTH
 
 
 def _chance(t: Linearization, projection: ScoreTest, noise: Noise) -> Chance:
     p = projection.least_p
-    if noise.loudest_input_mode <= t.context.criteria.blurred:
+    if noise.loudest_input_mode <= BLURRED:
         faults = np.array(list(projection.fault_p().values())).reshape(-1, len(p))
         p = np.maximum(np.minimum(p, faults.min(axis=0, initial=1.0)), SMALLEST_P)
     return Chance(p, projection.statistics(t.context.problem))

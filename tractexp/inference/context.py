@@ -25,6 +25,10 @@ from tractexp.record import Event
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
 
+# Standard deviation of a fault of the measurement before anything is seen, in its relevant sizes: clocks, windows and
+# drifts beyond that are seen before a record is used.
+FAULT_PRIOR = 5.0
+
 
 @dataclass(frozen=True, eq=False)
 class Context:
@@ -46,7 +50,7 @@ class Context:
     ) -> "Context":  # fmt: skip
         """A context for these records; the load is simulated behind the recorder's window, where there is one."""
         kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
-        coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, criteria.measurement_prior)
+        coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, FAULT_PRIOR)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def on(self, records: Records) -> "Context":

@@ -7,21 +7,21 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
-from tractexp.discrepancy.evidence import (
+from tractexp.discrepancy.decide import TIED
+from tractexp.discrepancy.explain import find_status
+from tractexp.discrepancy.investigate import Findings
+from tractexp.discrepancy.judgement import judgements
+from tractexp.inference.chance import by_draws
+from tractexp.report.candidate_rows import (
     CHOSEN,
     FITTED,
     ONE_STEP,
-    Evidence,
+    CandidateRow,
     beside,
     chance_level,
-    evidence,
+    list_candidates,
     why_not_the_most_helpful,
 )
-from tractexp.discrepancy.investigate import Findings
-from tractexp.discrepancy.judgement import judgements
-from tractexp.discrepancy.prediction import ErrorPredictions
-from tractexp.discrepancy.verdict import TIED
-from tractexp.inference.chance import by_draws
 from tractexp.report.predicted import BAR, predicted
 from tractexp.wording import joined
 
@@ -33,9 +33,9 @@ MOST_SETS = 12  # that are compared in a table
 
 def candidates(page: Report, findings: Findings) -> None:
     """By the deviance that each lowers, or where names go by the model's error, by that."""
-    if isinstance(predictions := findings.held_out.predictions, ErrorPredictions):
-        return predicted(page, findings, predictions)
-    rows = evidence(findings)
+    if findings.evidence.there is not None:
+        return predicted(page, findings)
+    rows = list_candidates(findings)
     labels = _labels(rows)
     page.heading("Candidates by their evidence")
     finite = [row for row in rows if np.isfinite(row.drop)]
@@ -65,13 +65,13 @@ def candidates(page: Report, findings: Findings) -> None:
         _further(page, findings)
 
 
-def _labels(rows: Sequence[Evidence]) -> dict[Evidence, str]:
+def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
     """A candidate's name; sets of several are numbered, because a chart has no room for all their names."""
     sets = [row for row in rows if len(row.names) > 1]
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence, str]) -> Chart:
+def _bars(findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]) -> Chart:
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
     chance = chance_level(findings)
@@ -80,7 +80,7 @@ def _bars(findings: Findings, rows: Sequence[Evidence], labels: Mapping[Evidence
     return chart.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
 
 
-def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
+def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     colors = ["green: added"] * bool(findings.names)
     colors += ["orange: tied with it"] * any(r.status == TIED for r in rows)
     colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
@@ -88,16 +88,16 @@ def _bars_caption(findings: Findings, rows: Sequence[Evidence]) -> str:
     chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
-        f" {findings.context.criteria.false_alarms:.0%} of cases."
+        f" {findings.context.criteria.naming:.0%} of cases."
     )
 
 
 def _sets(page: Report, findings: Findings) -> None:
     rows = [
         [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
-         "rejected" if r.rejected else "adequate" if r.adequate else "not adequate",
-         "" if r.tests is None else by_draws(r.tests.p_left)]
-        for r in findings.survivors.rivals[:MOST_SETS]
+         find_status(r, findings.verdict, findings.evidence, findings.context),
+         "" if r.tests is None else by_draws(r.p_left)]
+        for r in findings.evidence.rows[:MOST_SETS]
     ]  # fmt: skip
     with page.folded("How the refitted sets compare"):
         page.table(

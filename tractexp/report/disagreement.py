@@ -2,7 +2,7 @@
 
 from tractexp.blocks import Report
 from tractexp.discrepancy.investigate import Findings
-from tractexp.inference.chance import by_draws
+from tractexp.inference.chance import BLURRED, by_draws
 from tractexp.wording import in_words
 
 
@@ -13,7 +13,7 @@ def places(page: Report, findings: Findings) -> None:
     text = f"What the base model leaves would come about by chance with a probability of {by_draws(first.p_left)}"
     text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
     if first.scores:
-        best, alpha = first.scores[0], findings.context.criteria.false_alarms
+        best, alpha = first.scores[0], findings.context.criteria.naming
         text += (
             f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
             f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
@@ -33,7 +33,7 @@ def places(page: Report, findings: Findings) -> None:
 
 def noise(page: Report, findings: Findings) -> None:
     context, fit = findings.context, findings.last
-    quiet = fit.noise.loudest_input_mode <= context.criteria.blurred
+    quiet = fit.noise.loudest_input_mode <= BLURRED
     about = context.domain.about_noise(findings.catalogue.of_measurement, quiet)
     page.heading("Noise").text(f"{context.describe(fit.noise)}. {about}")
     if fit.robust is not None:

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from tractexp.blocks import Report, Table
+from tractexp.discrepancy.decide import UNEXPLAINED
 from tractexp.discrepancy.discrepancy_json import recommendation
+from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.remainder import Remainder
-from tractexp.discrepancy.verdict import UNEXPLAINED, Nearest
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity, described, title
 from tractexp.report.candidates import candidates
@@ -25,7 +26,7 @@ from tractexp.wording import alternatives, as_sentence, counted, epsilon, joined
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
 
-KIND = {"none": "good", "named": "good", "tied": "plain", "unexplained": "bad"}
+KIND = {"none": "good", "candidate": "plain", "named": "good", "tied": "plain", "unexplained": "bad"}
 ROLES = {"train": "fitted", "validate": "held out"}
 CURRENTS = (
     ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the currents of all"
@@ -85,7 +86,7 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
     spoken = [[findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets]
     head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
-    sentences = [as_sentence(findings.verdict.reason), *left, *headlines(findings), _graded(findings)]
+    sentences = [as_sentence(findings.reason), *left, *headlines(findings), _graded(findings)]
     kind = "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
     page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
@@ -119,7 +120,7 @@ def _graded(findings: Findings) -> str:
 def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
     """The gap; where nothing explains it, that of the nearest candidates beside it."""
     page.heading("How large the gap is" if not findings.names else "How much smaller the gap is")
-    table, near = gap(content), findings.verdict.nearest
+    table, near = gap(content), findings.nearest
     page.add(replace(table, rows=_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
         rows = [[joined(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
@@ -162,7 +163,7 @@ def _off(misfit: Mapping[str, Any]) -> list[str]:
 def _left(page: Report, findings: Findings) -> None:
     """What is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
-    shapes, near = findings.remainder, findings.verdict.nearest
+    shapes, near = findings.remainder, findings.nearest
     whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
     if findings.names:
         whose = f"the model with {joined(findings.names)}"
@@ -194,8 +195,8 @@ def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose
 
 def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
-    assert near.rival.tests is not None
-    by_name = {e.parameter.name: e for e in estimates(near.rival.tests, near.rival.fit.unit, near.names)}
+    assert near.row.tests is not None
+    by_name = {e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)}
     own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
     rows = [[joined(near.names), *map(_share, near.closed)]]
     rows += [[joined(names), _share(share), ""] for names, share in near.others]

@@ -5,7 +5,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import PALETTE
-from tractexp.discrepancy.next_event.choose import EventTrial, NextEvent
+from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, NextEvent
 from tractexp.wording import as_sentence
 
 LISTED = 2  # events of each kind that a table has
@@ -15,7 +15,7 @@ KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalan
 def report(choice: NextEvent, title: str) -> Report:
     """The page of a plan for rivals."""
     page = Report("What to record next", f"For {title}, to tell {' from '.join(choice.rivals)}.")
-    sure = choice.probability >= choice.criteria.decided
+    sure = choice.probability >= DECIDED
     page.verdict(as_sentence(choice.sentence()), kind="good" if sure else "bad" if choice.same else "plain")
     section(page, choice)
     return page
@@ -53,7 +53,7 @@ def section(page: Report, choice: NextEvent) -> None:
 
 
 def _caption(choice: NextEvent) -> str:
-    decided = f"Dashed: the {choice.criteria.decided:.0%} from which an event is recommended as sure."
+    decided = f"Dashed: the {DECIDED:.0%} from which an event is recommended as sure."
     return f"Probability that one dip more tells all rivals apart, by its depth and duration. {decided}"
 
 
@@ -65,7 +65,7 @@ def _chart(choice: NextEvent) -> Chart:
         line = sorted((t.event.depth, t.chances.least) for t in plain if t.event.duration == duration)
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
-    return chart.level(100 * choice.criteria.decided).limits(0, -3, 103)
+    return chart.level(100 * DECIDED).limits(0, -3, 103)
 
 
 def _kind(tried: EventTrial) -> str:

@@ -7,9 +7,10 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import MEASURED, PALETTE
+from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import effect_sizes
-from tractexp.discrepancy.prediction import ErrorPredictions, PredictedTerm, PredictionError
+from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import in_percent
 from tractexp.wording import joined
@@ -19,14 +20,14 @@ MOST = 16  # sets that are shown beside those named
 BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the bars
 
 
-def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -> None:
+def predicted(page: Report, findings: Findings) -> None:
     """The model's error on the held-out events with each set, and by what it divides that of the base model."""
-    criteria, bare = findings.context.criteria, predictions.bare
-    best = [predictions.term] if predictions.term else []
-    every = sorted((*predictions.sets.values(), *best), key=lambda p: p.left)
-    every = [one for one in every if np.isfinite(one.error)]
-    always = ((), *findings.verdict.sets, *(one.names for one in best))
-    rows = [one for k, one in enumerate(every) if k < MOST or one.names in always]
+    criteria, evidence = findings.context.criteria, findings.evidence
+    best = [evidence.term] if evidence.term else []
+    every = sorted((*evidence.every, *best), key=lambda row: row.predicted.left)
+    every = [row for row in every if np.isfinite(row.predicted.error)]
+    always = (evidence.base, *findings.verdict.kept, *best)
+    rows = [row for k, row in enumerate(every) if k < MOST or row in always]
     page.heading("Candidates by what they predict")
     if not rows:
         page.text("No set has a steady state on the held-out events.")
@@ -40,9 +41,10 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
         [
-            [_label(one), in_percent(one.error), f"{np.sqrt(bare.left / one.left):.2f}",
-             _status(findings, one), "; ".join(map(str, _sizes(findings, one)))]
-            for one in rows
+            [_label(findings, row), in_percent(row.predicted.error),
+             f"{np.sqrt(evidence.base.predicted.left / row.predicted.left):.2f}",
+             _status(findings, row), "; ".join(map(str, _sizes(findings, row)))]
+            for row in rows
         ],
         f"A name, or each of the best sets that have it, divides the error of the base model by {criteria.divides:g}."
         f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of the library is"
@@ -52,39 +54,43 @@ def predicted(page: Report, findings: Findings, predictions: ErrorPredictions) -
     )  # fmt: skip
 
 
-def _label(one: PredictionError) -> str:
-    if isinstance(one, PredictedTerm):
-        return one.words
-    return joined(one.names) or "the base model"
+def _label(findings: Findings, row: SetEvidence) -> str:
+    if row is findings.evidence.term:
+        return term(row.names[0]).words
+    return joined(row.names) or "the base model"
 
 
-def _bars(findings: Findings, rows: Sequence[PredictionError]) -> Chart:
-    errors = [100 * one.error for one in rows]
-    colors = [
-        BASE if not one.names else ADDED if one.names == findings.names
-        else TIED if one.names in findings.verdict.sets else OTHER
-        for one in rows
-    ]  # fmt: skip
+def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
+    errors = [100 * row.predicted.error for row in rows]
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
-    chart.bars("", [_label(one) for one in rows], errors, colors, hover=[f"{error:.3g}" for error in errors])
-    for bare in (error for one, error in zip(rows, errors, strict=True) if not one.names):
-        chart.edge(bare / findings.context.criteria.divides, dash="dash")
+    labels, colors = [_label(findings, row) for row in rows], [_color(findings, row) for row in rows]
+    chart.bars("", labels, errors, colors, hover=[f"{error:.3g}" for error in errors])
+    for row, error in zip(rows, errors, strict=True):
+        if row is findings.evidence.base:
+            chart.edge(error / findings.context.criteria.divides, dash="dash")
     return chart.limits(None, 0.0, ROOM * max(errors))
 
 
-def _status(findings: Findings, one: PredictionError) -> str:
-    if not one.names:
+def _color(findings: Findings, row: SetEvidence) -> str:
+    if row is findings.evidence.base:
+        return BASE
+    if row is findings.verdict.chosen:
+        return ADDED
+    return TIED if row in findings.verdict.kept else OTHER
+
+
+def _status(findings: Findings, row: SetEvidence) -> str:
+    if row is findings.evidence.base:
         return ""
-    if isinstance(one, PredictedTerm):
+    if row is findings.evidence.term:
         return "the best term of the library"
-    if one.names in findings.verdict.sets:
-        return "added" if one.names == findings.names else "tied"
+    if row in findings.verdict.kept:
+        return "added" if row is findings.verdict.chosen else "tied"
     return "not named"
 
 
-def _sizes(findings: Findings, one: PredictionError) -> list[ParameterEstimate]:
+def _sizes(findings: Findings, row: SetEvidence) -> list[ParameterEstimate]:
     """How large its effects are, with standard errors where they were reckoned."""
-    if isinstance(one, PredictedTerm):
+    if row is findings.evidence.term:
         return []
-    tests = next((r.tests for r in findings.survivors.rivals if r.fit.names == one.names), None)
-    return effect_sizes(findings.context, one.fit, one.names, tests)
+    return effect_sizes(findings.context, row.fit, row.names, row.tests)

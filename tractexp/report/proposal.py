@@ -7,7 +7,7 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.discrepancy.discrepancy_json import PLUGIN
-from tractexp.discrepancy.held_out import Assessment
+from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.proposal.judge import TermAssessment
 from tractexp.discrepancy.proposal.library import Term
@@ -78,7 +78,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
 def _explained(page: Report, proposal: Proposal) -> None:
     rows = [
         [role, *map(in_percent, (g.before.error.value, g.after.error.value)), percent(g.explained)]
-        for role, g in (("fitted", proposal.train.gap), ("held out", proposal.validate.gap))
+        for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
     page.table(
         ["events", "model's error without it", "with it", "explained"], rows,
@@ -92,15 +92,17 @@ def _drawn(page: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
         page.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        page.charts([_missed(judged, e) for e in range(min(len(judged.context.events), EVENTS))])
+        page.charts([_missed(judged, e) for e in range(min(len(judged.by_event), EVENTS))])
 
 
-def _missed(judged: Assessment, e: int) -> Chart:
-    bench, event = judged.context, judged.context.events[e]
+def _missed(judged: GapTest, e: int) -> Chart:
+    bench = judged.context
+    assert bench is not None
+    event = bench.events[e]
     part = bench.drive.part(e)
-    base = judged.gap.before.calculated[:, part]
+    base = judged.before.calculated[:, part]
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
-    more = judged.gap.after.calculated[:, part] - base
+    more = judged.after.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
     measured = [c for c in range(len(base)) if bench.valid[c, part].any()]  # a delta winding has no zero sequence
     chart = Chart(f"t [s], {event.record.name}", [f"{bench.drive.names[c]} [pu]" for c in measured])
@@ -135,6 +137,6 @@ def _tried(page: Report, tried: Sequence[tuple[Term, TermAssessment]]) -> None:
         page.table(
             ["term", "explained, fitted", "explained, held out", "left, fitted", "left, held out", "chance"],
             [[t.words, *(percent(g.explained) for g in gaps), *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
-              in_words(w.p)] for t, w in tried for gaps in ((w.train.gap, w.validate.gap),)],
+              in_words(w.p)] for t, w in tried for gaps in ((w.train, w.validate),)],
             "Shares explained, and what is left over the variance of the noise.",
         )  # fmt: skip

@@ -18,6 +18,7 @@ from tractexp.inference.records import Records
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
+DECIDED = 0.95  # probability with which a recommended dip must tell tied sets apart: one miss in twenty
 CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
 HOPELESS = 0.5  # chance below which no event is said to tell a pair apart
 WORTH = 0.1  # chance below which no refit is worth its time
@@ -102,7 +103,7 @@ class NextEvent:
         first, *others = self.rivals
         them = f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
         what, p = self.best.event.words, self.probability
-        if p >= self.criteria.decided:
+        if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
         sure = f"no event that was tried is sure to tell {them}"
         return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
@@ -157,13 +158,13 @@ def _held(
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
     while left and len(checked) < CHECKED:
-        best = mildest(left, context.criteria.decided)
+        best = mildest(left, DECIDED)
         chance = best.chances.least
         if checked and chance < min(HOPELESS, max(t.chances.least for t in checked)):
             break
         left.remove(best)
         checked.append(_refitted(context, noise, sides, best, ignored, seed) if chance >= WORTH else best)
-        if checked[-1].chances.least >= context.criteria.decided:
+        if checked[-1].chances.least >= DECIDED:
             return checked[-1]
     return max(checked, key=lambda t: t.chances.least)
 
@@ -190,9 +191,9 @@ def _refitted(
         return EventTrial(event, Chances.of(denied, ignored), refitted=plain)
 
     once = again(1)
-    if once.chances.least >= context.criteria.decided:
+    if once.chances.least >= DECIDED:
         return once
-    enough = (n for n in REPEATED if again(n).chances.least >= context.criteria.decided)
+    enough = (n for n in REPEATED if again(n).chances.least >= DECIDED)
     return replace(once, repeated=next(enough, None))
 
 

@@ -38,7 +38,7 @@ def event_for(
     events = domain_of(model).events(events)
     check_events(events, ())
     named = sorted({name for names in sets for name in names})
-    missing = catalogue(model, events, named, criteria.frequency_swing)
+    missing = catalogue(model, events, named)
     _check(missing, named)
     with Effort(tell).audible() as effort:
         context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)

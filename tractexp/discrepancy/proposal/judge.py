@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.gap import gap, pushed, share_gone
-from tractexp.discrepancy.held_out import Assessment, carried
+from tractexp.discrepancy.gap import GapTest, gap, pushed, share_gone
+from tractexp.discrepancy.held_out import carried
 from tractexp.discrepancy.proposal.bed import carried_over
 from tractexp.discrepancy.proposal.refit import JUDGED, TermFits
 from tractexp.inference.context import Context
@@ -21,14 +21,18 @@ from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
+# How often noise may give the best term of the whole library as much: a guard against the library's size alone, since
+# held-out events do the rest.
+PROPOSED_P = 0.01
+
 
 @dataclass(frozen=True, eq=False)
 class TermAssessment:
     """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the best of all as much."""
 
     fit: Refit
-    train: Assessment
-    validate: Assessment
+    train: GapTest
+    validate: GapTest
     p: float
 
     def stands(self, criteria: Criteria) -> bool:
@@ -37,7 +41,7 @@ class TermAssessment:
 
     def objections(self, criteria: Criteria) -> list[str]:
         """Why it is not proposed, each as the end of a sentence."""
-        gap = self.validate.gap
+        gap = self.validate
         least = share_gone(criteria.ahead)
         little = (
             f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events, less than {least:.0%}"
@@ -45,8 +49,8 @@ class TermAssessment:
         enough = gap.explained >= least
         rows = {
             (little if gap.gain > 0 else "it makes the held-out events worse"): not enough,
-            "the held-out events are too mild to show it": enough and not gap.helps,
-            "chance gives the best of the library as much": self.p > criteria.proposal_p,
+            "the held-out events are too mild to show it": enough and not gap.is_shown,
+            "chance gives the best of the library as much": self.p > PROPOSED_P,
         }
         return [why for why, true in rows.items() if true]
 
@@ -73,7 +77,7 @@ def term_assessments(
 def _assessed(
     original: Context, context: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
     units: Sequence[np.ndarray],
-) -> list[Assessment]:  # fmt: skip
+) -> list[GapTest]:  # fmt: skip
     """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `context`.
 
     `original` has the same events; coordinates `fitted` were fitted to them.
@@ -85,11 +89,10 @@ def _assessed(
     ]
     terms = context.whiten(noise, np.array(apart))
 
-    def assessed(fit: Refit, unit: np.ndarray) -> Assessment:
+    def assessed(fit: Refit, unit: np.ndarray) -> GapTest:
         perturbations = pushed(original, carried_over(original, context, unit), (), noise)
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
-        judged = gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
-        return Assessment(judged, context, (bare, unit))
+        return gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
 
     return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.discrepancy.held_out import Assessment
+from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
@@ -43,8 +43,8 @@ class Proposal:
 
     term: Term
     estimates: tuple[ParameterEstimate, ...]
-    train: Assessment
-    validate: Assessment
+    train: GapTest
+    validate: GapTest
     p: float
     acting: tuple[Acting, ...]
     ties: tuple[tuple[Term, float, float], ...]  # with the shares they explain on fitted and on held-out events
@@ -106,7 +106,7 @@ def _proposal(result: TermFits, first: Disagreement, standing: Sequence[TermAsse
     return Proposal(
         term=term, estimates=estimates, train=chosen.train, validate=chosen.validate, p=chosen.p,
         acting=tuple(_acting(result, chosen.fit)),
-        ties=tuple((result.term(o.fit), o.train.gap.explained, o.validate.gap.explained) for o in alternatives),
+        ties=tuple((result.term(o.fit), o.train.explained, o.validate.explained) for o in alternatives),
         alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
         next_event=_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
@@ -165,7 +165,7 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
     """The proposal as `discrepancy.json` has it; `plugin` is the path of its file."""
     if (proposal := proposed.proposal) is None:
         return None
-    judged = ("train", proposal.train.gap), ("validate", proposal.validate.gap)
+    judged = ("train", proposal.train), ("validate", proposal.validate)
     return {
         "terms": [
             _named(proposal.term)

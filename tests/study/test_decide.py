@@ -1,0 +1,82 @@
+"""The decision by itself: numbers in, a word out, as docs/missing-effects.md has it for a reader with a pencil."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tractexp.discrepancy.criteria import Criteria
+from tractexp.discrepancy.decide import decide
+from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
+from tractexp.discrepancy.gap import GapTest
+from tractexp.inference.fitting import Refit
+
+
+def held_out(gain, expected):
+    return GapTest(None, None, gain, 0.0, expected, Criteria().shown, None)
+
+
+def row(*names, deviance=0.0, **columns):
+    """A set that leaves nothing of the fitted events, unless columns say otherwise."""
+    fit = Refit(names, np.zeros(0), deviance, len(names))
+    return SetEvidence(fit, names, names, **{"behind": 0.0, "p_left": 1.0} | columns)
+
+
+def word(*rows, base_p=0.0, **base):
+    """The verdict on these sets beside a base model that leaves something."""
+    verdict = decide(Evidence(row(deviance=100.0, p_left=base_p, **base), rows), Criteria())
+    return verdict.word, verdict.sets
+
+
+CONFIRMED, MILD, DENIED = held_out(50.0, 55.0), held_out(3.0, 6.0), held_out(-2.0, 60.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ([row("a", gap=CONFIRMED)], "named"),
+        ([row("a")], "candidate"),  # no event was held out
+        ([row("a", gap=MILD)], "candidate"),
+        ([row("a", gap=CONFIRMED, grade="wrong_model")], "candidate"),
+        ([row("a", gap=CONFIRMED, grade="effect_missing")], "named"),
+        ([row("a", gap=DENIED)], "unexplained"),
+        ([row("a", gap=CONFIRMED, p_of_all=1e-4)], "unexplained"),
+        ([row("a", gap=CONFIRMED, behind_of_all=6.1)], "unexplained"),
+        ([row("a", p_left=1e-4)], "unexplained"),
+        ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": CONFIRMED})], "named"),
+        ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": MILD})], "candidate"),
+        ([row("a", "b", gap=CONFIRMED, without={"a": CONFIRMED, "b": DENIED})], "unexplained"),
+        ([row("a", gap=CONFIRMED), row("b", behind=5.9, gap=MILD)], "tied"),
+        ([row("a", gap=CONFIRMED), row("b", behind=6.1, gap=CONFIRMED)], "named"),
+        ([row("a", gap=CONFIRMED), row("b", behind=3.0, gap=DENIED)], "named"),
+        ([row("a", p_left=1e-4), row("b", behind=3.0, gap=CONFIRMED)], "unexplained"),  # the best leaves something
+    ],
+)
+def test_a_word_follows_from_the_numbers_of_the_sets(rows, told):
+    assert word(*rows)[0] == told
+
+
+def test_where_no_set_is_kept_the_base_model_decides():
+    assert word(row(p_left=0.5), base_p=0.5)[0] == "none"
+    assert word(row(p_left=0.5), base_p=0.5, p_of_all=1e-4)[0] == "unexplained"
+    assert word(row("a", gap=DENIED), base_p=0.5)[0] == "none"
+    assert word(row("a", gap=DENIED), base_p=1e-4)[0] == "unexplained"
+
+
+def test_of_one_family_the_best_member_is_kept():
+    member = replace(row("a_member", behind=2.0, gap=CONFIRMED), family=("a",))
+    assert word(row("a", gap=CONFIRMED), member) == ("named", (("a",),))
+
+
+def off(*names, error, deviance):
+    """A set by what it leaves of held-out events in twenty blocks, and of the fitted events."""
+    blocks = np.ones(20)
+    prediction = PredictedError(error**2 * blocks, 0 * blocks, blocks, np.zeros(0))
+    return replace(row(*names, deviance=deviance), behind=np.nan, prediction=prediction)
+
+
+@pytest.mark.parametrize(("other", "told"), [(60.0, "named"), (40.0, "candidate")])
+def test_what_held_out_events_chose_is_named_if_the_fitted_ones_put_it_first_too(other, told):
+    sets = off("a", error=0.1, deviance=50.0), off("b", error=0.9, deviance=other)
+    verdict = decide(Evidence(off(error=1.0, deviance=100.0), sets), Criteria())
+    assert (verdict.word, verdict.names, verdict.complete) == (told, ("a",), False)

@@ -1,0 +1,304 @@
+"""The verdict in words: the sentence, what comes nearest where nothing explains, and what to record next."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tractexp.discrepancy.decide import (
+    CANDIDATE,
+    NAMED,
+    NONE,
+    TIED,
+    UNEXPLAINED,
+    Verdict,
+    divides,
+    find_adequate,
+    find_leading,
+    find_nearest,
+    is_confirmed,
+    needs_all,
+    rank_sets,
+)
+from tractexp.discrepancy.evidence import Evidence, SetEvidence
+from tractexp.discrepancy.gap import Curves, closed, curves
+from tractexp.discrepancy.held_out import carried
+from tractexp.discrepancy.next_event.choose import NextEvent, next_event
+from tractexp.discrepancy.proposal.library import term
+from tractexp.inference.chance import by_draws
+from tractexp.inference.context import Context
+from tractexp.inference.model_error import in_percent
+from tractexp.record import Event
+from tractexp.wording import alternatives, joined, listed, percent
+
+CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
+MOST_NEAR = 4  # sets that are told where nothing explains
+
+
+@dataclass(frozen=True, eq=False)
+class Nearest:
+    """Where nothing explains the disagreement: the set that comes nearest, and what it leaves."""
+
+    row: SetEvidence
+    others: list[tuple[tuple[str, ...], float]]  # the next ones, and what share of the gap they close on fitted events
+    curves: tuple[Curves, Curves]  # of the base model and with these, on the fitted events
+    carried: tuple[Curves, Curves] | None  # on the held-out ones
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.row.fit.names
+
+    @property
+    def closed(self) -> tuple[float, float]:
+        """The share of the gap that is closed on the fitted and on the held-out events, nan without any."""
+        return closed(*self.curves), closed(*self.carried) if self.carried else np.nan
+
+
+def find_nearest_sets(verdict: Verdict, evidence: Evidence, validate: Sequence[Event]) -> Nearest | None:
+    """The best of the sets that were compared; None where something explains, or that is the base model."""
+    assert evidence.last is not None
+    assert evidence.base.tests is not None
+    context, rows = evidence.base.tests.context, evidence.rows[:MOST_NEAR]
+    is_base = evidence.there is not None and not find_nearest(evidence, context.criteria).fit.names
+    if verdict.word != UNEXPLAINED or not rows or not rows[0].fit.names or is_base:
+        return None
+    fits = [evidence.base.fit, *(row.fit for row in rows)]
+    before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
+    there = None
+    if validate:
+        other, units, noise = carried(context, validate, fits[:2])
+        pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
+        there = pair if np.isfinite([one.deviance for one in pair]).all() else None  # else no steady state there
+    others = [(row.fit.names, closed(before, one)) for row, one in zip(rows[1:], after[1:], strict=True)]
+    return Nearest(rows[0], others, (before, after[0]), there)
+
+
+def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) -> NextEvent | None:
+    """What to record to tell tied sets apart."""
+    if verdict.word != TIED:
+        return None
+    assert evidence.noise is not None
+    fits = [row.told for row in verdict.kept]
+    labels = [joined(label_effects(names, context)) for names in verdict.sets]
+    return next_event(context, evidence.noise, evidence.base.fit, fits, labels)
+
+
+def explain(
+    verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context, *, all_fitted: bool = False
+) -> str:
+    """The sentence behind a verdict; `all_fitted` tells whether events were fitted that were to be held out."""
+    clauses = [_explain_word(verdict, evidence, nearest, context)]
+    gaps = [row.gap for row in verdict.kept if row.gap is not None]
+    if gaps and all(gap.is_mild for gap in gaps):
+        clauses.append("the held-out events are too mild to show it")
+    elif verdict.word == CANDIDATE:
+        clauses.append(_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted))
+    if any(row.is_fitted_to_all for row in verdict.kept):
+        clauses.append("what the fitted events leave open of it was fitted to the held-out ones, too")
+    if (window := context.records.window) is not None:
+        clauses.append(f"{window.describe()}, which is taken into account")
+    tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
+    if tests is not None and tests.resting:
+        clauses.append(f"on a bound: {', '.join(tests.resting)}")
+    return "; ".join(clauses)
+
+
+def _explain_word(verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context) -> str:
+    sets = verdict.sets
+    if evidence.there is not None:
+        return describe_prediction(verdict, evidence, context) if sets else explain_distance(evidence, context)
+    if evidence.is_predicted:
+        return describe_deviance(verdict, evidence, context)
+    if verdict.word in (NAMED, CANDIDATE):
+        return _describe_name(sets[0], evidence, context)
+    if verdict.word == TIED:
+        return _describe_tie([label_effects(names, context) for names in sets])
+    adequate = find_adequate(evidence, context.criteria)
+    if verdict.word == UNEXPLAINED and not adequate:
+        return explain_rest(evidence, nearest, context)
+    if adequate and (evidence.rows[0].fit.names or evidence.faults):
+        seemed = " or ".join(joined(label_effects(row.names, context)) for row in adequate)
+        return _explain_denial(verdict.word, seemed, adequate[0], context)
+    if verdict.word == UNEXPLAINED:
+        return "the fitted events alone show no disagreement, but all events together do"
+    return f"no disagreement above the noise, at a false-alarm rate of {context.criteria.false_alarms:.0%}"
+
+
+def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) -> str:
+    """Why a set that is kept alone is a candidate and no name."""
+    if is_confirmed(row, evidence):
+        return "the model with it does not describe this load, so it is no name"
+    if evidence.is_predicted:
+        return "the fitted events alone put another set first, and no further event confirms the choice"
+    if all_fitted:
+        return "only all events together show it, so all were fitted, and none is left to confirm it"
+    if row.gap is None:
+        return "no event was held out to confirm it"
+    doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
+    return f"the held-out events are too mild to show {joined(doubtful)}"
+
+
+def label_effects(names: Sequence[str], context: Context) -> list[str]:
+    """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
+    return [context.catalogue.spoken(name) for name in names]
+
+
+def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -> str:
+    labels = label_effects(names, context)
+    if len(labels) > 1:
+        sets = {row.fit.names for row in evidence.rows if len(row.fit.names) == len(names)}
+        fitted = len(sets - {tuple(names)})
+        sentence = f"{joined(labels)} explain the disagreement"
+        return (
+            f"{sentence}, and none of the {fitted} other sets of {len(names)} that were fitted does"
+            if fitted
+            else sentence
+        )
+    tested, comma = len(context.catalogue.candidates), "," if ", " in labels[0] else ""
+    rest = f"none of the {tested - 1} other effects tested does" if tested > 1 else "no other effect was tested"
+    return f"{labels[0]}{comma} explains the disagreement, and {rest}"
+
+
+def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
+    """Several explanations, told as the alternatives they are."""
+    each = "either" if len(sets) == 2 else "each"
+    return f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them apart"
+
+
+def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) -> str:
+    """What the sets explain on the held-out events, and what became of the others."""
+    shares = listed([row.gap.explained for row in verdict.kept if row.gap is not None], percent)
+    labels = alternatives([label_effects(names, context) for names in verdict.sets])
+    others = sum(bool(context.criteria.rejects(row.behind)) for row in evidence.rows)
+    verb = "explains" if len(verdict.kept) == 1 and len(verdict.names) == 1 else "explain"
+    sentence = f"{labels} {verb} {shares} of what exceeds the noise on the held-out events"
+    if len(verdict.kept) > 1:
+        sentence += ", and these events cannot tell them apart"
+    elif others == 1:
+        sentence += ", and the other set of its size is rejected"
+    elif others:
+        sentence += f", and the {others} other sets of its size are rejected"
+    return f"{sentence}; {CHOSEN_BY}"
+
+
+def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) -> str:
+    """How far the sets that predict best, the base model and the next set are off on the held-out events."""
+    chosen = verdict.kept
+    size, most = len(chosen[0].fit.names), chosen[0].predicted.left
+    rest = [
+        row for row in rank_sets(evidence, context.criteria)
+        if len(row.fit.names) <= size and row not in chosen and row.predicted.left > most
+    ]  # fmt: skip  # what leaves less does so by chance
+    worse = [f"the base model misses {_size(evidence.base)}"]
+    if rest:
+        following = joined(label_effects(rest[0].names, context))
+        worse.append(f"the next best of {len(rest)} other sets ({following}) {_size(rest[0])}")
+    worse.append(_describe_term(evidence))
+    labels = alternatives([label_effects(names, context) for names in verdict.sets])
+    off = listed([row.predicted.error for row in chosen], in_percent)
+    if len(chosen) > 1:
+        sentence = (
+            f"{labels}: they predict the held-out events within {off} of the response, which cannot tell them apart"
+        )
+    else:
+        sentence = f"{labels} {'predicts' if size == 1 else 'predict'} the held-out events within {off} of the response"
+    return f"{sentence}, where {joined(worse)}{_describe_shared(chosen[0], evidence, context)}; {CHOSEN_BY}"
+
+
+def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) -> str:
+    """Of a name that does not divide the error by as much as names must: what the best of all sets misses, which has
+    it, as the end of a sentence."""
+    if divides(chosen, evidence.base, context.criteria.divides):
+        return ""
+    best = min((row for row in evidence.every if row.prediction is not None), key=lambda row: row.predicted.left)
+    labels = joined(label_effects(best.names, context))
+    return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
+
+
+def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) -> str:
+    """What was tried, how far the nearest of it gets, and what stands out in what it leaves."""
+    best = evidence.rows[0]
+    assert best.tests is not None
+    chance = f"would come about by chance with a probability of {by_draws(best.p_left)}"
+    loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
+    if nearest is None and not evidence.faults:
+        return f"{_deny_all(context)} helps more than chance does: what the base model leaves {chance}; {loudest}"
+    names, faults = label_effects(best.fit.names, context), label_effects(evidence.faults, context)
+    sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
+    ending = "s" if len(names or faults) == 1 else ""
+    share = f"help{ending}"
+    if nearest and np.isfinite(nearest.closed[0]):
+        share = f"close{ending} {nearest.closed[0]:.0%} of the gap"
+    none = f"{_deny_all(context, len(best.fit.names))} explains it all"
+    return f"{none}: {sentence}, the nearest, {share}, but what is left {chance}; {loudest}"
+
+
+def explain_distance(evidence: Evidence, context: Context) -> str:
+    """How far the set that predicts the held-out events best is from dividing what the base model leaves of them."""
+    criteria, bare = context.criteria, _size(evidence.base)
+    near = find_nearest(evidence, criteria)
+    if not near.fit.names:
+        better = "predicts the held-out events better than the base model"
+        return f"{_deny_all(context)} {better}, which misses {bare} of the response there"
+    if evidence.term is not None:  # it beats the set that would be kept
+        beaten = find_leading(evidence, criteria, criteria.divides)[0]
+        name = joined(label_effects(beaten.names, context))
+        misses = f"misses {_size(beaten)} of the response of the held-out events"
+        return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
+    labels = joined(label_effects(near.names, context))
+    why = f"a name must divide that by {criteria.divides:g}"
+    if divides(near, evidence.base, criteria.divides):
+        needed = needs_all(near, evidence, criteria)
+        why = "that may be chance in so few blocks" if needed else "one of them alone does hardly worse"
+    none = f"{_deny_all(context, len(near.names))} predicts the held-out events well enough to be named"
+    misses = f"{'misses' if len(near.names) == 1 else 'miss'} {_size(near)} of the response there"
+    return f"{none}: {labels}, the nearest, {misses}, where the base model misses {bare}; {why}"
+
+
+def _describe_term(evidence: Evidence) -> str:
+    """What the best term is, and how far it is off, as the end of a sentence."""
+    assert evidence.term is not None
+    return f"the best term of the library ({term(evidence.term.names[0]).words}) {_size(evidence.term)}"
+
+
+def _size(row: SetEvidence) -> str:
+    """The model's error on the held-out events, as a sentence tells it."""
+    return in_percent(row.predicted.error)
+
+
+def _deny_all(context: Context, most: int = 1) -> str:
+    """How a sentence begins that says what no effect does, nor a set of so many where the nearest is one."""
+    together = f", alone or up to {most} together," if most > 1 else ""
+    tested = len(context.catalogue.candidates)
+    return f"the model and the records disagree, and none of the {tested} effects tested{together}"
+
+
+def _explain_denial(word: str, seemed: str, best: SetEvidence, context: Context) -> str:
+    """What the held-out events have against the explanations of the fitted ones."""
+    if word == NONE:
+        return (
+            f"what seemed to help on the fitted events, {seemed}, is not borne out by the held-out ones, and what the"
+            " base model leaves is no more than chance leaves"
+        )
+    why = _describe_objection(best, context)
+    return f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {why}"
+
+
+def _describe_objection(best: SetEvidence, context: Context) -> str:
+    assert best.gap is not None
+    if best.gap.is_denied:
+        return "there it fits no better than the base model"
+    if needless := [name for name, gap in best.without.items() if gap.is_denied]:
+        return f"there it fits no better than without {joined(label_effects(needless, context), 'or')}"
+    return (
+        "what a fit to all events together leaves would come about by chance with a probability of"
+        f" {by_draws(best.p_of_all)}"
+    )
+
+
+def find_status(row: SetEvidence, verdict: Verdict, evidence: Evidence, context: Context) -> str:
+    """What became of a set that was compared, in two words."""
+    is_outdone = evidence.there is not None and row not in verdict.kept
+    if is_outdone or context.criteria.rejects(row.behind):
+        return "rejected"
+    return "adequate" if row.p_left >= context.criteria.adequate_p else "not adequate"
