@@ -35,7 +35,7 @@ def starting_level(
     first = levels[:, :most]
     middle = np.maximum(np.array([np.median(first[:, : k + 1], axis=1) for k in range(first.shape[1])]).T, 1e-12)
     stays = np.all(np.abs(first / middle - 1) <= limits[:, None] / 2, axis=0)
-    count = len(stays) if stays.all() else int(np.argmin(stays))
+    count = len(stays) if stays.all() else max(1, int(np.argmin(stays)))  # a dead channel leaves nothing
     level = np.median(first[:, :count], axis=1)
     last = levels[:, t >= t[-1] - max(REFERENCE, (t[-1] - t[0]) / 5)]
     after, usual = np.median(last, axis=1), np.median(levels, axis=1)
