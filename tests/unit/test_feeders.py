@@ -250,7 +250,31 @@ def test_currents_of_a_bus_add_up_to_nothing():
 
 
 def test_a_bus_tie_is_left_out_of_the_sum():
-    assert "without tie: a bus tie, or one of another bus" in station(tie=True)["tie"].why[-1]
+    found = station(tie=True)
+    assert "without tie: a bus tie, or one of another bus" in found["tie"].why[-1]
+    assert {name: f.loaded for name, f in found.items()} == {"T1": True, "T2": True, "L1": True, "tie": False}
+
+
+@pytest.mark.parametrize("name", ["Bus coupler", "220kV母联", "ШСВ-220", "Sectionalizer 1"])
+def test_what_is_called_a_bus_coupler_is_no_load(name):
+    one = wave(T, load(dip(T)))
+    names = ["Ua", "Ub", "Uc", *(f"{bay} I{p}" for bay in ("T1", name) for p in "abc")]
+    waves = [*V, *(one + KA * noise((3, len(T)), 0.001)), *(0.5 * one)]
+    found = propose(recording(waves, names=names))
+    assert [f.loaded for f in found] == [True, False]
+    assert "a bus coupler" in found[1].why[-1]
+
+
+def test_the_load_of_the_greatest_active_power_is_recommended():
+    from tractexp.report import look_console
+
+    def entry(name, P, Q):
+        event = {"kind": "dip", "dip": 1, "start": 1.0, "duration": 0.2, "depth": 0.3, "worth": True, "why": "",
+                 "P_after": P, "Q_after": Q}  # fmt: skip
+        return {"name": name, "events": [event], "command": f"fit {name}"}
+
+    feeders = [entry("cable", 1.0, -98.0), entry("load", 20.0, 8.0), entry("aside", 5.0, 2.0)]
+    assert "fit load" in look_console._answer([{"feeders": feeders}])
 
 
 def test_a_transformer_whose_polarity_is_reversed_is_found_by_the_sum():
@@ -306,7 +330,8 @@ def test_the_transformers_of_the_220_kv_station(shared_data):
     assert by_currents[8, 9, 10].voltages == (4, 5, 6)
     assert by_currents[16, 17, 18].voltages == (0, 1, 2)
     assert "the currents of 6 feeders add up to 0.1" in by_currents[8, 9, 10].why[-1]
-    assert [f.loaded for f in found] == [True] * 7 + [False]
+    assert [f.loaded for f in found] == [True] * 6 + [False] * 2  # the bus coupler, and a line without load
+    assert "a bus coupler, as its name says" in by_currents[24, 25, 26].why[-1]
 
 
 def test_the_feeders_of_the_110_kv_station(shared_data):

@@ -1,5 +1,6 @@
 """Which channels show one load, and how they are connected."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -32,6 +33,7 @@ STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
 FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
+COUPLER = re.compile(r"coupler|bus[ _-]?tie|sectionali[sz]|kuppl|母联|分段|шсв|секцион|acoplador")
 ALONE = "no current is recorded: there is no load to fit"
 HALF = "half of an autotransformer feeder"
 SAME_BUS = 0.02  # voltages that never differ by more are those of one bus, or of two tied ones
@@ -453,6 +455,9 @@ def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: flo
     if _dead(phasors, feeder.voltages):
         why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
         return replace(feeder, why=(*feeder.why, why), loaded=False)
+    if named := COUPLER.search(feeder.name.lower()):
+        said = f"no load here: a bus coupler, as its name says ('{named[0]}'): its current is that of other feeders"
+        return replace(feeder, why=(*feeder.why, said), loaded=False)
     if not any(phasors.pure(i) for i in feeder.currents):
         said = "no load here: the currents are no more than noise or harmonics"
         return replace(feeder, why=(*feeder.why, said), loaded=False)

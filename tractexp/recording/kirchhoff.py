@@ -74,5 +74,13 @@ def _said(feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes:
             said += f", without {' and '.join(out)}" + (": a bus tie, or one of another bus" if sign == 0 else "")
         if sign < 0:
             said += " once this one's polarity is reversed"
-        marked[k] = replace(marked[k], reverse_current=bool(sign < 0), why=(*marked[k].why, said))
+        others = {feeders[i].voltages for i in loaded if i != k}
+        coupler = sign == 0 and len(out) == 1 and others == {feeders[k].voltages}
+        said += ", and no load of this one" if coupler else ""
+        marked[k] = replace(
+            marked[k],
+            reverse_current=bool(sign < 0),
+            why=(*marked[k].why, said),
+            loaded=marked[k].loaded and not coupler,
+        )
     return marked

@@ -4,8 +4,6 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from tractexp.blocks import Report, Table
 from tractexp.recording.excursion import HYSTERESIS
 from tractexp.recording.happening import OF_LOADS
@@ -78,9 +76,12 @@ def _answer(files: Sequence[Entry]) -> str:
 
 
 def _answered(event: Entry) -> float:
-    """How much of a load answers an event and stays: the depth times the apparent power after it."""
-    powers = (event["P_after"], event["Q_after"])
-    return abs(event["depth"]) * float(np.hypot(*powers)) if None not in powers else 0.0
+    """How much of a load answers an event and stays: the depth times the active power after it.
+
+    Not the apparent one: a line of 1 MW and -98 Mvar is no load.
+    """
+    power = event["P_after"]
+    return 0.0 if power is None else abs(event["depth"] * power)
 
 
 def _worth(feeder: Entry) -> list[Entry]:
