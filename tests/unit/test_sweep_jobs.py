@@ -5,6 +5,7 @@ import json
 import re
 import sys
 import threading
+from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,11 +13,12 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.progress import FIRST_LINE
-from tractexp.sweep import launcher, progress
+from tractexp.sweep import launcher, progress, recorder
 from tractexp.sweep.job import SweepJob, shared
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.placing import place
 from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, objective, read, returned
+from tractexp.tracking import TrackedRun, runfile
 from tractexp.tracking.sweepfile import folder_of
 
 
@@ -185,3 +187,39 @@ def test_a_folder_that_is_not_the_jobs_alone_is_refused(subdirs, sentence, tmp_p
     jobs = [replace(job(Path(), seed=k), subdir=name) for k, name in enumerate(subdirs)]
     with pytest.raises(UserError, match=re.escape(sentence)):
         place(jobs, tmp_path)
+
+
+def test_a_job_is_logged_once_below_the_run_of_its_sweep(jobs, monkeypatch):
+    logged = []
+    monkeypatch.setattr(recorder, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1])
+    opening: Future[str | None] = Future()
+    opening.set_result("7")
+    record = recorder.Recorder(jobs[0].folder.parent, opening)
+    runfile.save(jobs[0].folder, TrackedRun("e", "r"), "sqlite:///x.db")
+    for folder in (jobs[0].folder, jobs[0].folder, jobs[1].folder):  # the last kept nothing
+        record.log(folder)
+    assert logged == [("r", "7", "sqlite:///x.db")]
+    assert runfile.read(jobs[0].folder).run_id == "id"
+
+
+def test_a_store_that_is_away_is_asked_once_and_what_it_lacks_is_kept(jobs, monkeypatch, capsys):
+    asked = []
+
+    def refuse(run, uri):
+        asked.append(run.name)
+        raise UserError("the store is away")
+
+    monkeypatch.setattr(recorder, "log", refuse)
+    opening: Future[str | None] = Future()
+    opening.set_result("7")
+    record = recorder.Recorder(jobs[0].folder.parent, opening)
+    for one in jobs:
+        runfile.save(one.folder, TrackedRun("e", one.folder.name), "sqlite:///x.db")
+        record.log(one.folder)
+    assert asked == ["0"]
+    assert capsys.readouterr().out.count("not logged yet: the store is away") == 1
+    assert [runfile.read(one.folder).run_id for one in jobs] == [""] * 4
+    waiting: Future[str | None] = Future()
+    waiting.set_result(None)  # the run of the sweep could not be opened
+    recorder.Recorder(jobs[0].folder.parent, waiting).log(jobs[0].folder)
+    assert asked == ["0"]
