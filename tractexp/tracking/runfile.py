@@ -5,6 +5,7 @@ sends what a store lacks, and sends nothing twice.
 """
 
 import json
+import math
 import re
 import time
 import uuid
@@ -23,7 +24,8 @@ MOST_CHILDREN = 1000  # runs below one: sets of effects, optimizers
 NUMBER = (int, float)
 SHAPES: Mapping[str, Any] = {  # kinds of the entries of a run that are no texts
     "parameters": dict, "metrics": dict, "curves": dict, "tags": dict, "artifacts": list, "records": list,
-    "children": list, "model": (str, type(None)), "parent": (str, type(None)), "seconds": NUMBER, "ended": NUMBER,
+    "children": list, "model": (str, type(None)), "parent": (str, type(None)), "seconds": NUMBER,
+    "ended": (*NUMBER, type(None)),  # None of a run below another, which ends with it
 }  # fmt: skip
 INNER: Mapping[str, Any] = {  # and of what these hold
     "metrics": NUMBER, "tags": str, "artifacts": str, "records": dict, "children": dict, "curves": list,
@@ -86,7 +88,8 @@ def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
     """A run as JSON knows it; paths within the folder are relative, so that it may be moved."""
     content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(TrackedRun)}
     content["parameters"] = flatten(run.parameters)
-    content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
+    metrics = {name: float(value) for name, value in run.metrics.items()}
+    content["metrics"] = {name: value for name, value in metrics.items() if not math.isinf(value)}
     content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
     content["artifacts"] = [_relative(path, folder) for path in run.artifacts]
     content["model"] = None if run.model is None else _relative(run.model, folder)
