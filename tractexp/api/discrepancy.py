@@ -30,6 +30,7 @@ from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
 from tractexp.progress import Progress, console, say, telling
+from tractexp.provenance import again
 from tractexp.wording import joined, shown_in_words, with_error
 
 if TYPE_CHECKING:
@@ -367,6 +368,11 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
         lines.append(f"use the extended model{which}: {use_of(domain, model)}")
         if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
             lines.append(f"use it as the base model: {investigate_with(domain, model)}")
+    if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
+        context = result.steps.context
+        better = [why for why in map(context.domain.better, context.events) if why][:1]
+        in_waves = again("task=discrepancy", "domain=waves", of=("data", "task"))
+        lines += [f"next: {why}: {in_waves}" for why in better]
     if term := paths.get(PLUGIN):
         lines.append(f"use the proposed term: {adopt_term(term)}")
     return lines

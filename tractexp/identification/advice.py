@@ -21,7 +21,7 @@ def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
-    better = better_domain(uncertainty.likelihood.problem)
+    better = [f"{why}: {again('domain=waves')}" for why in better_domain(uncertainty.likelihood.problem)]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     search = again("task=discrepancy", *[f"data={data}"] * bool(data))
     if adequacy.grade is Grade.WRONG_MODEL:
