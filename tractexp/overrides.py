@@ -83,8 +83,7 @@ def _check(argument: str, key: str, value: str) -> None:
 def _name_model_file(arguments: list[str]) -> list[str]:
     """The arguments with a model of a folder, `--config-dir CONF model=NAME`, as the path of its file.
 
-    A folder that holds models only is then left out: nothing else in it is looked at. A name that is a shipped
-    choice's stays that one.
+    A folder that holds models only is then left out: nothing else in it is looked at.
     """
     flag, folder, rest = _take_config_folder(arguments)
     if folder is None:
@@ -92,7 +91,7 @@ def _name_model_file(arguments: list[str]) -> list[str]:
     found = False
     for k, argument in enumerate(rest):
         key, _, name = argument.partition("=")
-        if key == MODEL and (file := folder / MODEL / f"{name}.yaml").is_file() and not _is_shipped(name):
+        if key == MODEL and (file := folder / MODEL / f"{name}.yaml").is_file():
             rest[k], found = f"{MODEL}={file}", True
     only_models = found and all(path.parent == folder / MODEL for path in folder.rglob("*.y*ml"))
     return rest if only_models else [*flag, *rest]
@@ -108,12 +107,6 @@ def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, l
         folder = value if equals else "".join(arguments[k + 1 : end])
         return arguments[k:end], Path(folder) if folder else None, [*arguments[:k], *arguments[end:]]
     return [], None, arguments
-
-
-def _is_shipped(name: str) -> bool:
-    from tractexp.choices import choices
-
-    return name in choices()[MODEL]
 
 
 @functools.cache

@@ -95,6 +95,8 @@ def test_a_model_of_a_folder_is_its_file(write, tmp_path, monkeypatch, flag):
     path = write(GOOD, "conf/model/extended.yaml")
     assert overrides([*flag, "model=extended"]) == [f"model='{path}'"]
     assert overrides([*flag, "model=third_order_zip"]) == [*flag, "model=third_order_zip"]
+    own = write(GOOD, "conf/model/third_order_zip.yaml")  # one's own folder replaces ours
+    assert overrides([*flag, "model=third_order_zip"]) == [f"model='{own}'"]
     (tmp_path / "conf" / "experiment").mkdir()
     write("", "conf/experiment/own.yaml")
     assert overrides([*flag, "model=extended"]) == [*flag, f"model='{path}'"]
