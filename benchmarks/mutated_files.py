@@ -372,7 +372,8 @@ class Worker:
         return kind, words, figures, seconds, growth
 
 
-def run(count, seed):
+def run(count, seed, damaged=damaged):
+    """Counts and findings of so many files, each `damaged(paths, folder, rng)`: its path and what was done."""
     rng, worker = np.random.default_rng(seed), Worker()
     with tempfile.TemporaryDirectory() as base:
         sound, broken = Path(base) / "sound", Path(base) / "broken"

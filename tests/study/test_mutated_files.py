@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from mutated_files import LEAKS, damaged, originals, outcome
+from structured_damage import damage, restructured
 
 BENCHMARKS = Path(__file__).parents[2] / "benchmarks"
 
@@ -30,6 +31,20 @@ def test_a_damaged_file_is_read_or_refused_with_a_sentence(sound, tmp_path, seed
         path, done = damaged(sound[name], tmp_path, rng)
         kind, words, _ = outcome(path)
         assert kind in ("read", "refused"), f"{name}, {done}: {words}"
+        assert words.strip() or kind == "read"
+
+
+SEEDS = (4, 17, 2026)  # 300 files; a seed with a finding is added to them
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_file_of_a_damaged_structure_is_read_or_refused_with_a_sentence(sound, tmp_path, seed):
+    rng = np.random.default_rng(seed)
+    names = [name for name, paths in sound.items() if damage(paths[0], rng) is not None]
+    for k in range(100):
+        path, done = restructured(sound[names[k % len(names)]], tmp_path, rng)
+        kind, words, _ = outcome(path)
+        assert kind in ("read", "refused"), f"{names[k % len(names)]}, {done}: {words}"
         assert words.strip() or kind == "read"
 
 
