@@ -814,7 +814,7 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
 
 def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(planted, monkeypatch):
     """Products of matrices round by how many rows they have: the same descents go together on any machine."""
-    from tractexp.discrepancy import cores, fitting
+    from tractexp.inference import cores, fitting
 
     bench = planted.context
     wander = RandomWalk(np.array([1.0, 0.3]), 0.002, bench.problem.power)
