@@ -1,0 +1,197 @@
+"""Kinds of field records: short or several-rate ones, railways, direct voltages, secondary values, unknown units."""
+
+import numpy as np
+import pytest
+
+import tractexp
+from tractexp.filetypes import comtrade
+from tractexp.plugin import chosen
+from tractexp.recording import Channel, Recording, Segment
+
+RATE = 3200.0
+TURN = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+
+
+def waves(phasor, t, f=50.0, seed=0):
+    x = np.sqrt(2) * np.real(np.atleast_2d(phasor) * np.exp(2j * np.pi * f * t))
+    return x + 1e-4 * np.abs(x).max() * np.random.default_rng(seed).standard_normal(x.shape)
+
+
+def station(t, dips):
+    """Six channels of 110 kV, 20 MW and 8 Mvar: (name, unit, values)."""
+    u = np.ones(len(t))
+    for start, seconds, depth in dips:
+        u[(t >= start) & (t < start + seconds)] = 1 - depth
+    V = 110 / np.sqrt(3) * u
+    I = np.conj((20 * u**1.5 + 8j * u**2) / (3 * V))
+    rows = np.concatenate([waves(V * TURN, t), waves(I * TURN, t, seed=1)])
+    units = ["kV"] * 3 + ["kA"] * 3
+    return [(f"{x}{p}", unit, row) for (x, p), unit, row in zip(
+        [*(("U", p) for p in "ABC"), *(("I", p) for p in "ABC")], units, rows, strict=True)]  # fmt: skip
+
+
+def written(tmp_path, t, channels, segments=None, f=50.0, trigger=None, side="P"):
+    made = []
+    for name, unit, x in channels:
+        gain = np.abs(x).max() / 30000
+        quantity = "voltage" if name.upper().startswith("U") else "current"
+        made.append(Channel(name, np.round(x / gain).astype(np.int16), unit, quantity, gain=gain))
+    recording = Recording("made", made, segments or [Segment(0, len(t), RATE, 0.0)], f, "s", "r", trigger=trigger)
+    path = next(p for p in comtrade.write(recording, tmp_path / "a.cfg") if p.suffix == ".cfg")
+    if side != "P":
+        lines = path.read_text().splitlines()
+        path.write_text("\n".join(line[:-1] + side if line.endswith(",P") else line for line in lines) + "\n")
+    return path
+
+
+def look(path, **settings):
+    seen = tractexp.look(path, progress=False, **settings)
+    return seen, str(seen.summary()).splitlines()[0]
+
+
+def parts(*spans):
+    """Times of several rates, and their segments, from (start, end, rate)."""
+    times, segments, n = [], [], 0
+    for start, end, rate in spans:
+        t = np.arange(start, end - 1e-9, 1 / rate)
+        times.append(t)
+        segments.append(Segment(n, n + len(t), rate, start))
+        n += len(t)
+    return np.concatenate(times), segments
+
+
+@pytest.mark.parametrize(
+    "spans",
+    [
+        ((0, 0.96, 1600.0), (0.96, 1.4, 6400.0), (1.4, 3, 1600.0)),
+        ((0, 1.05, 1600.0), (1.05, 1.4, 6400.0), (1.4, 3, 1600.0)),
+        ((0, 1.02, 6400.0), (1.02, 3, 1600.0)),
+    ],
+)
+def test_a_dip_over_several_rates_is_one_dip(tmp_path, spans):
+    t, segments = parts(*spans)
+    path = written(tmp_path, t, station(t, [(1.0, 0.25, 0.3)]), segments)
+    [event] = look(path)[0].events
+    assert (event["kind"], event["worth"]) == ("dip", True)
+    [dip] = tractexp.read(path)
+    assert dip.t_start == pytest.approx(1.0, abs=0.012)
+    assert dip.depth == pytest.approx(0.3, abs=0.003)
+    assert dip.P0 * dip.record.base.power == pytest.approx(20, rel=0.01)
+
+
+@pytest.mark.parametrize("before", [0.0, 0.01, 0.02, 0.03, 0.04, 0.06, 0.1])
+@pytest.mark.parametrize(("seconds", "depth"), [(0.25, 0.3), (0.1, 0.15)])
+def test_little_before_a_dip_makes_no_swell_of_it(tmp_path, before, seconds, depth):
+    t = np.arange(0, 1.5, 1 / RATE)
+    path = written(tmp_path, t, station(t, [(before, seconds, depth)]))
+    [event] = look(path)[0].events
+    assert event["kind"] == "dip"
+    assert event["depth"] == pytest.approx(depth, abs=0.01)
+    if before >= 0.03:
+        [dip] = tractexp.read(path)
+        assert dip.depth == pytest.approx(depth, abs=0.01)
+
+
+def test_the_voltage_before_the_trigger_is_the_reference(tmp_path):
+    t = np.arange(0, 3, 1 / RATE)
+    path = written(tmp_path, t, station(t, [(0, 0.2, 0.1), (1.0, 0.25, 0.3)]), trigger=1.0)
+    kinds = [(event["kind"], round(event["depth"], 2)) for event in look(path)[0].events]
+    assert kinds == [("dip", 0.1), ("dip", 0.3)]
+    [dip] = tractexp.read(path)
+    assert dip.depth == pytest.approx(0.3, abs=0.005)
+
+
+class TestRailways:
+    t = np.arange(0, 2, 1 / RATE)
+    u = np.where((t >= 1) & (t < 1.25), 0.7, 1.0)
+    V = 27.5 * u
+    I = np.conj((12 * u**1.5 + 4j * u**2) / V)
+
+    def loads(self, tmp_path, *channels, f=50.0):
+        rows = [(name, "kV" if name[0] == "U" else "kA", waves(z, self.t, f)[0]) for name, z in channels]
+        seen, first = look(written(tmp_path, self.t, rows, f=f))
+        return [x for x in seen.feeders if x["loaded"]], first
+
+    def test_contact_line_and_negative_feeder_are_one_load(self, tmp_path):
+        V, I = self.V, self.I
+        each = (("U_CAT", V), ("U_FEED", -V), ("I_CAT", 0.6 * I), ("I_FEED", -0.4 * I))
+        between = (("U T-F", 2 * V), ("I T", 0.6 * I), ("I F", -0.4 * I))
+        for channels in (each, each[::-1], between):
+            [load], _ = self.loads(tmp_path, *channels)
+            assert load["connection"] == "autotransformer"
+            assert (load["U"], load["P"], load["Q"]) == pytest.approx((27.5, 12, 4), rel=0.01)
+
+    def test_half_of_it_is_called_half(self, tmp_path):
+        V, I = self.V, self.I
+        [load], first = self.loads(tmp_path, ("U_CAT", V), ("U_FEED", -V), ("I_CAT", 0.6 * I))
+        assert "half" in load["name"]
+        assert "half" in first
+        loads, _ = self.loads(tmp_path, ("U_CAT", V), ("I_CAT", 0.6 * I), ("I_FEED", -0.4 * I))
+        assert all("half" in load["name"] for load in loads)
+
+    @pytest.mark.parametrize("name", ["I_RC", "I return", "I Rückleiter", "I BT"])
+    def test_a_return_conductor_is_no_load(self, tmp_path, name):
+        V, I = 15 / 27.5 * self.V, self.I
+        [load], _ = self.loads(tmp_path, ("U FL", V), ("I FL", I), (name, -0.8 * I), f=50 / 3)
+        assert load["P"] == pytest.approx(12 * 15 / 27.5, rel=0.01)
+
+    def test_of_opposite_voltages_it_is_the_sum_of_both_powers(self):
+        each = chosen("connection", "autotransformer")
+        V, I = np.array([27.5, -27.5]), np.array([0.3 - 0.1j, -0.2 + 0.05j])
+        assert (each.voltage() @ V)[0] * np.conj(each.current() @ I)[0] == pytest.approx(V @ I.conj())
+
+    @pytest.mark.parametrize("volts", [750, 1500, 3000])
+    def test_a_direct_voltage_is_said_to_be_one(self, tmp_path, volts):
+        ripple = np.sin(2 * np.pi * 300 * self.t)
+        u = volts * self.u * (1 + 0.02 * ripple)
+        path = written(tmp_path, self.t, [("U line", "V", u), ("I line", "A", 500 + 50 * ripple)])
+        seen, first = look(path)
+        assert not seen.feeders.rows
+        assert f"is direct: {volts} V in the mean with a ripple of 1.4% RMS" in first
+        assert "(30.0%) at 1.000 s for 250 ms" in first
+        with pytest.raises(tractexp.UserError, match=r"is direct: .* alternating voltage"):
+            tractexp.read(path)
+
+
+def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
+    t = np.arange(0, 2, 1 / RATE)
+    rows = [
+        (name, unit[1:], x * 1e3 / (1100 if unit == "kV" else 120)) for name, unit, x in station(t, [(1.0, 0.2, 0.3)])
+    ]
+    path = written(tmp_path, t, rows, side="S")
+    seen, first = look(path)
+    [load] = seen.feeders
+    assert (load["U"], load["P"]) == (None, None)
+    assert "secondary" in first
+    assert any("units={U: '1.1 kV', I: '120 A'}" in note for note in seen.files.rows[0]["notes"])
+    assert any("secondary" in note for note in tractexp.read(path)[0].record.notes)
+    [load] = look(path, units={"U": "1.1 kV", "I": "120 A"})[0].feeders
+    assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=0.01)
+
+
+def test_an_unknown_unit_leaves_a_record_unexamined_and_never_quiet(tmp_path):
+    t = np.arange(0, 2, 1 / RATE)
+    rows = [(name, "V/kV" if unit == "kV" else unit, x) for name, unit, x in station(t, [(1.0, 0.2, 0.3)])]
+    path = written(tmp_path, t, rows)
+    seen, first = look(path)
+    assert first.startswith("not examined: ")
+    assert "nothing happened" not in str(seen.summary())
+    from tractexp.api.surveying import rows_of
+
+    assert [row["kind"] for row in rows_of(str(tmp_path), path.name)] == ["not examined"]
+
+
+def test_a_bus_tells_the_fault_that_its_circuits_end_at_different_instants(tmp_path):
+    t = np.arange(0, 3, 1 / RATE)
+    fault = (t >= 1) & (t < 2.2)
+    E = 110 / np.sqrt(3)
+    V = E * np.where(fault & (np.arange(3)[:, None] == 0), 0.05, 1.0) * TURN
+    rows = [(f"U L{p}", "kV", x) for p, x in zip("ABC", waves(V, t), strict=True)]
+    for number, S, opens in ((1, 20 + 8j, 1.10), (2, -18 - 6j, 1.16)):
+        I = np.conj(S / 3 / E**2) * V
+        I[0] *= np.where(fault & (t < opens), 60.0, np.where(fault, 0.0, 1.0))
+        rows += [(f"I{number} L{p}", "kA", x) for p, x in zip("ABC", waves(I, t, seed=number), strict=True)]
+    seen, _ = look(written(tmp_path, t, rows))
+    [bus] = [line for line in str(seen.summary()).splitlines() if line.strip().startswith("bus 1")]
+    assert "dip at 0.99" in bus
+    assert "1200 ms" in bus

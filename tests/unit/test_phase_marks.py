@@ -1,0 +1,114 @@
+"""One vocabulary of phases: whatever a table or a recording calls them, 110 kV, 20 MW and 8 Mvar come out."""
+
+import numpy as np
+import pytest
+
+import tractexp
+from tractexp.filetypes import comtrade
+from tractexp.recording import Channel, Recording, Segment
+
+ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]
+LINES = [
+    "U {}-{}",
+    "U_{}_{}",
+    "Vrms {} {} Avg",
+    "U{}-U{}",
+    "V {}/{}",
+    "Spannung {}-{}",
+    "{}-{}",
+    "Tensión {}{}",
+    "电压{}{}",
+]
+GROUND = ["U {}N", "V {}-G", "U_{}_N", "Vrms {}N Avg", "V{}-E"]
+PLAIN = ["U {}", "V_{}", "Phase {} voltage", "{}相电压", "Напряжение фаза {}"]
+SIZE = (110.0, 20.0, 8.0)  # kV, MW, Mvar
+
+
+def slow(seconds=20.0, rate=50.0):
+    """t, U [kV], P [MW], Q [Mvar] of a dip of 30 % at 8 s."""
+    t = np.arange(0, seconds, 1 / rate)
+    u = np.where((t >= 8) & (t < 8.3), 0.7, 1.0)
+    few = 1 + 3e-4 * np.random.default_rng(0).standard_normal((3, len(t)))
+    return t, 110 * u * few[0], 20 * u**1.5 * few[1], 8 * u**2 * few[2]
+
+
+def read(path, header, columns):
+    np.savetxt(path, np.array(columns).T, delimiter=",", header=header, comments="", fmt="%.5f", encoding="utf-8")
+    event = tractexp.read(path)[0]
+    base = event.record.base
+    return (base.voltage, event.P0 * base.power, event.Q0 * base.power), event.record.notes
+
+
+def pairs(order):
+    return [(order[k], order[(k + 1) % 3]) for k in range(3)]
+
+
+@pytest.mark.parametrize("order", ORDERS, ids="".join)
+def test_columns_of_magnitudes(tmp_path, order):
+    t, U, P, Q = slow()
+    for form in LINES:
+        names = [form.format(*pair) for pair in pairs(order)]
+        header = "t," + ",".join(f"{name} (kV)" for name in names) + ",P (MW),Q (Mvar)"
+        got, _ = read(tmp_path / "a.csv", header, [t, U, U, U, P, Q])
+        assert got == pytest.approx(SIZE, rel=0.01), names
+        got, _ = read(tmp_path / "a.csv", f"t,{names[0]} (kV),P (MW),Q (Mvar)", [t, U, P, Q])
+        assert got == pytest.approx(SIZE, rel=0.01), names[0]
+    for form in (*GROUND, *PLAIN):
+        names = [form.format(mark) for mark in order]
+        header = "t," + ",".join(f"{name} (kV)" for name in names) + ",P (MW),Q (Mvar)"
+        got, _ = read(tmp_path / "a.csv", header, [t, *[U / np.sqrt(3)] * 3, P, Q])
+        assert got == pytest.approx(SIZE, rel=0.01), names
+    for form in GROUND:
+        name = form.format(order[0])
+        got, _ = read(tmp_path / "a.csv", f"t,{name} (kV),P (MW),Q (Mvar)", [t, U / np.sqrt(3), P, Q])
+        assert got == pytest.approx(SIZE, rel=0.01), name
+
+
+@pytest.mark.parametrize("order", ORDERS, ids="".join)
+@pytest.mark.parametrize("form", ["V {}-{}", "U_{}_{}", "V{}-V{}"])
+def test_phasors_of_line_voltages(tmp_path, order, form):
+    t, U, P, Q = slow()
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    V, I = U / np.sqrt(3) * turn, np.conj((P + 1j * Q) / (np.sqrt(3) * U)) * turn
+    lines, names = V - V[[1, 2, 0]], [form.format(*pair) for pair in pairs(order)]
+    for kept in ([0, 1, 2], [0, 1]):  # two say the third
+        header, columns = "t", [t]
+        voltages = [(names[k], "kV", lines[k]) for k in kept]
+        for name, unit, z in (*voltages, *((f"I {mark}", "kA", I[k]) for k, mark in enumerate(order))):
+            header += f",{name} mag ({unit}),{name} ang (deg)"
+            columns += [np.abs(z), np.degrees(np.angle(z))]
+        got, _ = read(tmp_path / "a.csv", header, columns)
+        assert got == pytest.approx(SIZE, rel=0.01), (names, kept)
+
+
+@pytest.mark.parametrize("order", ORDERS, ids="".join)
+def test_channels_of_a_recording(tmp_path, order):
+    t = np.arange(0, 1.5, 1 / 1600)
+    u = np.where((t >= 0.8) & (t < 1.0), 0.7, 1.0)
+    turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
+    V = 110 / np.sqrt(3) * u * turn
+    I = np.conj((20 + 8j) / (3 * 110 / np.sqrt(3)) * u) * turn
+    for form in ("U {}-{}", "V{}{}", "U_{}_{}", "U{}-U{}"):
+        names = [form.format(*pair) for pair in pairs(order)] + [f"I {mark}" for mark in order]
+        values = np.sqrt(2) * np.real(np.concatenate([V - V[[1, 2, 0]], I]) * np.exp(2j * np.pi * 50 * t))
+        channels = [
+            Channel(name, np.round(x / np.abs(x).max() * 30000).astype(np.int16), "kV" if k < 3 else "kA",
+                    "voltage" if k < 3 else "current", gain=np.abs(x).max() / 30000)
+            for k, (name, x) in enumerate(zip(names, values, strict=True))
+        ]  # fmt: skip
+        made = Recording("made", channels, [Segment(0, len(t), 1600.0, 0.0)], 50.0, "s", "r")
+        path = next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
+        event = tractexp.read(path)[0]
+        base = event.record.base
+        assert (base.voltage, event.P0 * base.power, event.Q0 * base.power) == pytest.approx(SIZE, rel=0.01), names
+
+
+def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
+    t, U, P, Q = slow()
+    I = 1000 * np.hypot(P, Q) / (np.sqrt(3) * U)
+    got, notes = read(tmp_path / "a.csv", "t,Voltage (kV),Current (A),P (MW),Q (Mvar)", [t, U / np.sqrt(3), I, P, Q])
+    assert got == pytest.approx(SIZE, rel=0.01)
+    assert any("P and Q are the product" in note for note in notes)
+    got, notes = read(tmp_path / "a.csv", "t,Ua (kV),Ub (kV),Uc (kV),P (MW),Q (Mvar)", [t, U, U, U, P, Q])
+    assert got == pytest.approx(SIZE, rel=0.01)
+    assert any("110 kV is near a nominal voltage, and times sqrt(3) near none" in note for note in notes)
