@@ -184,7 +184,8 @@ def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) ->
 def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) -> str:
     """How far the sets that predict best, the base model and the next set are off on the held-out events."""
     chosen = verdict.kept
-    size, most = len(chosen[0].fit.names), chosen[0].predicted.left
+    first = chosen[0]
+    size, most = len(first.fit.names), first.predicted.left
     rest = [
         row for row in rank_sets(evidence, context.criteria)
         if len(row.fit.names) <= size and row not in chosen and row.predicted.left > most
@@ -202,7 +203,7 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
         )
     else:
         sentence = f"{labels} {'predicts' if size == 1 else 'predict'} the held-out events within {off} of the response"
-    return f"{sentence}, where {joined(worse)}{_describe_shared(chosen[0], evidence, context)}; {CHOSEN_BY}"
+    return f"{sentence}, where {joined(worse)}{_describe_shared(first, evidence, context)}; {CHOSEN_BY}"
 
 
 def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) -> str:
