@@ -345,11 +345,9 @@ def _concluded(question: Question, steps: "Steps") -> Investigation:
 
 def _estimated(question: Question, steps: "Steps") -> Result:
     """The graded model's parameters as a result, which predicts and is logged as a model."""
-    from tractexp.discrepancy.discrepancy_json import recorder_window
-
     base, graded, effort = question.model, steps.final_grade, steps.context.effort
-    model = base.with_(effects=sorted({*base.effects, *steps.names}), window=recorder_window(steps))
     values, problem = graded.values, graded.problem
+    model = base.with_(effects=sorted({*base.effects, *steps.names}), window=problem.model.window)
     objective = float(problem.objective(values[None])[0])
     history = History(np.array([effort.simulations]), np.array([objective]), values[None], np.zeros(1))
     status = f"ended with the verdict {steps.verdict.word}"

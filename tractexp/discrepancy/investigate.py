@@ -165,8 +165,8 @@ class Findings:
 
     def grade_of(self, names: Sequence[str]) -> GradedModel:
         """The base model with some of the names added, graded with all that the extended model has beside them."""
-        if not self.names:
-            return self.grader.grade((), self.window)
+        if not self.names:  # a window is part of the model where nothing is missing behind it
+            return self.grader.grade((), self.window) if self.verdict.complete else self.base_grade
         if not names:
             return self.base_grade
         own = {p.name for p in self.catalogue.parameters([name for name in self.names if name not in names])}
