@@ -17,6 +17,7 @@ from tractexp.recording.unit import in_doubt
 OPPOSITE = 0.15  # of a phasor: two that are nearer to adding up to zero are opposite
 TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at most
 BETWEEN = (45.0, 62.0)  # kV: a voltage between contact line and negative feeder, of 2x25 kV
+EACH = (20.0, 31.0)  # kV: a voltage of either of them to the rail
 RETURN = re.compile(r"return|retour|rück|(?<![a-z])(?:rc|ret|rail|rl|bt)(?![a-z])|обратн|回流|回线")
 CONTACT = re.compile(r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс")
 FEED = re.compile(r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线")
@@ -27,7 +28,8 @@ LONGEST = 1 << 20  # samples that are looked at
 
 
 def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] | None:
-    """The first two voltages that are opposite to each other while they are alive; None where none are."""
+    """The first two voltages of 25 kV that are opposite to each other while they are alive; None where none are."""
+    volts = [i for i in volts if EACH[0] <= phasors.size([i]) <= EACH[1]]
     for k, first in enumerate(volts):
         for second in volts[k + 1 :]:
             if is_opposite(phasors, first, second):
