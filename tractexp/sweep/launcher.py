@@ -20,7 +20,7 @@ from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import finished, place
 from tractexp.sweep.progress import progress
 from tractexp.sweep.recorder import Recorder
-from tractexp.sweep.status import FAILED, RUNNING, Status
+from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
 from tractexp.workers import Workers, backends
 
 FORKING = ("multiprocessing",)  # backends whose workers would inherit a half-done import of another thread
@@ -79,11 +79,18 @@ class Cores(Launcher):
         jobs = [job if job.hydra is None else replace(job, callbacks=callbacks) for job in jobs]
         ends: dict[Path, Status] = {}
         results = self.workers.results(work, jobs, self.tries, _trace)
-        with progress(jobs) as note, contextlib.closing(results):
-            for job, end in results:
-                ends[job.folder] = end or self._killed(job)
-                note(job, ends[job.folder])
-                recorder.log(job.folder)
+        waiting = {job.folder for job in jobs}  # to be logged
+        try:
+            with progress(jobs) as note, contextlib.closing(results):
+                for job, end in results:
+                    ends[job.folder] = end or self._killed(job)
+                    note(job, ends[job.folder])
+                    recorder.log(job.folder)
+                    waiting.discard(job.folder)
+        except KeyboardInterrupt:
+            for folder in filter(_has_ended, waiting):  # the few that ended since
+                recorder.log(folder)
+            raise
         return [ends[job.folder] for job in jobs]
 
     def _killed(self, job: SweepJob) -> Status:
@@ -98,6 +105,12 @@ def _trace(job: SweepJob) -> Status | bool:
     """What a job has left whose worker did not answer: its end, or whether it had begun."""
     state = status.read(job.folder)
     return state if state is not None and state.status != RUNNING else state is not None
+
+
+def _has_ended(folder: Path) -> bool:
+    """Whether the job in a folder has ended well."""
+    state = status.read(folder)
+    return state is not None and state.status == FINISHED
 
 
 def warm(jobs: Sequence[SweepJob]) -> None:
