@@ -1,6 +1,8 @@
 """The decision by itself: numbers in, a word out, as docs/missing-effects.md has it for a reader with a pencil."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -80,3 +82,18 @@ def test_what_held_out_events_chose_is_named_if_the_fitted_ones_put_it_first_too
     sets = off("a", error=0.1, deviance=50.0), off("b", error=0.9, deviance=other)
     verdict = decide(Evidence(off(error=1.0, deviance=100.0), sets), Criteria())
     assert (verdict.word, verdict.names, verdict.complete) == (told, ("a",), False)
+
+
+def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():
+    """The table of the shipped contactors: a column a set, to be checked by hand."""
+    page = (Path(__file__).parents[2] / "docs" / "missing-effects.md").read_text(encoding="utf-8")
+    lines = re.findall(r"^\| (.+?) \|(?: .+?)? \| (.+?) \| (.+?) \|$", page.split("### The decision")[1], re.M)
+    cells = {what.replace("`", ""): values for what, *values in lines}
+    rows = []
+    for k, name in enumerate(cells["number"]):
+        behind, p_left, gain, expected, p_of_all, behind_of_all = (
+            float(cells[what][k]) for what in ("behind", "p_left", "gain", "expected", "all p_left", "all behind")
+        )
+        of_all = {"p_of_all": p_of_all, "behind_of_all": behind_of_all}
+        rows.append(row(name.strip("`"), behind=behind, p_left=p_left, gap=held_out(gain, expected), **of_all))
+    assert word(*rows) == ("named", (("undervoltage_trip",),))
