@@ -32,7 +32,7 @@ SENTENCES = {
     "base.json": "own_base has powers that are no finite numbers above zero",
     "list_base.json": "own_base=.1. is a list",
     "pipe.json": "is a named pipe, no ordinary file",
-    "folder.json": "Is a directory",
+    "folder.json": "there is no result file",
     "sparse.json": "at most",
     "database.json": "is not UTF-8 text",
 }

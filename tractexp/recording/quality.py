@@ -1,6 +1,7 @@
 """How well a channel was recorded, and what it is fit for."""
 
 import functools
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated, i
 LONGEST_CALM = 60.0  # s of it in which they are sought
 SORTED = 1 << 20  # samples among which the least difference of two is sought
 TOGETHER = 1024  # cycles that are compared at once
+WINDOWS_AT_ONCE = 64  # of ten cycles each
 FEWEST_CALM = 2  # cycles in a row that repeat: one alone is no calm
 REPEATS = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
 LEVEL = 0.05  # by which their RMS differs at most
@@ -225,9 +227,21 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
     change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
     starts = np.arange(0, len(change) - n + 1, max(cycle, 1))
     filled = np.nan_to_num(x)
-    energy = n * np.lib.stride_tricks.sliding_window_view(filled, n)[starts].var(axis=1)
-    changed = np.lib.stride_tricks.sliding_window_view(change, n)[starts].sum(axis=1)
+    energy = n * _measure_windows(filled, n, starts, np.var)
+    changed = _measure_windows(change, n, starts, np.sum)
     return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
+
+
+def _measure_windows(
+    x: np.ndarray, n: int, starts: np.ndarray, measure: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Return `measure` of the n samples from each start on, (k,); some at a time, for they overlap."""
+    windows = np.lib.stride_tricks.sliding_window_view(x, n)
+    parts = [
+        measure(windows[starts[first : first + WINDOWS_AT_ONCE]], axis=1)
+        for first in range(0, len(starts), WINDOWS_AT_ONCE)
+    ]
+    return np.concatenate(parts)
 
 
 def _colour(lag: float, count: int, noise: float, step: float) -> str:
