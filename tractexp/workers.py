@@ -8,7 +8,6 @@ parent that is killed; so a thread of it watches the parent.
 """
 
 import contextlib
-import importlib
 import multiprocessing
 import os
 import signal
@@ -33,7 +32,7 @@ def backends() -> list[str]:
     """The names of joblib's backends, and of those that a package or plugin has registered with it."""
     from joblib.parallel import BACKENDS
 
-    return sorted({*BACKENDS, "dask", "ray"})
+    return sorted({*BACKENDS, "dask"})
 
 
 @dataclass(frozen=True)
@@ -127,9 +126,6 @@ class Workers:
                 from tractexp.compat.joblib_dask import Dask
 
                 chosen = {"backend": Dask(client=stack.enter_context(dask_client(self.n_jobs, self.address)))}
-            elif self.backend == "ray":
-                stack.enter_context(ray_cluster(self.n_jobs, self.address))
-                chosen = {"backend": "ray"}
             elif self.backend == "loky":
                 chosen = {"backend": "loky", "inner_max_num_threads": 1, "initializer": _begin}
             else:
@@ -215,29 +211,3 @@ def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
         except (OSError, ValueError) as error:
             raise UserError(f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})") from error
         yield client
-
-
-@contextlib.contextmanager
-def ray_cluster(n_jobs: int, address: str | None) -> Iterator[None]:
-    """Connect joblib to the Ray cluster at `address`, or to one of our own that ends with the jobs.
-
-    Raises `UserError` where Ray is not installed or no cluster answers.
-    """
-    try:
-        ray: Any = importlib.import_module("ray")
-        register_ray = importlib.import_module("ray.util.joblib").register_ray
-    except ImportError:
-        raise UserError("hydra.launcher.backend=ray needs Ray, which is not installed: pip install ray") from None
-    from joblib import cpu_count
-
-    cores = {} if address else {"num_cpus": n_jobs if n_jobs > 0 else cpu_count(), "include_dashboard": False}
-    try:
-        ray.init(address=address or "local", log_to_driver=False, logging_level="ERROR", **cores)
-    except (OSError, ValueError, RuntimeError) as error:
-        reason = str(error).strip().partition("\n")[0]
-        raise UserError(f"hydra.launcher.address={address}: no Ray cluster answers there ({reason})") from error
-    try:
-        register_ray()
-        yield
-    finally:
-        ray.shutdown()
