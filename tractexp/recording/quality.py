@@ -232,9 +232,7 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
     return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
 
 
-def _measure_windows(
-    x: np.ndarray, n: int, starts: np.ndarray, measure: Callable[..., np.ndarray]
-) -> np.ndarray:
+def _measure_windows(x: np.ndarray, n: int, starts: np.ndarray, measure: Callable[..., np.ndarray]) -> np.ndarray:
     """Return `measure` of the n samples from each start on, (k,); some at a time, for they overlap."""
     windows = np.lib.stride_tricks.sliding_window_view(x, n)
     parts = [
