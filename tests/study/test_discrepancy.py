@@ -37,7 +37,7 @@ from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
 from tractexp.inference.fit_effort import TOGETHER
 from tractexp.inference.fitting import Refit, refit
-from tractexp.inference.goodness_of_fit import Scale, tail
+from tractexp.inference.goodness_of_fit import GoodnessOfFit, Scale, tail
 from tractexp.inference.injection import PUSHES
 from tractexp.inference.least_squares import normal
 from tractexp.inference.linearization import tangent
@@ -497,10 +497,10 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
     bare = replace(first, chance=replace(first.chance, scales={}))
     for p, open_ in [(level / 30, False), (level / 10, True), (level * 10, True), (level * 30, False)]:
         moved = replace(bare)
-        moved.__dict__["left"] = {"one of six": p}
+        moved.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": p})
         assert moved.undecided == open_
     exact = replace(bare, chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)))
-    exact.__dict__["left"] = {"one of six": level}
+    exact.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": level})
     assert not exact.undecided
     drawn = bare.chance.left
     for name, scale in exact.chance.scales.items():

@@ -181,7 +181,7 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     width = 0.2 * np.maximum(np.linalg.norm(bench.drive.before, axis=1, keepdims=True), 0.1)
     before = bench.drive.before + width * (2 * chosen.unit[at.before].reshape(-1, 2) - 1)
     made = model.simulate(bench.drive, np.array(values)[None], bench.problem.step.substeps, before[:, None])
-    assert np.abs(made.outputs[:, 0] - proposal.train.gap.after.calculated).max() < 1e-8
+    assert np.abs(made.outputs[:, 0] - proposal.train.after.calculated).max() < 1e-8
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
 
@@ -202,9 +202,9 @@ def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed
     made = events("load_step", 0.2, seed=seed, recorder=FAST)
     found = searched(made[:2], made[2:])
     held = found.proposal.validate
-    excess = held.gap.before.deviance - held.context.samples
-    assert held.gap.gain / excess == pytest.approx(measured, abs=0.1)
-    assert 0.8 < held.gap.explained <= 1.0
+    excess = held.before.deviance - held.context.samples
+    assert held.gain / excess == pytest.approx(measured, abs=0.1)
+    assert 0.8 < held.explained <= 1.0
     assert found.proposal.term.name == STEP
 
 
