@@ -295,7 +295,8 @@ def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
     names = ("dc_link_lag", "undervoltage_trip")
     better = replace(louder.prediction, squares=louder.prediction.squares / 1.4)
     pair = replace(trip, fit=replace(trip.fit, names=names), names=names, family=names, prediction=better)
-    reason = reason_of(inexact, replace(evidence, rows=(louder, pair), others=(), term=None))
+    no_better = replace(evidence.term, prediction=replace(own, squares=2 * louder.prediction.squares))
+    reason = reason_of(inexact, replace(evidence, rows=(louder, pair), others=(), term=no_better))
     assert f"; dc_link_lag and undervoltage_trip miss {in_percent(better.error)}, the least, and {near};" in reason
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from tractexp.identification.grade import GradedModel, grade_model
+from tractexp.identification.grade import GradedModel, grade_playable
 from tractexp.inference.catalogue import Catalogue
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
@@ -38,12 +38,18 @@ class Grader:
         return self.grade((), self.base.window)
 
     def grade(
-        self, names: Sequence[str], window: float | str | None, held: Mapping[str, float] | None = None,
-        *, fit_all: bool = False,
-    ) -> GradedModel:  # fmt: skip
+        self,
+        names: Sequence[str],
+        window: float | str | None,
+        held: Mapping[str, float] | None = None,
+        found: Mapping[str, float] | None = None,
+        *,
+        fit_all: bool = False,
+    ) -> GradedModel:
         """The base model with the named effects, behind a recorder's `window`, some parameters held at values.
 
-        With `fit_all` the held-out events are fitted like the others.
+        `found` are values where a fit of the investigation ended: a relay's times have hardly a slope, and a search
+        alone may end far from them. With `fit_all` the held-out events are fitted like the others.
         """
         fixed = {**self.fixed, **(held or {})}
         key = repr((sorted(names), window, sorted(fixed.items()), fit_all))
@@ -51,9 +57,19 @@ class Grader:
             fitted, judged = ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
             model = self._extended(names, window)
             problem = Problem(model, fitted, self.bounds, fixed, self.substeps, priors=self.priors)
-            searched = None if self.search is None else self.search(problem)
-            self.known[key] = grade_model(problem, judged, searched, self.shown)
+            start = self._choose_start(problem, found or {})
+            self.known[key] = grade_playable(problem, judged, start, self.shown)
         return self.known[key]
+
+    def _choose_start(self, problem: Problem, found: Mapping[str, float]) -> np.ndarray | None:
+        """Free values (d,): where a search ends, or those found where they fit better; None without either."""
+        starts = [] if self.search is None else [self.search(problem)]
+        if all(name in found for name in problem.space.names):
+            values = np.array([found[name] for name in problem.space.names])
+            starts.append(np.clip(values, problem.lower, problem.upper))
+        if not starts:
+            return None
+        return starts[int(np.argmin(problem.objective(np.array(starts))))]
 
     def _extended(self, names: Sequence[str], window: float | str | None) -> Model:
         base, own = self.base, {effect.name for effect in self.base.effects}

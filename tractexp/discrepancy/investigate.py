@@ -171,7 +171,9 @@ class Findings:
             return self.base_grade
         own = {p.name for p in self.catalogue.parameters([name for name in self.names if name not in names])}
         held = {name: value for name, value in self.held.items() if name not in own}
-        return self.grader.grade(names, self.window, held, fit_all=self.fitted_to_both)
+        at = self.context.coordinates
+        found = {name: at.value(name, self.extended.unit) for name in at.names} if names == self.names else {}
+        return self.grader.grade(names, self.window, held, found, fit_all=self.fitted_to_both)
 
     def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
         """How far off a graded model is on the events that were to be fitted, and on those that were to be held out."""

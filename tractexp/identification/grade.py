@@ -6,14 +6,21 @@ identification, in an investigation, in what is stored, logged and exported, and
 
 import functools
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from tractexp.identification.adequacy import Adequacy, grade_errors
+from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
 from tractexp.identification.estimate import EstimationResult, estimate, polished
-from tractexp.identification.result import Fit, active_bounds, model_errors, play, relative_errors
+from tractexp.identification.result import (
+    Fit,
+    active_bounds,
+    explain_refusal,
+    model_errors,
+    play,
+    relative_errors,
+)
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.inference.problem import Problem
@@ -74,6 +81,22 @@ def grade_model(
     """
     estimation = polished(problem) if searched is None else estimate(problem, searched)
     return grade_estimate(problem, estimation, validate, shown)
+
+
+def grade_playable(
+    problem: Problem, validate: Sequence[Event] = (), searched: np.ndarray | None = None, shown: Collection[str] = ()
+) -> GradedModel:
+    """As `grade_model`, where a held-out event without a steady state makes a wrong model and no refusal."""
+    estimation = polished(problem) if searched is None else estimate(problem, searched)
+    shared = problem.full(estimation.uncertainty.values)[0]
+    refusals = {event.record.name: explain_refusal(problem.model, shared, event) for event in validate}
+    playable = [event for event in validate if not refusals[event.record.name]]
+    graded = grade_estimate(problem, estimation, playable, shown)
+    if len(playable) == len(validate):
+        return graded
+    reasons = [f"{name} cannot be simulated ({why})" for name, why in refusals.items() if why]
+    sentence = f"{graded.adequacy.sentence}; {'; '.join(reasons)}: the model does not describe this load"
+    return replace(graded, adequacy=replace(graded.adequacy, grade=Grade.WRONG_MODEL, sentence=sentence))
 
 
 def grade_estimate(

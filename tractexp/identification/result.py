@@ -73,6 +73,12 @@ def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
     return Fit(role=role, **vars(domain.comparison(event, response.outputs[:, 0])))
 
 
+def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
+    """Return why an event cannot be played through the model at these values; "" where it can."""
+    domain = domain_of(model)
+    return model.refusal(values, Drive.of([domain.excitation(domain.event(event), model)])) or ""
+
+
 @dataclass(frozen=True)
 class Result:
     """The content of `result.json`. `model` and `before` are what it takes to simulate it again.

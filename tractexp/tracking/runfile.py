@@ -5,7 +5,6 @@ sends what a store lacks, and sends nothing twice.
 """
 
 import json
-import math
 import re
 import time
 import uuid
@@ -88,8 +87,7 @@ def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
     """A run as JSON knows it; paths within the folder are relative, so that it may be moved."""
     content: dict[str, Any] = {field.name: getattr(run, field.name) for field in fields(TrackedRun)}
     content["parameters"] = flatten(run.parameters)
-    metrics = {name: float(value) for name, value in run.metrics.items()}
-    content["metrics"] = {name: value for name, value in metrics.items() if not math.isinf(value)}
+    content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
     content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
     content["artifacts"] = [_relative(path, folder) for path in run.artifacts]
     content["model"] = None if run.model is None else _relative(run.model, folder)
