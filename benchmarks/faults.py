@@ -117,15 +117,20 @@ def command(folder: Path, *arguments: str) -> int:
 
 
 def nth_write(n: int, fails: Callable[[], None], for_good: bool) -> None:
-    """Let the nth file that gets its name fail, and where it is `for_good` every later one."""
+    """Let the nth file that gets its name fail, and where it is `for_good` every later one.
+
+    A file that is whole already takes its place in another folder on a full disk, too.
+    """
     replace, count = os.replace, 0
 
     def counted(*paths):
         nonlocal count
+        if not str(paths[0]).endswith(files.PART):
+            return replace(*paths)
         count += 1
         if count == n or (for_good and count > n):
             fails()
-        replace(*paths)
+        return replace(*paths)
 
     files.os = type("OS", (), {**vars(os), "replace": staticmethod(counted)})
 

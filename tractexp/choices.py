@@ -95,17 +95,22 @@ def find_varied(name: str, plugins: Collection[str]) -> str:
     return name if name in plugins or not stems else max(stems, key=len)
 
 
+def find_families(names: Mapping[str, Option]) -> dict[str, list[str]]:
+    """Return {plugin: its names, itself among them} of the names of a group."""
+    plugins = {name for name, option in names.items() if option.module}
+    families: dict[str, list[str]] = {}
+    for name in names:
+        families.setdefault(find_varied(name, plugins), []).append(name)
+    return families
+
+
 def group_variants(names: Mapping[str, Option]) -> dict[str, list[str]]:
     """Return {name: what varies it, in order} of the names of a group.
 
     Fewer than `FEWEST_VARIANTS` stand for themselves.
     """
-    plugins = {name for name, option in names.items() if option.module}
-    families: dict[str, list[str]] = {}
-    for name in names:
-        families.setdefault(find_varied(name, plugins), []).append(name)
     grouped: dict[str, list[str]] = {}
-    for base, members in families.items():
+    for base, members in find_families(names).items():
         varied = [name for name in members if name != base]
         if len(varied) >= FEWEST_VARIANTS:
             grouped[base] = varied

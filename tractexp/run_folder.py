@@ -19,7 +19,7 @@ from typing import TypeAlias
 from tractexp import files
 from tractexp.errors import UserError
 
-CONFIGURATION = ".hydra"
+CONFIGURATION, RESULT = ".hydra", "result.json"
 WHOLE, NEXT, LOCK, GOES = ".tractexp.whole", ".tractexp.next", ".tractexp.next.lock", ".tractexp.goes"
 KINDS = (
     "discrepancy", "generalise", "linear_network", "posterior", "plan", "profile", "survey", "benchmark", "comparison",
@@ -28,7 +28,7 @@ KINDS = (
 RESULTS = (
     "history.csv", "interrupted.json", "report.html", "posterior.npz", "unexplained.csv", "survey.csv",
     "survey.parquet", "paper.md", "mlflow.json",
-    *(f"{kind}{ending}" for kind in KINDS for ending in (".json", ".html")), "result.json",
+    *(f"{kind}{ending}" for kind in KINDS for ending in (".json", ".html")), RESULT,
 )  # fmt: skip
 Write: TypeAlias = Callable[[Path], list[Path]]
 
@@ -50,10 +50,15 @@ class RunFolder:
         """Let `write` fill a folder with results, and give them their places; their paths.
 
         Raises `UserError` where that is impossible: the earlier run is there then, or the newer one is whole and the
-        next command goes on.
+        next command goes on. Where there is no earlier run a result is kept without what should have followed it.
         """
         self.next.mkdir(exist_ok=True)
-        paths = [self.folder / path.relative_to(self.next) for path in write(self.next)]
+        try:
+            paths = [self.folder / path.relative_to(self.next) for path in write(self.next)]
+        except BaseException:
+            if self.begun_empty and (self.next / RESULT).is_file():
+                self._commit()
+            raise
         self._commit()
         return paths
 
@@ -72,7 +77,8 @@ class RunFolder:
         new = {path.name for path in self.next.iterdir()}
         keeps = {path.name for path in self.read if path.parent == self.folder.absolute()}
         goes = [name for name in RESULTS if CONFIGURATION in new and name not in new | keeps]
-        files.write(self.next / GOES, "\n".join(goes))
+        if goes:
+            files.write(self.next / GOES, "\n".join(goes))
         files.move(self.next, self.folder / WHOLE)
         _settle(self.folder)
 

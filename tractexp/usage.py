@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from tractexp.choices import Option, choices, defaults, group_variants, sentence
+from tractexp.choices import FEWEST_VARIANTS, Option, choices, defaults, find_families, group_variants, sentence
 from tractexp.errors import UserError, among
 
 WIDTH = 100  # columns
@@ -162,8 +162,11 @@ def _describe_variants(base: str, names: Mapping[str, Option], width: int) -> st
 
 def _summary(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
-    grouped = group_variants({name: names[name] for name in _sorted(group, names)})
-    parts = [f"{base} and {len(varied)} variants" if varied else base for base, varied in grouped.items()]
+    families = find_families({name: names[name] for name in _sorted(group, names)})
+    parts = [
+        f"{base} and {len(members) - 1} variants" if len(members) > FEWEST_VARIANTS else ", ".join(members)
+        for base, members in families.items()
+    ]
     more = f" and {len(parts) - FEW + 1} others" if len(parts) > FEW else ""
     return ", ".join(parts[: FEW - 1] if more else parts) + more
 

@@ -434,6 +434,10 @@ def test_what_a_model_is_not_good_for_is_said_when_it_is_exported(tmp_path):
     for grade, told in (("adequate", False), ("wrong_model", True)):
         graded = dataclasses.replace(good, adequacy={"grade": grade, "sentence": sentence, "p": None})
         graded.write(tmp_path / "result.json")
-        done = run_command("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}", cwd=tmp_path)
+        command = ("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}")
+        done = run_command(*command, cwd=tmp_path)
+        assert (done.returncode, sentence in done.stderr) == ((2, True) if told else (0, False))
+        assert not told or not list((tmp_path / grade).glob("load.*"))
+        done = run_command(*command, "task.doubtful=true", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
         assert (f"mind: {sentence}" in done.stdout) == told

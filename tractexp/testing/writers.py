@@ -28,8 +28,13 @@ def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
         if issubclass(reader, WaveformReader):
             return  # a format of waveforms, which holds U, P, Q as channels
         (again,) = build("data", {"name": reader.name, **reader.of(str(files[0]))}).read().train
+        # a format that does not keep the base is read on that of the power before the dip
+        ratio = {"U": 1.0, "P": 1.0, "Q": 1.0}
+        if again.base is not None and again.base != RECORD.base:
+            power = again.base.power / RECORD.base.power
+            ratio = {"U": again.base.voltage / RECORD.base.voltage, "P": power, "Q": power}
         for name, values in RECORD.channels.items():
-            off = np.abs(again.channels[name] - values).max()
+            off = np.abs(again.channels[name] * ratio.get(name, 1.0) - values).max()
             assert off < 1e-9, f"'{cls.name}' writes {name} that is read {off:.2g} off"
 
 
