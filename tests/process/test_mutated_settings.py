@@ -101,7 +101,7 @@ REFUSED = [
     (["tracking.uri=a\nb"], "tracking.uri=a b has a line break"),
     (["optimizer.population=99999999999"], "optimizer.population=99999999999 is out of range"),
     (["hydra.run.dir=/dev/null/x"], "/dev/null/x cannot be created (Not a directory); choose another folder"),
-    (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x/multirun.yaml cannot be written"),
+    (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x/.tractexp.next.lock cannot be written"),
 ]
 # one process for all: what takes time is to start
 SESSION = """if True:

@@ -78,7 +78,7 @@ def test_a_model_that_does_not_describe_the_load_is_exported_when_asked_for_only
     with pytest.raises(UserError) as refused:
         tractexp.export(fit, "andes")
     assert str(refused.value).startswith(sentence)
-    for mend in ("task=discrepancy", "task.doubtful=true exports it all the same"):
+    for mend in ("task=discrepancy", "doubtful=true exports it all the same"):
         assert mend in str(refused.value)
     assert tractexp.export(fit, "andes", doubtful=True).notes[0].startswith(sentence)
 
