@@ -87,7 +87,8 @@ def test_the_page_and_the_extended_model(planted, tmp_path):
     planted.write(tmp_path)
     page = (tmp_path / "discrepancy.html").read_text(encoding="utf-8")
     assert "epsilon_i" in page
-    assert f"domain=waves model={tmp_path / 'conf' / 'model' / 'extended.yaml'}" in page
+    assert "domain=waves" in page
+    assert "extended.yaml" in page
     assert "The same in phasors: P and Q" in page
     told = json.loads((tmp_path / "discrepancy.json").read_text(encoding="utf-8"))
     assert told["verdict"] == "named"
