@@ -11,7 +11,7 @@ import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from typing import Any, TypeVar
 
@@ -71,7 +71,7 @@ def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[It
             warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
             with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin, (call,)) as pool:
                 try:
-                    yield lambda positions: pool.map(_call, positions)
+                    yield lambda positions: _results_in_order([pool.submit(_call, k) for k in positions])
                 except BaseException:
                     for process in multiprocessing.active_children():
                         if process not in others:
@@ -82,6 +82,12 @@ def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[It
             "a process at work on a part of this step was killed, as systems do where memory is short; close other"
             " programs, or allow this one fewer cores (taskset)"
         ) from error
+
+
+def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
+    """Not `Executor.map`: it cancels what is left, and Python 3.11's pool cannot end a call that was cancelled."""
+    for future in calls:
+        yield future.result()
 
 
 def _counted(result: Result, ended: Callable[[], None]) -> Result:

@@ -15,7 +15,7 @@ from tractexp.errors import TASK, UserError, among
 # The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled under one name.
 PROBLEM = ("data", "model", "objective")  # one comparison has one of each
 SETTINGS = ("optimizer", "task", "budget", "time_limit", "target")  # what differs in these makes a variant
-REST = ("seed", "tracking")  # what differs in these does not
+REST = ("seed", "tracking", "sweep")  # what differs in these does not
 
 
 @dataclass(frozen=True, eq=False)
