@@ -14,7 +14,7 @@ from typing import Any
 import marked
 
 from tractexp import files
-from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 
 ROOT = Path(__file__).resolve().parents[1]
 STORED, PAGE, NAME = ROOT / "benchmarks" / "ablation.json", ROOT / "docs" / "comparison.md", "benchmarks/ablation.py"
@@ -47,7 +47,7 @@ def _best(part: Mapping[str, Any]) -> str:
     (rank, name), *others = sorted(zip(ranks["mean"], ranks["names"], strict=True))
     alike = [other for mean, other in others if mean - rank < ranks["critical_difference"]]
     said = f"{part['terms']}, {part['where']}: `{name}` has the best mean rank, {rank:.2f} of {len(ranks['names'])}"
-    if ranks["p"] >= ALPHA:
+    if ranks["p"] >= SIGNIFICANCE_LEVEL:
         return f"{said}, but the variants do not differ significantly (Friedman, p = {ranks['p']:.2g})."
     return f"{said}; {len(alike)} others are not significantly different."
 

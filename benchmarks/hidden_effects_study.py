@@ -228,12 +228,12 @@ def _left(found, clean: np.ndarray) -> float:
 
     At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
     """
-    from tractexp.discrepancy.explanations import searched
+    from tractexp.discrepancy.explanations import search_effect_sets
     from tractexp.inference.linearization import tangent
 
     bench, first, refits = found.context, found.first, found.explanations.refits
     singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]
-    singles = singles or searched([first], {(): first.fit}, 1, lambda line: None)
+    singles = singles or search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
         t = tangent(bench, fit, first.noise)

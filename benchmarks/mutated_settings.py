@@ -174,19 +174,19 @@ def perform(arguments, folder):
     from omegaconf import OmegaConf, open_dict
 
     from tractexp.api.task import Job
-    from tractexp.cli.chosen import given, refuse_unread
+    from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
     from tractexp.overrides import overrides
     from tractexp.plugin import build
-    from tractexp.refusal import explained
+    from tractexp.refusal import explain_errors
     from tractexp.schema import check
 
-    with explained():
+    with explain_errors():
         config = compose("config", overrides(arguments), return_hydra_config=True)
         choices, told = dict(config.hydra.runtime.choices), list(config.hydra.overrides.task)
         with open_dict(config):
             del config["hydra"]
         plain = OmegaConf.to_container(config, resolve=True)
-        job = Job(plain, choices, folder, given=given(told, choices))
+        job = Job(plain, choices, folder, given=collect_chosen_settings(told, choices))
         check(job.config)
         task = build("task", job.config["task"])
         refuse_unread(task, job.given, task.needless())

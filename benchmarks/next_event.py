@@ -29,7 +29,7 @@ from independent import Dip
 from tractexp.discrepancy.investigate import Findings, investigate
 from tractexp.discrepancy.next_event import choose
 from tractexp.discrepancy.next_event.choose import NextEvent
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, imagine_dips
 from tractexp.domain import PHASORS
 from tractexp.inference.context import Context
 from tractexp.model.model import compose
@@ -60,7 +60,7 @@ def recorded(made: Scene, seed: int) -> list[Event]:
 
 def plain(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     """What the generator can make of the events that are tried."""
-    return [event for event in imagined(bench, reads) if not event.burden[0]]
+    return [event for event in imagine_dips(bench, reads) if not event.burden[0]]
 
 
 def with_event(made: Scene, chosen: NextEvent) -> Scene:
@@ -122,7 +122,7 @@ def main() -> None:
     for flag, default in (("first", FIRST), ("count", COUNT), ("most", MOST), ("minutes", MINUTES)):
         parser.add_argument(f"--{flag}", type=type(default), default=default)
     given = parser.parse_args()
-    choose.imagined = plain
+    choose.imagine_dips = plain
     rows, begun = [], time.monotonic()
     for seed in range(given.first, given.first + given.count):
         try:

@@ -146,7 +146,7 @@ def on_record(series: Series, name: str) -> dict[str, Any]:
         "runs": {
             f"{optimizer} {budget}": {
                 **_told(group, [run.objective / lowest - 1 for run in group]),
-                "valley": [int(polished.reached[run] <= (1 + floor.AT_FLOOR) * lowest) for run in runs[key]],
+                "valley": [int(polished.reached[run] <= (1 + floor.FLOOR_SHARE) * lowest) for run in runs[key]],
             }
             for key, group in ended.items()
             for optimizer, budget in [key]

@@ -30,7 +30,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
 
 from tractexp import files
-from tractexp.cli.again import again
+from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
 from tractexp.run_folder import CONFIGURATION, GOES, LOCK, NEXT, WHOLE, run_folder
 from tractexp.tracking import TrackedRun, runfile, sync
@@ -192,7 +192,7 @@ class RunMachine(RuleBasedStateMachine):
             return
         COUNTS["again"] += 1
         with contextlib.redirect_stdout(io.StringIO()):
-            arguments = again([str(self.folder)])
+            arguments = build_repeat_command([str(self.folder)])
         os.chdir(self.here)
         assert arguments == ["optimizer=pso", f"seed={self.seed()}"]
 

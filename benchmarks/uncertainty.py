@@ -118,7 +118,7 @@ def model():
 
 def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None = None):
     """Search and judgement as in `task=identify`: the values of Eq. (8), and the `Uncertainty`."""
-    from tractexp.identification.profile import checked
+    from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.search import search
     from tractexp.inference.problem import Problem
     from tractexp.plugin import get
@@ -126,7 +126,7 @@ def identified(load, events, seed: int = 0, starts: int = 3, bounds: dict | None
     problem = Problem(load, events, bounds)
     optimizer = get("optimizer", "multistart_least_squares")(starts=starts)
     found = search(problem, optimizer, seed)
-    return found, checked(judged(problem, found.values).uncertainty)
+    return found, check_by_profiles(judged(problem, found.values).uncertainty)
 
 
 def judged(problem, values):

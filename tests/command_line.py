@@ -65,7 +65,7 @@ def as_it_was(environment):
         process._end_ahead()
         GlobalHydra.instance().hydra = hydra
         HydraConfig.instance().cfg = None
-        provenance.started([])
+        provenance.remember_command([])
         provenance._started.clear()
         identity._file.cache_clear()
         signal.signal(signal.SIGTERM, handler)

@@ -38,30 +38,30 @@ def main(argv: Sequence[str] | None = None) -> int:
     gc.set_threshold(*SELDOM)
     try:
         with outlet() as out, interpreter.safe_path():
-            code = _explained(arguments)
+            code = _run_with_refusals(arguments)
         if out and out.lost:
-            return _refused(f"what was to be printed could not be written ({out.lost}); files are whole", code or 2)
+            return _print_refusal(f"what was to be printed could not be written ({out.lost}); files are whole", code or 2)
         return code
     finally:
         gc.freeze()  # nor at the end, when everything goes anyway
 
 
-def _explained(arguments: list[str]) -> int:
+def _run_with_refusals(arguments: list[str]) -> int:
     """Do what is asked; a sentence where it cannot be done."""
     traceback = os.environ.get(FULL_ERROR, "0") not in ("", "0")
     try:
-        return _asked(arguments)
+        return _dispatch_command(arguments)
     except KeyboardInterrupt as stop:
         sentence = str(stop) or "interrupted; nothing was logged for this run"
-        return _refused(sentence, getattr(stop, "code", 130))
+        return _print_refusal(sentence, getattr(stop, "code", 130))
     except (UserError, OSError, MemoryError) as error:
         if traceback:
             raise
         if isinstance(error, MemoryError):
-            return _refused("this takes more memory than there is; ask for less, such as a smaller population")
+            return _print_refusal("this takes more memory than there is; ask for less, such as a smaller population")
         if isinstance(error, OSError):
-            return _refused(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}")
-        return _refused(str(error))
+            return _print_refusal(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}")
+        return _print_refusal(str(error))
     except Exception as error:
         if traceback:
             raise
@@ -69,24 +69,24 @@ def _explained(arguments: list[str]) -> int:
 
         place = place_in_plugin(error)
         whose = f"the plugin fails in {place}" if place else "the program failed, which is its own mistake"
-        return _refused(f"{whose}: {type(error).__name__}: {error}; {FULL_ERROR}=1 shows where", 1)
+        return _print_refusal(f"{whose}: {type(error).__name__}: {error}; {FULL_ERROR}=1 shows where", 1)
 
 
-def _refused(sentence: str, code: int = 2) -> int:
+def _print_refusal(sentence: str, code: int = 2) -> int:
     print(f"tractexp: {one_line(sentence)}", file=sys.stderr)
     return code
 
 
-def _asked(arguments: list[str]) -> int:
+def _dispatch_command(arguments: list[str]) -> int:
     for argument in arguments:
         key, equals, _ = argument.partition("://")[0].rpartition("=")
         credentials.check(key if equals else "what is given", argument)
     if arguments[:1] and (place := COMMANDS.get(arguments[0])):
         return _command(place, arguments[1:])
     if arguments[:1] == ["again"]:
-        from tractexp.cli.again import again
+        from tractexp.cli.again import build_repeat_command
 
-        return _run(again(arguments[1:]))
+        return _run(build_repeat_command(arguments[1:]))
     if arguments[:1] and os.path.isdir(arguments[0]):
         from tractexp.cli.folder import choose_command
 
@@ -118,13 +118,13 @@ def _is_file(argument: str) -> bool:
     return os.path.splitext(argument)[1].lower() in endings()
 
 
-def terminated(*_: object) -> None:
+def end_on_signal(*_: object) -> None:
     """End what runs in an orderly way when the system asks for it, as at a batch system's time limit."""
     raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
 
 
 def _run(arguments: list[str]) -> int:
-    signal.signal(signal.SIGTERM, terminated)
+    signal.signal(signal.SIGTERM, end_on_signal)
     if not any(argument.startswith(UNLOGGED) for argument in arguments):
         from tractexp.tracking.process import start_ahead
 
@@ -135,13 +135,13 @@ def _run(arguments: list[str]) -> int:
     from tractexp.compat.hydra_versions import behavior
     from tractexp.config import register
     from tractexp.overrides import overrides
-    from tractexp.provenance import started
-    from tractexp.refusal import explained
+    from tractexp.provenance import remember_command
+    from tractexp.refusal import explain_errors
 
     register(arguments)
-    started(arguments)
+    remember_command(arguments)
     os.environ[FULL_ERROR] = "1"  # let exceptions through: they are told below, in one sentence
-    with explained():
+    with explain_errors():
         sys.argv[1:] = overrides(arguments)  # where Hydra reads them
     ended: list[Exception] = []
 
@@ -154,16 +154,16 @@ def _run(arguments: list[str]) -> int:
         from tractexp.sweep.job import run_job
 
         if HydraConfig.get().mode == RunMode.MULTIRUN:
-            with explained():
+            with explain_errors():
                 return run_job(config)
         try:
-            with explained():
+            with explain_errors():
                 run(config)
         except Exception as error:  # raised again below, beyond what Hydra would print about it
             ended.append(error)
         return None
 
-    with explained():
+    with explain_errors():
         job()
     for error in ended:
         raise error

@@ -46,7 +46,7 @@ def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
                 options[place.parent.as_posix()][place.name] = Option(place.name, _comment(file))
     for package, folder in plugin_folders():
         for module in modules(package, [str(folder)]):
-            for group, about in _declared(module):
+            for group, about in _list_declared_plugins(module):
                 name = module.rpartition(".")[2]
                 options[group][name] = Option(name, about, module)
     return options
@@ -68,7 +68,7 @@ def elsewhere(group: str, name: str) -> str:
 
 
 @functools.cache
-def replaced(group: str, name: str) -> dict[str, str]:
+def read_replacements(group: str, name: str) -> dict[str, str]:
     """{group: choice} that the configuration `group=name` puts in the place of the usual ones."""
     import yaml
 
@@ -173,7 +173,7 @@ def _comment(file: Path) -> str:
     return sentence("\n".join(lines))
 
 
-def _declared(module: str) -> Iterator[tuple[str, str]]:
+def _list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
     """(group, first sentence) of the plugins that a module declares."""
     for node in _tree(module).body:
         if not (isinstance(node, ast.ClassDef) and any(_last(d) == "plugin" for d in node.decorator_list)):

@@ -74,7 +74,7 @@ def register(arguments: Sequence[str] = ()) -> None:
     for group, classes in plugin.discover().items():
         for name, cls in classes.items():
             if cls.chosen:
-                where = f"schema/{group}" if _configured(group, name) else group
+                where = f"schema/{group}" if _is_configured(group, name) else group
                 hydra_config_store.store_later(where, name, functools.partial(plugin.schema, cls))
     store.store(group="hydra/sweeper", name="grid", node=GridConfig)
     store.store(group="hydra/launcher", name="cores", node=CoresConfig)
@@ -95,7 +95,7 @@ def _own_folders(arguments: Sequence[str]) -> list[Path]:
     return [Path(folder).absolute()] if folder and Path(folder).is_dir() else []
 
 
-def _configured(group: str, name: str) -> bool:
+def _is_configured(group: str, name: str) -> bool:
     """Whether a file gives this plugin its defaults: it begins with the schema, as conf/task/export.yaml does."""
     folders = (plugin.CONF, *plugin.configuration_folders(), *PluginSearchPath.own)
     return any((folder / group / f"{name}.yaml").is_file() for folder in folders)

@@ -15,7 +15,7 @@ QUERY = re.compile(
 TOKEN = re.compile(r"dapi\w{8,}|[\w+/=\-]{32,}", re.ASCII)  # in the place of a profile of Databricks
 
 
-def held(text: str) -> bool:
+def holds_credentials(text: str) -> bool:
     """Whether a text holds an address with a password or a token; the name alone is one where a server is asked."""
     for scheme, rest in ADDRESS.findall(text):
         user, at, _ = rest.rpartition("@")
@@ -34,7 +34,7 @@ def check(where: str, content: Any) -> None:
     elif isinstance(content, list | tuple):
         for value in content:
             check(where, value)
-    elif isinstance(content, str) and held(content):
+    elif isinstance(content, str) and holds_credentials(content):
         raise UserError(
             f"{where} is an address with a user's name, password or token in it, which would be printed, stored and "
             "logged; leave it out and give it by MLFLOW_TRACKING_USERNAME and MLFLOW_TRACKING_PASSWORD (or "

@@ -31,7 +31,7 @@ MOST_NODES, DEEPEST = 100_000, 50  # values of a configuration, and how deep wit
 ODD = {stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
 
 
-def located(path: str) -> Path:
+def locate_file(path: str) -> Path:
     """The path of a file that may be named as `pkg://package/file`; raises `UserError` for an unknown package."""
     if not path.startswith(PACKAGE):
         return Path(path)
@@ -42,7 +42,7 @@ def located(path: str) -> Path:
         raise UserError(f"{path}: there is no installed package '{package}'") from error
 
 
-def packaged(name: str) -> str:
+def read_packaged_text(name: str) -> str:
     """The text of a file that the package brings along, such as `blocks/chart.js`."""
     return (Path(__file__).parent / name).read_text(encoding="utf-8")
 
@@ -84,7 +84,7 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
     is missing.
     """
     try:
-        with opened(path) as file:
+        with open_ordinary_file(path) as file:
             size = os.fstat(file.fileno()).st_size
             if limit is None and size > largest:
                 size_and_most = f"{size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB"
@@ -97,7 +97,7 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
 
 
 @contextlib.contextmanager
-def opened(path: Path | str) -> Iterator[IO[bytes]]:
+def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
     """An ordinary file, open to be read. Raises `UserError` for what only seems to be one, `OSError` as `open`."""
     there(path)
     with open(path, "rb", opener=_open_at_once) as file:
@@ -192,15 +192,15 @@ def write(path: Path | str, content: str | bytes, *, lasting: bool = True, priva
     written.
     """
     path = Path(path)
-    with _as_user_error(path), _beside(path) as temporary:
-        _fill(temporary, encoded(content), lasting, private)
+    with _as_user_error(path), _make_part_file(path) as temporary:
+        _fill(temporary, encode_text(content), lasting, private)
         os.replace(temporary, path)
         if lasting:
             _settle(path.parent)
     return path
 
 
-def encoded(content: str | bytes) -> bytes:
+def encode_text(content: str | bytes) -> bytes:
     """Text as UTF-8; half a character, as in a name that is no text, becomes its escape."""
     return content.encode(errors="backslashreplace") if isinstance(content, str) else content
 
@@ -251,14 +251,14 @@ class Transcript(io.TextIOBase):
 
 
 @contextlib.contextmanager
-def held(path: Path, seconds: float) -> Iterator[None]:
+def lock_file(path: Path, seconds: float) -> Iterator[None]:
     """Hold the file `path` exclusively among processes; one that dies lets go of it.
 
     Raises `TimeoutError` where another process holds it for so long.
     """
     deadline = time.monotonic() + seconds
     with path.open("a+b") as file:
-        while not _locked(file):
+        while not _try_lock(file):
             if time.monotonic() > deadline:
                 raise TimeoutError(f"another process has held {path} for {seconds:.0f} s")
             time.sleep(0.05)
@@ -266,17 +266,17 @@ def held(path: Path, seconds: float) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def claimed(path: Path, claimant: str) -> Iterator[None]:
+def claim_file(path: Path, claimant: str) -> Iterator[None]:
     """Hold the file `path`, which says by whom, and remove it at the end; a process that dies lets go of it.
 
     Raises `UserError` where another process holds it. A file system without locks holds nothing.
     """
     with _as_user_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
-        file = _taken(path)
+        file = _take_lock(path)
     with file:
         file.truncate(0)
-        file.write(encoded(claimant))
+        file.write(encode_text(claimant))
         file.flush()
         try:
             yield
@@ -285,13 +285,13 @@ def claimed(path: Path, claimant: str) -> Iterator[None]:
                 path.unlink()
 
 
-def _taken(path: Path) -> IO[bytes]:
+def _take_lock(path: Path) -> IO[bytes]:
     """The file of a lock, locked. What was removed between opening and locking it is none any more."""
     while True:
         there(path)
         file = path.open("a+b")
         try:
-            if not _locked(file):
+            if not _try_lock(file):
                 file.seek(0)
                 raise UserError(
                     f"{path.parent} is in use by {file.read(200).decode(errors='replace') or 'another process'}: wait"
@@ -317,7 +317,7 @@ def new_folder(path: Path) -> Path:
     raise AssertionError("numbers end nowhere")
 
 
-def _locked(file: IO[bytes]) -> bool:
+def _try_lock(file: IO[bytes]) -> bool:
     try:
         if os.name == "nt":
             import msvcrt
@@ -367,7 +367,7 @@ def _as_user_error(path: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _beside(path: Path) -> Iterator[Path]:
+def _make_part_file(path: Path) -> Iterator[Path]:
     """A new file in the folder of `path`, which is created if need be; the file is removed at the end."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=PART)
@@ -421,7 +421,7 @@ def plain(content: Any) -> Any:
         return content if math.isfinite(content) else None
     if dataclasses.is_dataclass(content) and not isinstance(content, type):
         return plain(dataclasses.asdict(content))
-    return content if isinstance(content, int | bool | None) else encoded(str(content)).decode()
+    return content if isinstance(content, int | bool | None) else encode_text(str(content)).decode()
 
 
 def _umask() -> int:

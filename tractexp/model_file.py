@@ -19,8 +19,8 @@ from tractexp.schema import ModelConfig
 
 ENDINGS = (".yaml", ".yml")
 LARGEST = 1 << 20  # bytes
-DEEPEST = 20  # levels of values within one another
-LONGEST = 100  # characters of the name of a choice: a system takes no file's name of more than some 250
+DEEPEST_VALUES = 20  # levels of values within one another
+LONGEST_CHOICE_NAME = 100  # characters of the name of a choice: a system takes no file's name of more than some 250
 DEFAULTS, SELF = "defaults", "_self_"
 PARTS = ("motor", "static")
 NAME = re.compile(r"[^\W_]\w*(-\w+)*")  # of a choice: no path, no package, no other group
@@ -84,8 +84,8 @@ def _loader() -> Any:
         def compose_node(self, parent: Any, index: Any) -> Any:
             if self.check_event(yaml.AliasEvent):
                 raise yaml.YAMLError("it has an alias (*name); write the value itself")
-            if self.level > DEEPEST:
-                raise yaml.YAMLError(f"its values lie more than {DEEPEST} levels within one another")
+            if self.level > DEEPEST_VALUES:
+                raise yaml.YAMLError(f"its values lie more than {DEEPEST_VALUES} levels within one another")
             self.level += 1
             node = super().compose_node(parent, index)
             self.level -= 1
@@ -100,7 +100,7 @@ def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:
     """The list as it stands: a choice to begin with, the names of a motor and of a static load, and `_self_`."""
     for item in defaults if isinstance(defaults, list) else [defaults]:
         (group, name) = next(iter(item.items())) if isinstance(item, Mapping) and len(item) == 1 else ("", item)
-        named = isinstance(name, str) and len(name) <= LONGEST and (name == SELF or NAME.fullmatch(name))
+        named = isinstance(name, str) and len(name) <= LONGEST_CHOICE_NAME and (name == SELF or NAME.fullmatch(name))
         if not named or (isinstance(item, Mapping) and group not in PARTS):
             raise UserError(
                 f"{path}: its defaults have {item!s:.80}; they may name a choice of a model, {SELF},"

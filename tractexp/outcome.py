@@ -51,16 +51,16 @@ class Plain:
 
     def to_dict(self) -> dict[str, Any]:
         """Everything found, as plain data that JSON knows."""
-        return {f.name: _form(f)[0](getattr(self, f.name)) for f in _saved(type(self))}
+        return {f.name: _form(f)[0](getattr(self, f.name)) for f in _list_saved_fields(type(self))}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """What `to_dict` gave."""
-        required = [f for f in _saved(cls) if f.name in content or (f.default is f.default_factory is MISSING)]
+        required = [f for f in _list_saved_fields(cls) if f.name in content or (f.default is f.default_factory is MISSING)]
         return cls(**{f.name: _form(f)[1](content[f.name]) for f in required})
 
 
-def _saved(cls: Any) -> list[Field[Any]]:
+def _list_saved_fields(cls: Any) -> list[Field[Any]]:
     return [f for f in fields(cls) if not isinstance(f.type, str)]
 
 
@@ -107,7 +107,7 @@ class Outcome(Plain, Tabulated):
     @classmethod
     def load(cls, path: Path | str) -> Self:
         """The saved result. Raises `UserError` where the file is missing, damaged or of another kind."""
-        content = saved(path)
+        content = read_saved_result(path)
         if content["kind"] != cls.kind:
             raise UserError(f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by load()")
         return cls.revived(content)
@@ -169,7 +169,7 @@ def not_drawn(path: Path, error: Exception) -> str:
     return f"{path.name} could not be made, while the results are whole ({reason.partition(chr(10))[0]})"
 
 
-def saved(path: Path | str) -> dict[str, Any]:
+def read_saved_result(path: Path | str) -> dict[str, Any]:
     """The content of a saved result, its kind checked to be there. Raises `UserError` where it is none."""
     try:
         content = files.read_json(path)

@@ -20,7 +20,7 @@ MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
 MODEL = "model"  # the group
 OPTIONS = ("-", "~", "+", "")  # what begins an argument that needs no value
 CONFIG_FOLDER = ("--config-dir", "-cd")
-DEEPEST = 20  # brackets within one another
+DEEPEST_BRACKETS = 20  # brackets within one another
 NEEDED = ("seed", "budget", "time_limit", "target", "task", "model", "optimizer", "data", "objective", "tracking")
 NO_NAME = re.compile(r"(?!\[.*\],\[)\[.*\]|[-+.]?[\d_]+[\d_.e+-]*|[-+]?(nan|inf)|null|true|false", re.IGNORECASE)
 MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
@@ -67,8 +67,8 @@ def _without_plus(argument: str) -> str:
 def _check(argument: str, key: str, value: str) -> None:
     """Raise `UserError` for what Hydra takes without a word, or refuses in words of its own code."""
     depth = max(itertools.accumulate((c in "[({") - (c in "])}") for c in value), default=0)
-    if depth > DEEPEST:
-        raise UserError(f"{key:.80} has brackets {depth} deep within one another; no setting needs more than {DEEPEST}")
+    if depth > DEEPEST_BRACKETS:
+        raise UserError(f"{key:.80} has brackets {depth} deep within one another; no setting needs more than {DEEPEST_BRACKETS}")
     if not argument.isprintable():
         raise UserError(f"{' '.join(argument.split()):.80} has a line break or another sign that cannot be printed")
     if MISSING.search(value):
@@ -144,7 +144,7 @@ def override(argument: str) -> str:
         chosen = [value] if _names_a_file(value) else _parts(value)  # a sweep has several
         return f"{key}={','.join(map(_model_choice, chosen))}"
     if equals and key.lstrip("+~").startswith(NAMING) and not _read_by_hydra(argument, value):
-        argument = f"{key}={_quoted(value)}"
+        argument = f"{key}={_quote_override_value(value)}"
     return f"++{argument}" if argument.startswith(OPEN) else argument
 
 
@@ -157,19 +157,19 @@ def _model_choice(name: str) -> str:
     return quoting.hydra(str(file))
 
 
-def typed(data: Mapping[str, object], *more: str) -> str:
+def build_typed_command(data: Mapping[str, object], *more: str) -> str:
     """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
     settings = dict(data)
-    words = [f"data={settings.pop('name')}", *(assigned(f"data.{key}", value) for key, value in settings.items())]
+    words = [f"data={settings.pop('name')}", *(format_assignment(f"data.{key}", value) for key, value in settings.items())]
     return quoting.shell("tractexp", *more, *words)
 
 
 def survey_of(folder: str) -> str:
     """The command, as a shell takes it, that makes a table of the recordings in a folder."""
-    return quoting.shell("tractexp", "task=survey", assigned("data.path", folder))
+    return quoting.shell("tractexp", "task=survey", format_assignment("data.path", folder))
 
 
-def assigned(key: str, value: object) -> str:
+def format_assignment(key: str, value: object) -> str:
     """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of them."""
     if isinstance(value, list | tuple):
         return f"{key}=[{','.join(map(_plain, value))}]"
@@ -213,7 +213,7 @@ def _parses(argument: str) -> bool:
     return True
 
 
-def _quoted(value: str) -> str:
+def _quote_override_value(value: str) -> str:
     """A value in quotes; of a list, each of its elements that Hydra would not read."""
     if value.startswith("[") and value.endswith("]") and not _names_a_file(value):
         return f"[{','.join(_element(part.strip()) for part in _parts(value[1:-1]))}]"
@@ -222,7 +222,7 @@ def _quoted(value: str) -> str:
 
 def _element(text: str) -> str:
     quoted = len(text) > 1 and text[0] == text[-1] and text[0] in "'\""
-    return text if quoted or PLAIN.fullmatch(text) else _quoted(text)
+    return text if quoted or PLAIN.fullmatch(text) else _quote_override_value(text)
 
 
 def _parts(inner: str) -> list[str]:

@@ -162,7 +162,7 @@ def import_all(packages: Iterable[ModuleType]) -> None:
         _check_decorated(module)
 
 
-def registered() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
+def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
     """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
     refused: dict[str, str] = {}
 

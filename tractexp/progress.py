@@ -24,7 +24,7 @@ Progress = Callable[[str], None] | bool | None  # of a call: None shows it, Fals
 Counting = AbstractContextManager[Callable[[], None]]  # gives what is to be called at the end of each part
 
 
-def uncounted(total: int) -> Counting:
+def make_silent_counter(total: int) -> Counting:
     """Nobody counts the parts."""
     return nullcontext(lambda: None)
 
@@ -45,7 +45,7 @@ def say(text: str = "") -> None:
 
 
 @contextmanager
-def searching(iterations: int | None, budget: int | None, progress: Progress = None) -> Iterator[Any]:
+def report_search(iterations: int | None, budget: int | None, progress: Progress = None) -> Iterator[Any]:
     """Yield the search loop's progress callback: a live line, or a line now and then in a log file; None for False."""
     from rich.progress import BarColumn, TextColumn
 
@@ -57,7 +57,7 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
 
         def line(iteration: int, best: float, simulations: int) -> None:
             if spent := pace():
-                rest = remaining(spent, share(iteration, simulations, iterations, budget))
+                rest = describe_remaining_time(spent, share(iteration, simulations, iterations, budget))
                 say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
                 sys.stdout.flush()
 
@@ -73,14 +73,14 @@ def searching(iterations: int | None, budget: int | None, progress: Progress = N
 
         def callback(iteration: int, best: float, simulations: int) -> None:
             done = share(iteration, simulations, iterations, budget)
-            rest = remaining(time.perf_counter() - started, done)
+            rest = describe_remaining_time(time.perf_counter() - started, done)
             update(completed=done or 0.0, simulations=simulations, best=best, rest=rest)
 
         yield callback
 
 
 @contextmanager
-def counting(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
+def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
     """Yield a function to call at the end of each of `total` parts: a bar, or a line now and then in a log file.
 
     A callable gets a line for each.
@@ -114,11 +114,11 @@ def counting(what: str, total: int, progress: Progress = None) -> Iterator[Calla
 
 def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
     """`counting` of as many parts as will be said; a callable, which is told what begins, is told of none."""
-    return lambda total: counting(what, total, None if callable(progress) else progress)
+    return lambda total: count_parts(what, total, None if callable(progress) else progress)
 
 
 @contextmanager
-def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
+def tell_stages(progress: Progress) -> Iterator[Callable[[str], None]]:
     """Yield a function for the lines of the stages: the newest stands on a live line; a log file has each."""
     from rich.progress import SpinnerColumn, TextColumn
 
@@ -132,14 +132,14 @@ def telling(progress: Progress) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
-def staged(progress: Progress = None) -> Iterator[Callable[[str], None]]:
+def tell_late_stages(progress: Progress = None) -> Iterator[Callable[[str], None]]:
     """As `telling`, but a log file has a stage only once the call has taken `FIRST_LINE` seconds.
 
     It stands with what is said of errors, so that the first line of the output is the answer.
     """
     started = time.perf_counter()
     if _lively() or callable(progress) or progress is False:
-        with telling(progress) as show:
+        with tell_stages(progress) as show:
             yield show
         return
 
@@ -166,7 +166,7 @@ def share(iteration: int, simulations: int, iterations: int | None, budget: int 
     return max(parts, default=None)
 
 
-def remaining(spent: float, done: float | None) -> str:
+def describe_remaining_time(spent: float, done: float | None) -> str:
     """The end of a progress line: the time [s] that the rest takes; "" before the first part."""
     return f", about {spent / done - spent:.0f} s left" if done and done < 1 else ""
 

@@ -81,25 +81,25 @@ _started: list[str] = []
 _placed: list[Path] = []
 
 
-def started(arguments: list[str]) -> None:
+def remember_command(arguments: list[str]) -> None:
     """Remember the command line that this process was started by."""
     _started[:] = ["tractexp", *arguments]
     _placed.clear()
 
 
-def placed(folder: Path) -> None:
+def remember_folder(folder: Path) -> None:
     """Remember the folder of this run, which `tractexp again` takes."""
     here = Path.cwd()
     _placed[:] = [folder.relative_to(here) if folder.is_relative_to(here) else folder]
 
 
-def again(*settings: str, of: Collection[str] = OF_LOAD) -> str:
+def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
     """The command that does something else with the settings of this run in some groups: its records and its load.
 
     Whole, or by the folder of this run where that is shorter. The command line of a sweep has several of each, so that
     its jobs repeat none.
     """
-    whole = _repeated(settings, of)
+    whole = _repeat_settings(settings, of)
     possible = of == OF_LOAD and not any(map(_not_taken_over, _started[1:]))
     by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible]
     return min(whole, *by_folder, key=len) if by_folder else whole
@@ -112,7 +112,7 @@ def _not_taken_over(argument: str) -> bool:
     return bool(repeatable.refusal(argument))
 
 
-def _repeated(settings: Collection[str], of: Collection[str]) -> str:
+def _repeat_settings(settings: Collection[str], of: Collection[str]) -> str:
     arguments, others = _started[1:], {setting.partition("=")[0] for setting in settings}
     if {"-m", "--multirun"} & {*arguments}:
         arguments = []

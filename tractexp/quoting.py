@@ -53,7 +53,7 @@ def markdown_again(text: str) -> str:
     return markdown(re.sub(r"\\([\\`*_<>\[\]|$~&#])", r"\1", text))
 
 
-def fenced(text: str) -> str:
+def fence_markdown(text: str) -> str:
     """A block of code of Markdown, which no backticks in the text end."""
     fence = "`" * max(3, 1 + max(map(len, re.findall("`+", text)), default=0))
     return f"{fence}\n{text}\n{fence}"
@@ -61,10 +61,10 @@ def fenced(text: str) -> str:
 
 def hydra(text: str, *, literal: bool = True) -> str:
     """A value of Hydra's grammar in quotes; where it is `literal`, an interpolation within it is text, too."""
-    return "'" + re.sub(r"\\*('|$)", _doubled, omegaconf(text) if literal else text) + "'"
+    return "'" + re.sub(r"\\*('|$)", _double_backslashes, omegaconf(text) if literal else text) + "'"
 
 
-def _doubled(match: re.Match[str]) -> str:
+def _double_backslashes(match: re.Match[str]) -> str:
     """Backslashes before a quote, or at the end: only there are they read as an escape."""
     mark, slashes = match[1], match[0].removesuffix(match[1])
     return 2 * slashes + ("\\'" if mark else "")

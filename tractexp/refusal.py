@@ -14,11 +14,11 @@ from tractexp.errors import UserError, among
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
 KINDS = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false", "String": "a text"}
 PYTHON = re.compile(r"Config\b|Exception|Error:|\btype '|\b(?:dict|list|tuple|int|str|float|None\w*)\b|__")
-LONGEST = 80  # characters of a value that are repeated
+LONGEST_REPEATED_VALUE = 80  # characters of a value that are repeated
 
 
 @contextmanager
-def explained() -> Iterator[None]:
+def explain_errors() -> Iterator[None]:
     """Turn Hydra's and OmegaConf's exceptions into `UserError`, unforeseen ones from their code too."""
     from hydra.errors import HydraException, MissingConfigException
     from omegaconf.errors import OmegaConfBaseException
@@ -28,7 +28,7 @@ def explained() -> Iterator[None]:
     except UserError:  # of a job that Hydra has run: it is a sentence
         raise
     except MissingConfigException as error:
-        raise UserError(_missing(error)) from error
+        raise UserError(_describe_missing_choice(error)) from error
     except (HydraException, OmegaConfBaseException) as error:
         raise UserError(_sentence(error)) from error
     except OSError as error:
@@ -72,10 +72,10 @@ def _argument(error: BaseException | None) -> str | None:
 
 def _short(text: object) -> str:
     text = " ".join(str(text).split())
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]}…"
+    return text if len(text) <= LONGEST_REPEATED_VALUE else f"{text[:LONGEST_REPEATED_VALUE]}…"
 
 
-def _missing(error: Any) -> str:
+def _describe_missing_choice(error: Any) -> str:
     name = str(error.missing_cfg_file or "")
     group, _, choice = name.rpartition("/")
     options = [o for o in error.options or () if not o.startswith("_")]

@@ -19,7 +19,7 @@ def refusal(setting: str) -> str:
     """Why KEY=VALUE is not taken over; "" where it is."""
     key, _, value = setting.partition("=")
     match = KEY.fullmatch(key)
-    if match is None or not _listed(match[1]):
+    if match is None or not _is_listed(match[1]):
         return "it says more than what is computed"
     if "${" in value:
         return "its value refers to something else"
@@ -30,5 +30,5 @@ def refusal(setting: str) -> str:
     return ""
 
 
-def _listed(key: str) -> bool:
+def _is_listed(key: str) -> bool:
     return key in (*CHOICES, *VALUES) or key.startswith(PARTS)

@@ -120,7 +120,7 @@ def hold(folder: Path) -> Iterator[None]:
     """Hold a folder, created where there is none, for this process alone. Raises `UserError` where another does."""
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     try:
-        with files.claimed(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"):
+        with files.claim_file(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"):
             yield
     finally:
         with contextlib.suppress(OSError):  # where it is not empty

@@ -117,7 +117,7 @@ KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS
 MOST_LINKS = 40  # that a path leads through, as the system has it
 
 
-def damaged(folder: Path) -> list[Path]:
+def find_damaged_files(folder: Path) -> list[Path]:
     """The files of a cache folder that are damaged, or of an earlier version."""
     ours = [path for path in folder.rglob("*") if NAME.fullmatch(path.name)]
     return [path for path in ours if path.suffix == EARLIER or _sound(path) is None]
@@ -173,7 +173,7 @@ def version(library: str) -> str:
     return importlib.metadata.version(library)
 
 
-def installed(part: Any) -> bool:
+def is_installed(part: Any) -> bool:
     """Whether a part's code is among that whose digest is taken: a plugin in no installed file may change unseen."""
     file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
     return file is not None and any(Path(file).is_relative_to(folder) for folder in provenance.folders())

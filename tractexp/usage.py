@@ -10,8 +10,8 @@ from pathlib import Path
 from tractexp.choices import FEWEST_VARIANTS, Option, choices, defaults, find_families, group_variants, sentence
 from tractexp.errors import UserError, among
 
-WIDTH = 100  # columns
-FEW = 9  # names of a group that fit into two lines of the help, or three
+WIDEST_HELP = 100  # columns
+MOST_HELP_NAMES = 9  # names of a group that fit into two lines of the help, or three
 
 GROUPS = {
     "task": "what to do",
@@ -68,12 +68,12 @@ Values are changed by KEY=VALUE
 
 def usage() -> str:
     options = choices()
-    tasks = {name: re.split("[:;] ", options["task"][name].about)[0] for name in _sorted("task", options["task"])}
-    groups = {group: _summary(group, options[group]) for group in _ordered(options) if group not in LATER}
+    tasks = {name: re.split("[:;] ", options["task"][name].about)[0] for name in _sort_names("task", options["task"])}
+    groups = {group: _summary(group, options[group]) for group in _order_groups(options) if group not in LATER}
     return TEXT.format(task=defaults()["task"], tasks=_columns(tasks), groups=_columns(groups))
 
 
-def listed(arguments: list[str]) -> int:
+def print_choices(arguments: list[str]) -> int:
     """`tractexp list [GROUP or NAME ...]`: print every name with a sentence on each; returns the exit code.
 
     Of a NAME that has variants these are printed. Raises `UserError` for what is neither.
@@ -92,9 +92,9 @@ def listed(arguments: list[str]) -> int:
     for name in chosen:
         if name not in options and not _find_group_of_variants(name, options):
             raise UserError(f"there is no group '{name}'{_describe_holders(name, options)}")
-    options, refused = _imported(options)
-    width = min(WIDTH, shutil.get_terminal_size((WIDTH, 24)).columns)
-    print("\n\n".join(_describe(name, options, width) for name in chosen or _ordered(options)))
+    options, refused = _import_choices(options)
+    width = min(WIDEST_HELP, shutil.get_terminal_size((WIDEST_HELP, 24)).columns)
+    print("\n\n".join(_describe(name, options, width) for name in chosen or _order_groups(options)))
     for why in refused:
         print(f"\nleft out: {why}")
     return 0
@@ -103,13 +103,13 @@ def listed(arguments: list[str]) -> int:
 def _describe(name: str, options: Mapping[str, Mapping[str, Option]], width: int) -> str:
     """Return what there is of a group, or of a name that has variants."""
     if name in options:
-        return _described(name, options[name], width)
+        return _describe_group(name, options[name], width)
     return _describe_variants(name, options[_find_group_of_variants(name, options)], width)
 
 
 def _find_group_of_variants(name: str, options: Mapping[str, Mapping[str, Option]]) -> str:
     """Return the group in which a name has variants; "" where there is none."""
-    for group in _ordered(options):
+    for group in _order_groups(options):
         if group_variants(options[group]).get(name):
             return group
     return ""
@@ -117,17 +117,17 @@ def _find_group_of_variants(name: str, options: Mapping[str, Mapping[str, Option
 
 def _describe_holders(name: str, options: Mapping[str, Mapping[str, Option]]) -> str:
     """Return the end of a sentence on a name that is no group: the groups that hold it, or all groups."""
-    holders = [f"'tractexp list {group}'" for group in _ordered(options) if name in options[group]]
+    holders = [f"'tractexp list {group}'" for group in _order_groups(options) if name in options[group]]
     if holders:
         return f", but there is such a name in {' and '.join(holders)}"
     return among(name, options, "Groups")
 
 
-def _imported(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, dict[str, Option]], list[str]]:
+def _import_choices(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, dict[str, Option]], list[str]]:
     """The choices as they are once every plugin is imported, and why those that fit no group cannot be."""
-    from tractexp.plugin import registered
+    from tractexp.plugin import register_all
 
-    classes_of, refused = registered()
+    classes_of, refused = register_all()
     result = {group: dict(names) for group, names in options.items()}
     for group, classes in classes_of.items():
         for name, cls in classes.items():  # also those registered by a program, which are in no file
@@ -141,12 +141,12 @@ def _imported(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, di
     return result, [why for module, why in refused.items() if module not in placed]
 
 
-def _described(group: str, names: Mapping[str, Option], width: int) -> str:
+def _describe_group(group: str, names: Mapping[str, Option], width: int) -> str:
     """A group and its names, each with its sentence."""
     head = f"{group}: {GROUPS[group]}" if group in GROUPS else group
     if chosen := defaults().get(group):
         head += f"; {chosen} by default"
-    grouped = group_variants({name: names[name] for name in _sorted(group, names)})
+    grouped = group_variants({name: names[name] for name in _sort_names(group, names)})
     rows = {base: names[base].about for base in grouped}
     for base, varied in grouped.items():
         if varied:
@@ -162,26 +162,26 @@ def _describe_variants(base: str, names: Mapping[str, Option], width: int) -> st
 
 def _summary(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
-    families = find_families({name: names[name] for name in _sorted(group, names)})
+    families = find_families({name: names[name] for name in _sort_names(group, names)})
     parts = [
         f"{base} and {len(members) - 1} variants" if len(members) > FEWEST_VARIANTS else ", ".join(members)
         for base, members in families.items()
     ]
-    more = f" and {len(parts) - FEW + 1} others" if len(parts) > FEW else ""
-    return ", ".join(parts[: FEW - 1] if more else parts) + more
+    more = f" and {len(parts) - MOST_HELP_NAMES + 1} others" if len(parts) > MOST_HELP_NAMES else ""
+    return ", ".join(parts[: MOST_HELP_NAMES - 1] if more else parts) + more
 
 
-def _ordered(options: Mapping[str, object]) -> list[str]:
+def _order_groups(options: Mapping[str, object]) -> list[str]:
     return [*(group for group in GROUPS if group in options), *sorted(options.keys() - GROUPS)]
 
 
-def _sorted(group: str, names: Collection[str]) -> list[str]:
+def _sort_names(group: str, names: Collection[str]) -> list[str]:
     """Names in order, `figure3` before `figure10`, and first of all the one that is chosen by default."""
     numbered = {name: [(word, int(digits or 0)) for word, digits in re.findall(r"(\D*)(\d*)", name)] for name in names}
     return sorted(names, key=lambda name: (name != defaults().get(group), numbered[name]))
 
 
-def _columns(rows: Mapping[str, str], width: int = WIDTH) -> str:
+def _columns(rows: Mapping[str, str], width: int = WIDEST_HELP) -> str:
     """Names in a column, and beside each its text, folded."""
     indent = 4 + max(map(len, rows), default=0)
     folded = textwrap.TextWrapper(max(width, indent + 30), subsequent_indent=" " * indent)

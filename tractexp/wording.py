@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
-MANY = 3  # alternatives that share a name, or figures: so many are told by what they have in common
+FEWEST_GROUPED = 3  # alternatives that share a name, or figures: so many are told by what they have in common
 MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
 
 
@@ -15,14 +15,14 @@ MOST_DIGITS = 7  # after the point: smaller errors are written with powers of te
 UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
-def shown(text: object) -> str:
+def escape_text(text: object) -> str:
     """A text of others, such as a channel's name, for a terminal: its control characters as `\\x1b`, but for lines."""
     return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), str(text))
 
 
 def one_line(text: object) -> str:
     """As `shown`, where a line break would be a line of somebody else's."""
-    return shown(text).replace("\n", "\\n")
+    return escape_text(text).replace("\n", "\\n")
 
 
 def in_words(p: float) -> str:
@@ -52,7 +52,7 @@ def epsilon(error: float | None) -> str:
     return "undefined" if error is None or not math.isfinite(error) else f"{error:.3%}"
 
 
-def joined(names: Sequence[str], last: str = "and") -> str:
+def join_words(names: Sequence[str], last: str = "and") -> str:
     """Names as a sentence lists them: 'a', 'a and b', 'a, b and c'."""
     return f" {last} ".join(part for part in (", ".join(names[:-1]), *names[-1:]) if part)
 
@@ -64,18 +64,18 @@ def alternatives(sets: Sequence[Sequence[str]]) -> str:
         return ""
     common = Counter(itertools.chain(*sets)).most_common(1)[0][0]
     sharing = [names for names in sets if common in names and len(names) > 1]
-    if len(sharing) < MANY:
-        return joined([joined(names) for names in sets], "or")
-    beside = joined([joined([name for name in names if name != common]) for names in sharing], "or")
-    others = [joined(names) for names in sets if names not in sharing]
-    return joined([f"{common} beside one more effect ({beside})", *others], "or")
+    if len(sharing) < FEWEST_GROUPED:
+        return join_words([join_words(names) for names in sets], "or")
+    beside = join_words([join_words([name for name in names if name != common]) for names in sharing], "or")
+    others = [join_words(names) for names in sets if names not in sharing]
+    return join_words([f"{common} beside one more effect ({beside})", *others], "or")
 
 
-def listed(values: Sequence[float], shown: Callable[[float], str]) -> str:
+def list_figures(values: Sequence[float], shown: Callable[[float], str]) -> str:
     """Figures as a sentence lists them; of many the smallest and the largest."""
-    if len(values) > MANY:
+    if len(values) > FEWEST_GROUPED:
         return f"{shown(min(values))} to {shown(max(values))}"
-    return joined([shown(value) for value in values])
+    return join_words([shown(value) for value in values])
 
 
 def as_sentence(text: str) -> str:
@@ -98,7 +98,7 @@ def change(before: float | None, after: float | None) -> str:
     return f"{figure(before) or '?'} to {figure(after) or '?'}"
 
 
-def counted(number: int, noun: str) -> str:
+def count_noun(number: int, noun: str) -> str:
     """1 dip, 2 dips."""
     return f"{number} {noun}{'s' * (number != 1)}"
 

@@ -62,7 +62,7 @@ class Workers:
             n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
             dispatch: Any = {"batch_size": 1, "pre_dispatch": n}  # numbers, other than joblib's annotations say
             parallel: Any = Parallel(max(n, 1 + self.apart), return_as="generator_unordered", **dispatch)
-            calls = (delayed(_numbered)(function, k, item) for k, item in enumerate(items))
+            calls = (delayed(_number_result)(function, k, item) for k, item in enumerate(items))
             # One at a time where one is at work: joblib drops a result that waits when the next call kills its worker.
             for batch in ([call] for call in calls) if n == 1 else [calls]:
                 results = parallel(batch)
@@ -98,7 +98,7 @@ class Workers:
             barren += 1
             keys, working = list(remaining), set[int]()
             with contextlib.suppress(BrokenExecutor):
-                for k, result in self.completed(function, _noted(remaining, keys, working), len(keys)):
+                for k, result in self.completed(function, _note_items(remaining, keys, working), len(keys)):
                     working.discard(k)
                     barren = 0
                     yield remaining.pop(keys[k]), result
@@ -134,11 +134,11 @@ class Workers:
             yield
 
 
-def _numbered(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, Any]:
+def _number_result(function: Callable[[Any], Any], k: int, item: Any) -> tuple[int, Any]:
     return k, function(item)
 
 
-def _noted(remaining: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
+def _note_items(remaining: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
     """The items by their keys; the position of one that is taken is in work from then on."""
     for k, key in enumerate(keys):
         working.add(k)

@@ -10,7 +10,7 @@ from tractexp.choices import defaults, sentence
 from tractexp.model import sites
 from tractexp.model.declaration import motor_alone
 from tractexp.model.parts import Effect, Motor, Part
-from tractexp.model.printed import changed
+from tractexp.model.printed import list_changed_lines
 from tractexp.parameter import Parameter
 from tractexp.plugin import Plugin, discover
 
@@ -111,11 +111,11 @@ def _equations(cls: type[Part]) -> str:
     """The equations of a motor by itself; of any other part those that it changes or brings in."""
     base, of = pictures.pair(cls)
     if issubclass(cls, Motor):
-        edits = [(None, line) for line in motor_alone(cls()).latex()] if not cls.waves_only else changed([], of.latex())
+        edits = [(None, line) for line in motor_alone(cls()).latex()] if not cls.waves_only else list_changed_lines([], of.latex())
     elif issubclass(cls, Effect):
-        edits = changed(base.latex(), of.latex())
+        edits = list_changed_lines(base.latex(), of.latex())
     else:
-        edits = [(was, line) for was, line in changed(motor_alone(of.motor).latex(), of.latex()) if was is None]
+        edits = [(was, line) for was, line in list_changed_lines(motor_alone(of.motor).latex(), of.latex()) if was is None]
     if not edits:
         return ""
     lines = [line if was is None else rf"{line} \quad \text{{instead of}} \quad {was}" for was, line in edits]

@@ -40,7 +40,7 @@ def pair(cls: type[Part]) -> tuple[Model, Model]:
     base, own = usual(), cls()
     if isinstance(own, Effect):
         if cls.waves_only or base.acceptance(own).refusal is not None:
-            return loads.without(cls), loads.with_part(cls)
+            return loads.build_base_model(cls), loads.with_part(cls)
         return base, compose(base.motor, base.static, [own])
     of = compose(own, base.static) if isinstance(own, Motor) else compose(base.motor, own)
     try:
@@ -53,7 +53,7 @@ def pair(cls: type[Part]) -> tuple[Model, Model]:
 def values(of: Model) -> dict[str, float]:
     """Every parameter at its default, the sizes of an effect clearly beyond what matters."""
     own = {p.name for effect in of.effects for p in effect.parameters}
-    return {p.name: loads.on(p) if p.name in own else p.default for p in of.parameters}
+    return {p.name: loads.choose_active_size(p) if p.name in own else p.default for p in of.parameters}
 
 
 def played(of: Model, drive: Drive) -> np.ndarray | None:

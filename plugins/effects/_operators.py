@@ -44,7 +44,7 @@ def bent(x, knots, bends, width):
     return y
 
 
-def drawn(law, x):
+def evaluate_law(law, x):
     """The values (n,) of a law at x (n,), for a page."""
     import sympy
 

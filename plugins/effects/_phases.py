@@ -3,14 +3,14 @@
 
 def phases_of(eq, vector, zero):
     """The three phases of a space vector in the frame and a zero sequence."""
-    return [eq.parts(eq.turn * (vector * _turned(-k)))[0] + zero for k in range(3)]
+    return [eq.parts(eq.turn * (vector * _rotate_phase(-k)))[0] + zero for k in range(3)]
 
 
 def vector_of(eq, phases):
     """The space vector in the frame of three phases, and their zero sequence."""
     from sympy import Rational, conjugate
 
-    still = Rational(2, 3) * sum(_turned(k) * x for k, x in enumerate(phases))
+    still = Rational(2, 3) * sum(_rotate_phase(k) * x for k, x in enumerate(phases))
     return conjugate(eq.turn) * still, sum(phases) / 3
 
 
@@ -21,7 +21,7 @@ def beyond(x, knee):
     return sympy.Max(0, x - knee) - sympy.Max(0, -x - knee)
 
 
-def left(eq, level):
+def detect_departure(eq, level):
     """1 in a moment at which the voltage is off by more than `level` of that before the event, else 0."""
     import sympy
 
@@ -30,7 +30,7 @@ def left(eq, level):
     return sympy.Min(1, sympy.Max(0, 10 * (square / (level * eq.U0) ** 2 - 1)))  # all of it 5 % farther
 
 
-def _turned(k):
+def _rotate_phase(k):
     """exp(j k 120 degrees)."""
     from sympy import I, Rational, sqrt
 

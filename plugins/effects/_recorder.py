@@ -23,7 +23,7 @@ def _cubic(y, r):
     return far * y(-2) + near * y(-1) + here * y(0) + ahead * y(1)
 
 
-def moved(power, drive, delay, quiet):
+def delay_response(power, drive, delay, quiet):
     """Make of power (C, n, N) what the voltage U, `delay` (E, n) [s] earlier, draws.
 
     Between samples U is the cubic of its slopes, as the equations have it, and the current y/U follows it: by so much
@@ -59,17 +59,17 @@ def _current(y, U, each, slope, follow, place, r):
     return u * (p + r * (s - p) - r * (1 - r) / 2 * weaker + answer * u)
 
 
-def grown(power, drive, rate):
+def add_drift(power, drive, rate):
     """Make of power (C, n, N) what it is if it changes by `rate` (E, C, n) [1/s] from the first sample of an event."""
     at_once = np.zeros(rate.shape, dtype=int)
     _change(GROWN, power, drive, {"shift": at_once}, {"rate": rate}, t=drive.inputs[INPUTS.index("t")])
 
 
-def _grown(y, t, rate):
+def _apply_drift(y, t, rate):
     return y(0) * (1 + rate * t(0))
 
 
-def averaged(power, drive, window):
+def average_power(power, drive, window):
     """Make of power (2, n, N) its mean over `window` (E, n) [s] around each sample.
 
     It is linear between samples and keeps its first and last value beyond them. A window of 0 leaves it as it is.
@@ -90,7 +90,7 @@ def _mean(y, total, r, each):
     return Piecewise((ahead, each <= 0), ((whole + ends) * each, True))
 
 
-GROWN = Stencil(_grown, rows=("y",), shared=("t",), numbers=("rate",))
+GROWN = Stencil(_apply_drift, rows=("y",), shared=("t",), numbers=("rate",))
 CUBIC = Stencil(_cubic, rows=("y",), numbers=("r",), onward=True)
 CURRENT = Stencil(_current, rows=("y",), shared=("U", "each", "slope", "follow", "place"), numbers=("r",))
 MEAN = Stencil(_mean, rows=("y",), sums={"total": "y"}, shifts=("ahead", "behind"), numbers=("r", "each"))

@@ -5,7 +5,7 @@ from ._operators import gate
 LEVEL, TIME = 0.0025, 0.2  # how sharp a relay is: in voltage over U_0, and in samples
 
 
-def opened(eq, level, delay, wait, margin, ramp, stage=""):
+def compute_open_share(eq, level, delay, wait, margin, ramp, stage=""):
     """What is open, 0 to 1: all once the voltage stayed below `level` for `delay`, until it stayed above for `wait`.
 
     Then it returns within `ramp`. Between samples the voltage is a line, so that the timers start where it crosses a
@@ -46,6 +46,6 @@ def stages(eq, first, last, delay, waits, margin, ramp, name):
     """
     steps = len(waits) - 1
     return sum(
-        opened(eq, first + (last - first) * k / steps, delay, wait, margin, ramp, f"_{name}{k + 1}")
+        compute_open_share(eq, first + (last - first) * k / steps, delay, wait, margin, ramp, f"_{name}{k + 1}")
         for k, wait in enumerate(waits)
     ) / (steps + 1)

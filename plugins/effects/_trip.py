@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from tractexp.extend import Effect, Parameter
 
-from ._relay import opened
+from ._relay import compute_open_share
 
 SOURCE = "NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model (Ftr1, Vtr1, Ttr1, Vrc1, Trc1)"
 TEXTBOOK = ("tripped_share", "trip_level", "trip_delay", "reconnect_delay", "reconnect_margin", "reconnect_ramp")
@@ -46,6 +46,6 @@ class _Trip(Effect):
 
     def edit(self, eq, **values):
         share, *timers = values.values()
-        gone = opened(eq, *timers, stage=self.stage)
+        gone = compute_open_share(eq, *timers, stage=self.stage)
         for site in self.wave_sites if eq.waves else self.phasor_sites:
             eq.edit(site, lambda drawn: drawn * (1 - share * gone))

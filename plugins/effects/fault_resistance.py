@@ -2,7 +2,7 @@
 
 from tractexp.extend import Effect, Parameter, plugin
 
-from ._phases import left
+from ._phases import detect_departure
 
 SOURCE = "Kundur 1994, section 13.4 (faults by shunts); IEC 60909-0"
 LEVEL, HOLD = 0.1, 0.005  # of the voltage: how far off it is in a fault; s: how long it may be nearer in between
@@ -33,6 +33,6 @@ class FaultResistance(Effect):
 
         on = eq.memory("fault_on", "f")
         active = sympy.Max(0, on - eq.step / HOLD)
-        eq.renews(on, sympy.Max(active, left(eq, LEVEL)), 0)
+        eq.renews(on, sympy.Max(active, detect_departure(eq, LEVEL)), 0)
         drawn = fault_conductance * sympy.Min(1, on * HOLD / eq.step)
         eq.draw(drawn * eq.v, drawn * eq.v_zero)

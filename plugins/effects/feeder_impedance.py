@@ -65,14 +65,14 @@ class FeederImpedance(Effect):
         loads = [eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq]
         at_bus = [eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0)))) for power in (eq.P, eq.Q)]
         I_0 = (eq.P0 - at_bus[0] - I * (eq.Q0 - at_bus[1])) / eq.U0
-        a, b = (_computed(eq, f"motor_{k}", part, part) for k, part in zip("ab", _motor_current(eq), strict=True))
-        B = _computed(eq, "feeder_source", eq.U - Z * a, eq.U - Z * a)
+        a, b = (_compute_complex_step(eq, f"motor_{k}", part, part) for k, part in zip("ab", _motor_current(eq), strict=True))
+        B = _compute_complex_step(eq, "feeder_source", eq.U - Z * a, eq.U - Z * a)
         x, Y = _solve(eq, Z, b, B, eq.U0 - Z * I_0)
-        V = _computed(eq, "load_voltage", B / (1 + Z * (b + Y)), eq.U0 - Z * I_0)
+        V = _compute_complex_step(eq, "load_voltage", B / (1 + Z * (b + Y)), eq.U0 - Z * I_0)
 
         name = eq.V if motor else eq.define("load_voltage", V, "V")
         drawn = sum(s * (1 if s.name.startswith("P") else I) for s in loads)
-        current = eq.define("feeder_current", _computed(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
+        current = eq.define("feeder_current", _compute_complex_step(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
         eq.shown[current] = conjugate(drawn / name)
         if motor:
             eq.edit(sites.motor_voltage, lambda _: V)
@@ -94,8 +94,8 @@ def _before_all(eq, R_f, X_f):
 
     source = eq.recorded_voltage + R_p * in_reactance
     inside, J, rest = _linear(eq, drop_0)
-    bus = _solved(eq, R_f + R_p, J, rest, source)
-    v = _computed(eq, "behind_feeder", bus, eq.U0 - drop_0)
+    bus = _solve_voltage(eq, R_f + R_p, J, rest, source)
+    v = _compute_complex_step(eq, "behind_feeder", bus, eq.U0 - drop_0)
     drop = eq.recorded_voltage - eq.v
     eq.edit(sites.bus_voltage, lambda recorded: v, shown=source - (R_f + R_p) * eq["feeder_drawn"])
     if inside is not None:
@@ -133,7 +133,7 @@ def _linear(eq, drop_0):
     return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
 
 
-def _solved(eq, R, J, rest, source):
+def _solve_voltage(eq, R, J, rest, source):
     """v of v + R (J v + rest) = source."""
     import sympy
 
@@ -209,7 +209,7 @@ def _affine(eq):
     return abs(complex(off.xreplace({s: n if s.is_real else n * (1 + I) for s, n in numbers.items()}))) < 1e-9
 
 
-def _computed(eq, name, value, before):
+def _compute_complex_step(eq, name, value, before):
     """A complex quantity computed once, from its two parts."""
     from sympy import I
 

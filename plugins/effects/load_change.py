@@ -28,11 +28,11 @@ class LoadChange(Measurement):
     confused_with = ("exponential_recovery", "undervoltage_trip", "frequency_dependence")
 
     def observe(self, power, drive, values):
-        from ._recorder import grown
+        from ._recorder import add_drift
 
         rate = np.stack([values["drift_P"], values["drift_Q"]], axis=1)
         if not drive.of_waves:
-            grown(power, drive, rate)
+            add_drift(power, drive, rate)
             return power
         for e in range(drive.events):
             part = drive.part(e)

@@ -24,7 +24,7 @@ class MeasurementWindow(Measurement):
     confused_with = ("time_skew", "stator_resistance")
 
     def observe(self, power, drive, values):
-        from ._recorder import averaged
+        from ._recorder import average_power
 
-        averaged(power, drive, values["window"])
+        average_power(power, drive, values["window"])
         return power

@@ -4,14 +4,14 @@ import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 
-from ._operators import bent, drawn, ramp
+from ._operators import bent, evaluate_law, ramp
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 KNOT, BEND = 0.5, 0.1  # of the way from full power to none
 WIDTH = 0.02  # of the power: how rounded the corners are
 
 
-def _allowed(u, full, off, bend, rest):
+def _compute_allowed_power(u, full, off, bend, rest):
     return ramp(1 - bent((full - u) / (full - off), (KNOT,), (bend,), BEND), WIDTH, rest)
 
 
@@ -50,7 +50,7 @@ class PowerLimitCurve(Effect):
     confused_with = ("voltage_dependent_power_limit", "constant_power_converter", "dc_link_lag")
 
     def edit(self, eq, curve_limited, curve_full, curve_off, curve_time, limit_bend, limit_rest):
-        allowed = lambda x: _allowed(x, curve_full, curve_off, limit_bend, limit_rest)  # noqa: E731
+        allowed = lambda x: _compute_allowed_power(x, curve_full, curve_off, limit_bend, limit_rest)  # noqa: E731
         u = eq[sites.static_voltage]
         voltage = eq.lag("measured_voltage", "x_u")
         eq.moves(voltage, (u - voltage) / curve_time, 1)
@@ -59,5 +59,5 @@ class PowerLimitCurve(Effect):
 
     def curve(self, curve_limited, curve_full, curve_off, curve_time, limit_bend, limit_rest):
         u = np.linspace(0.4, 1.0, 61)
-        allowed = lambda x: _allowed(x, curve_full, curve_off, limit_bend, limit_rest)  # noqa: E731
-        return Curve(u, drawn(lambda x: allowed(x) / allowed(1), u), "voltage over that before", "power allowed")
+        allowed = lambda x: _compute_allowed_power(x, curve_full, curve_off, limit_bend, limit_rest)  # noqa: E731
+        return Curve(u, evaluate_law(lambda x: allowed(x) / allowed(1), u), "voltage over that before", "power allowed")

@@ -33,7 +33,7 @@ class RotorFlux(Effect):
     confused_with = ("exponential_recovery", "dc_link_lag", "time_skew")
 
     def refusal(self, eq):
-        return "its rotor flux moves already" if _orders.moving(eq, _orders.FLUX) else None
+        return "its rotor flux moves already" if _orders.list_moving_states(eq, _orders.FLUX) else None
 
     def edit(self, eq, flux_share):
         from sympy import I, im

@@ -31,7 +31,7 @@ class RotorSpeed(Effect):
     confused_with = ("exponential_recovery", "second_motor_group", "load_change")
 
     def refusal(self, eq):
-        return "its speed moves already" if _orders.moving(eq, _orders.SPEED) else None
+        return "its speed moves already" if _orders.list_moving_states(eq, _orders.SPEED) else None
 
     def edit(self, eq, swing):
         excess = eq[sites.electrical_torque] - eq[sites.load_torque]

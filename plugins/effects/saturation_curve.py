@@ -4,7 +4,7 @@ import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 
-from ._operators import bent, drawn
+from ._operators import bent, evaluate_law
 
 SOURCE = "Milano 2010, ch. 15; tables of saturation in Kundur 1994, ch. 3"
 
@@ -70,5 +70,5 @@ class SaturationCurve(Effect):
 
     def curve(self, curve_saturation, saturation_bend, saturation_corner, saturation_rounding, flux_depth):
         x = np.linspace(0.0, 0.7, 71)
-        h = drawn(lambda x: bent(x, (saturation_corner,), (saturation_bend,), saturation_rounding), x)
+        h = evaluate_law(lambda x: bent(x, (saturation_corner,), (saturation_bend,), saturation_rounding), x)
         return Curve(x, -curve_saturation * h, "fall of the flux squared, pu²", "change of the saturation factor")

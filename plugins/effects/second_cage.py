@@ -40,7 +40,7 @@ class SecondCage(Effect):
             return "its rotor has a second cage already"
         if "psi" in eq:
             return "its stator flux moves, of which this effect knows nothing; compare with model/motor=double_cage"
-        if sites.stator_impedance in eq and not _orders.moving(eq, _orders.FLUX):
+        if sites.stator_impedance in eq and not _orders.list_moving_states(eq, _orders.FLUX):
             return "its first cage has no flux that moves; take model/motor=double_cage"
         return None
 

@@ -30,7 +30,7 @@ class SecondMotorGroup(Effect):
     confused_with = ("speed_dependent_torque", "undervoltage_trip", "exponential_recovery")
 
     def edit(self, eq, group_share, inertia_ratio):
-        omega, moving = eq.omega, _moving(eq)
+        omega, moving = eq.omega, _list_needed_states(eq)
         twins = {s: eq.twin(s, "_2") for s in moving}
         twins |= {eq.before(s): eq.before(twin) for s, twin in twins.items()}
         touched = [s for s in eq.definitions if eq.expand(s).free_symbols & twins.keys()]
@@ -41,19 +41,19 @@ class SecondMotorGroup(Effect):
             state, slower = eq.states[symbol], inertia_ratio if symbol == omega else 1
             eq.moves(twins[symbol], state.derivative.xreplace(twins) / slower, state.initial)
             eq.states[twins[symbol]].derived = state.derived
-        for site in _drawn(eq):
+        for site in _compute_drawn_output(eq):
             second = twins[eq[site]]
             eq.edit(site, lambda own, second=second: (1 - group_share) * own + group_share * second)
 
 
-def _drawn(eq):
+def _compute_drawn_output(eq):
     """What the motor draws: its power, of waveforms its current."""
     return (sites.motor_current,) if eq.waves else (sites.P_motor, sites.Q_motor)
 
 
-def _moving(eq):
+def _list_needed_states(eq):
     """The states the motor's power depends on, and those that these depend on in turn."""
-    states, read = set(), {eq[site] for site in _drawn(eq)}
+    states, read = set(), {eq[site] for site in _compute_drawn_output(eq)}
     while read:
         new = set().union(*(eq.expand(e).free_symbols for e in read)) & eq.states.keys() - states
         states |= new

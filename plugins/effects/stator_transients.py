@@ -50,7 +50,7 @@ class StatorTransients(Effect):
     def refusal(self, eq):
         if "psi" in eq:
             return "its stator flux moves already"
-        if sites.stator_impedance in eq and "rotor_flux" not in eq and not _orders.moving(eq, _orders.FLUX):
+        if sites.stator_impedance in eq and "rotor_flux" not in eq and not _orders.list_moving_states(eq, _orders.FLUX):
             return "its rotor flux does not move, beside which a stator flux would turn by itself; add rotor_flux first"
         return None
 

@@ -3,7 +3,7 @@
 from tractexp.extend import Effect, Parameter, plugin, sites
 
 from ._operators import gate
-from ._phases import left, phases_of, vector_of
+from ._phases import detect_departure, phases_of, vector_of
 
 SOURCE = "IEEE C37.04, pole discrepancy; Blackburn, Domin 2014, Protective Relaying, section 4.9 (open phases)"
 LEVEL = 0.1  # of the voltage: how far off it is when the event begins
@@ -37,7 +37,7 @@ class StuckPole(Effect):
         import sympy
 
         since = eq.memory("since_event", "t_e")
-        begun = sympy.Max(left(eq, LEVEL), sympy.Min(1, since / eq.step))
+        begun = sympy.Max(detect_departure(eq, LEVEL), sympy.Min(1, since / eq.step))
         eq.renews(since, since + begun * eq.step, 0)
         gone = opened_share * gate(since - opened_after - eq.step, 0.3 * eq.step)
         i = phases_of(eq, eq.expression(sites.current), eq.expression(sites.zero_current))

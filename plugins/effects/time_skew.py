@@ -27,10 +27,10 @@ class TimeSkew(Measurement):
     confused_with = ("stator_resistance", "dc_link_lag", "measurement_window")
 
     def observe(self, power, drive, values):
-        from ._recorder import earlier, moved
+        from ._recorder import delay_response, earlier
 
         if drive.of_waves:
             earlier(power, drive, values["skew"])
         else:
-            moved(power, drive, values["skew"], QUIET)
+            delay_response(power, drive, values["skew"], QUIET)
         return power

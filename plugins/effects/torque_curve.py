@@ -4,7 +4,7 @@ import numpy as np
 
 from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 
-from ._operators import bent, drawn
+from ._operators import bent, evaluate_law
 
 SOURCE = "Milano 2010, ch. 15; WECC composite load model (Etrq)"
 KNOTS, WIDTH = (0.08, 0.2), 0.04  # of 1 - (omega/omega_0)^2: at 96 and 89 % of the speed before
@@ -43,5 +43,5 @@ class TorqueCurve(Effect):
 
     def curve(self, curve_share, torque_bend_1, torque_bend_2):
         speed = np.linspace(0.75, 1.0, 51)
-        y = 1 - curve_share * drawn(lambda x: bent(x, KNOTS, (torque_bend_1, torque_bend_2), WIDTH), 1 - speed**2)
+        y = 1 - curve_share * evaluate_law(lambda x: bent(x, KNOTS, (torque_bend_1, torque_bend_2), WIDTH), 1 - speed**2)
         return Curve(speed, y, "speed over that before", "load torque over that before")

@@ -2,7 +2,7 @@
 
 from tractexp.extend import Effect, Parameter, plugin, sites
 
-from ._relay import opened
+from ._relay import compute_open_share
 from ._trip import relay
 
 SOURCE = "WECC composite load model (Ftr1, Vtr1, Ttr1, Ftr2, Vtr2, Ttr2); NERC 2016, Dynamic Load Modeling, app. A"
@@ -44,8 +44,8 @@ class TwoStageTrip(Effect):
         self, eq, stage_1_tripped, stage_1_level, stage_1_delay, stage_1_wait, stage_1_margin,
         stage_2_tripped, stage_2_level, stage_2_delay, stage_2_wait, stage_2_margin, stage_ramp,
     ):  # fmt: skip
-        first = opened(eq, stage_1_level, stage_1_delay, stage_1_wait, stage_1_margin, stage_ramp, "_1")
-        second = opened(eq, stage_2_level, stage_2_delay, stage_2_wait, stage_2_margin, stage_ramp, "_2")
+        first = compute_open_share(eq, stage_1_level, stage_1_delay, stage_1_wait, stage_1_margin, stage_ramp, "_1")
+        second = compute_open_share(eq, stage_2_level, stage_2_delay, stage_2_wait, stage_2_margin, stage_ramp, "_2")
         gone = stage_1_tripped * first + stage_2_tripped * second
         for site in (sites.current, sites.zero_current) if eq.waves else (sites.P, sites.Q):
             eq.edit(site, lambda drawn: drawn * (1 - gone))

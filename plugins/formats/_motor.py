@@ -6,7 +6,7 @@ SMALLEST = 1e-6  # pu: a resistance of 0 where a format takes that for one that 
 SAME = {"branch": "constant_impedance"}  # what phasors see of a static load
 
 
-def restored(load, motor, law, static):
+def restore_load(load, motor, law, static):
     """The load that a file's numbers give.
 
     `motor` is None, or its circuit (a `TCircuit`), inertia H [s] and load torque [pu]; `law` are the static load's

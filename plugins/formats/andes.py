@@ -10,9 +10,9 @@ import tempfile
 from pathlib import Path
 
 from tractexp.extend import UserError, plugin
-from tractexp.extend.formats import Format, Simulated, TCircuit, dip, held
+from tractexp.extend.formats import Format, Simulated, TCircuit, dip, lock_file
 
-from ._motor import SMALLEST, restored, terms
+from ._motor import SMALLEST, restore_load, terms
 
 SYSTEM = 100.0  # MVA, the system base of ANDES
 STEP = 1e-3  # s
@@ -67,7 +67,7 @@ class Andes(Format):
         for row in tables.get("ZIP", ()):
             law |= {"a_Z": row["kpz"], "a_I": row["kpi"], "b_Z": row["kqz"], "b_I": row["kqi"]}
             law = {name: percent / 100 for name, percent in law.items()}
-        return restored(load, motor, law, static)
+        return restore_load(load, motor, law, static)
 
     def simulated(self, text, load):
         """The response in ANDES, in a process of its own: of this Python, or of the one in TRACTEXP_ANDES_PYTHON."""
@@ -120,7 +120,7 @@ def respond(python, tables, settings):
         program = Path(__file__).with_name("_andes_run.py").read_text(encoding="utf-8")
         try:
             GENERATED.mkdir(exist_ok=True)
-            stack.enter_context(held(GENERATED / "tractexp.lock", LONGEST))
+            stack.enter_context(lock_file(GENERATED / "tractexp.lock", LONGEST))
             command = [python, "-P", "-c", program, target]  # by its text: this module has ANDES's own name
             done = subprocess.run(command, input=case, capture_output=True, text=True, timeout=LONGEST, cwd=folder)
         except (OSError, subprocess.TimeoutExpired) as error:

@@ -5,7 +5,7 @@ from math import pi
 from tractexp.extend import plugin
 from tractexp.extend.formats import Format, TCircuit
 
-from ._motor import law, restored, terms
+from ._motor import law, restore_load, terms
 
 POLE_PAIRS = 2  # of the machine that is written; only inertia and rated speed are said in them
 HEAD = "* written by tractexp; classes and columns as readers of DGS 5 have them\n"
@@ -82,7 +82,7 @@ class PowerFactory(Format):
         own = {}
         for row in tables.get("TypLod", ()):
             own = law(load, [((row[a], row[m]), (row[b], row[n])) for a, b, m, n, _ in TERMS.values()])
-        return restored(load, motor, own, static)
+        return restore_load(load, motor, own, static)
 
     def _machine(self, load):
         P, Q = (load.power * load.before[f"{power}_motor"] for power in "PQ")

@@ -3,7 +3,7 @@
 from tractexp.extend import plugin
 from tractexp.extend.formats import Format, TCircuit
 
-from ._motor import law, restored, terms
+from ._motor import law, restore_load, terms
 
 
 @plugin
@@ -64,7 +64,7 @@ class PsseDyr(Format):
                 static = load.before["P_static"], load.before["Q_static"]  # in the power flow: see the notes
                 pairs = [(c[k] * load.before["U0"] ** c[8 + k], c[8 + k]) for k in range(6)]
                 own = law(load, (pairs[:3], pairs[3:]))
-        return restored(load, motor, own, static)
+        return restore_load(load, motor, own, static)
 
 
 def _record(bus, model, load, *constants):

@@ -18,13 +18,13 @@ def differences(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return x[one] - x[(one + rng.integers(1, n, n)) % n]
 
 
-def varied(best: np.ndarray, better: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarray:
+def draw_varied_points(best: np.ndarray, better: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarray:
     """(k, d) normal numbers about `best` with the covariance of the sparrows `better` (h, d)."""
     spread = (better - better.mean(axis=0)) / np.sqrt(len(better))
     return best + rng.standard_normal((k, len(better))) @ spread
 
 
-def mixed(x: np.ndarray, proposed: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+def mix_coordinates(x: np.ndarray, proposed: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
     """x (n, d) with about a share of its coordinates from `proposed`, at least one of each sparrow."""
     taken = rng.random(x.shape) < share
     taken[np.arange(len(x)), rng.integers(0, x.shape[1], len(x))] = True
@@ -89,8 +89,8 @@ class CovariantSparrow(Iterative):
         new[half:] = leader[half:] + self.factor * way[half:]
         new[:p] = x[:p] + rng.standard_normal((p, 1)) * way[:p]
         watch = rng.permutation(n)[: round(self.perceivers * n)]
-        new[watch] = varied(x[0], x[:half], len(watch), rng)
-        return mixed(x, new, self.mixing, rng)
+        new[watch] = draw_varied_points(x[0], x[:half], len(watch), rng)
+        return mix_coordinates(x, new, self.mixing, rng)
 
     def _collapsed(self, flock: Flock, box: Box) -> bool:
         narrow = (np.ptp(flock.x, axis=0) <= self.collapse * box.width).all()

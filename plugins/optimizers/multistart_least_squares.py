@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from tractexp.extend import REFUSED, Box, Evaluate, Optimizer, check_range, plugin
-from tractexp.extend.search import APART, best_distinct, race
+from tractexp.extend.search import LEAST_START_DISTANCE, best_distinct, race
 
 CLOSER = 10  # scatters drawn ever closer about the least refused point before a search gives up
 
@@ -61,5 +61,5 @@ class MultistartLeastSquares(Optimizer):
             center, width = box.to_unit(x[f.argmin()]), width / 2
         feasible = f < REFUSED
         x, f = x[feasible], f[feasible]
-        chosen = best_distinct(box.to_unit(x), f, APART, self.starts)
+        chosen = best_distinct(box.to_unit(x), f, LEAST_START_DISTANCE, self.starts)
         yield from race(evaluate, box, zip(x[chosen], f[chosen], strict=True), self.tolerance, self.trials)

@@ -1,7 +1,7 @@
 """Records from COMTRADE fault recordings: the dips of one file, numbered in order of time."""
 
 from tractexp.extend import Recording, WaveformReader, plugin
-from tractexp.extend.files import comtrade, kind_of, located
+from tractexp.extend.files import comtrade, kind_of, locate_file
 
 
 @plugin
@@ -28,4 +28,4 @@ class COMTRADE(WaveformReader):
     encoding: str | None = None  # of the .cfg; null: found from its letters among utf-8, gbk, cp1251 and latin-1
 
     def recording(self) -> Recording:
-        return comtrade.load(located(self.path), self.encoding)
+        return comtrade.load(locate_file(self.path), self.encoding)

@@ -15,16 +15,16 @@ from tractexp.extend.files import (
     Powers,
     Sidecar,
     Tabular,
-    beside,
     check_load,
     check_numbers,
     chosen,
-    counted,
+    count_noun,
+    cut_dips,
     estimator_of,
     kind_of,
     level,
-    numbered,
     powers,
+    read_sidecar,
     signs,
 )
 
@@ -94,7 +94,7 @@ class CSV(Tabular, Reader):
     def read(self) -> Events:
         if self.path:  # the dips of one table: the whole of it where there is one
             whole, dips = self._dips()
-            notes = () if dips and dips[0].result is whole else (*whole.notes, counted(len(dips), "dip"))
+            notes = () if dips and dips[0].result is whole else (*whole.notes, count_noun(len(dips), "dip"))
             return chosen(self.path, dips, self.train or None, self.validate, notes)
         first = self._record(str(self.train[0]))
         rest = [self._record(str(path), first.base) for path in (*self.train[1:], *(self.validate or []))]
@@ -106,7 +106,7 @@ class CSV(Tabular, Reader):
     def _dips(self) -> tuple[Record, list[FileDip]]:
         whole = self._record(self.path)
         pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
-        dips = numbered([replace(whole, notes=())], self.path, pre, post)
+        dips = cut_dips([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
             spans = [(dip.start, dip.end) for dip in dips] or [(float(whole.t[0]), float(whole.t[-1]))]
             return whole, [FileDip(1, *spans[0], whole)]
@@ -114,7 +114,7 @@ class CSV(Tabular, Reader):
 
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""
-        sidecar = beside(path)
+        sidecar = read_sidecar(path)
         table, mapping = self.table_of(path, sidecar)
         given = self.base_voltage or (sidecar.base and sidecar.base.voltage)
         declared = sidecar.base.frequency if sidecar.base else table.frequency or self.frequency

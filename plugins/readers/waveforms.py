@@ -1,7 +1,16 @@
 """Records from tables of waveforms: the dips of one file, numbered in order of time."""
 
 from tractexp.extend import Recording, WaveformReader, check_range, plugin
-from tractexp.extend.files import ENDINGS, QUANTITIES, SIZES, Tabular, beside, kind_of, recording, restored
+from tractexp.extend.files import (
+    ENDINGS,
+    QUANTITIES,
+    SIZES,
+    Tabular,
+    kind_of,
+    read_sidecar,
+    recording,
+    restore_recording,
+)
 
 
 @plugin
@@ -32,7 +41,7 @@ class Waveforms(Tabular, WaveformReader):
         self.check_table()
 
     def recording(self) -> Recording:
-        sidecar = beside(self.path)
+        sidecar = read_sidecar(self.path)
         if sidecar.recording is not None:
-            return restored(self.path, sidecar.recording)
+            return restore_recording(self.path, sidecar.recording)
         return recording(*self.table_of(self.path, sidecar), self.frequency)

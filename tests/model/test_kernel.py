@@ -17,7 +17,7 @@ from tractexp.kernel import arrays, emit, listing, math, objects
 from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.kernel import Kernel
-from tractexp.kernel.layout import LANES, WIDTH
+from tractexp.kernel.layout import LANES, VECTOR_LANES
 from tractexp.kernel.lowered import Phase
 from tractexp.kernel.numbers import Numbers
 from tractexp.kernel.stencil import Stencil
@@ -32,7 +32,7 @@ X, Y = sympy.symbols("x y", real=True)
 def computed(expression, x, y=None, width=None):
     """An expression in X and Y as machine code computes it, (n,)."""
     f = Function()
-    n = Numbers(f, width or WIDTH)
+    n = Numbers(f, width or VECTOR_LANES)
     with f.loop(0, "%n", n.width) as i:
         left = f.integer("sub", "%n", i)
         known = {X: n.part(f.at("%x", i), left), Y: n.part(f.at("%y", i), left)}
@@ -291,14 +291,14 @@ def test_a_kernel_of_any_width_gives_the_same_response(drive, motor):
 
 @pytest.mark.parametrize("more", [0, 1])
 def test_an_expression_is_printed_whole_up_to_so_many_nodes(more):
-    terms = sympy.symbols(f"x:{listing.LONG - 1 + more}")
+    terms = sympy.symbols(f"x:{listing.MOST_PRINTED_NODES - 1 + more}")
     none, start = Phase((), (), ()), Phase((), (), (sympy.Add(*terms),))
     lowered = SimpleNamespace(
         start=start, rest=None, constant=none, derivative=none, renewal=none, output=none, starts=["s"], constants=[],
         states=[], memories=[], outputs=[],
     )  # fmt: skip
     _, line = listing.equations(cast(Any, lowered))
-    assert (f"x{listing.LONG - 2}" in line, "terms and more" in line) == (not more, bool(more))
+    assert (f"x{listing.MOST_PRINTED_NODES - 2}" in line, "terms and more" in line) == (not more, bool(more))
 
 
 def test_a_kernel_is_printed_for_people(model):

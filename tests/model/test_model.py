@@ -127,14 +127,14 @@ def test_a_long_simulation_is_done_in_calls_between_which_signals_are_heard(mode
     whole, sums = model.simulate(drive, values, 2), model.errors(drive, values, 2)
     run, calls = model.kernel.run, []
     monkeypatch.setattr(model.kernel, "run", lambda *arrays: (calls.append(arrays[0].shape[2]), run(*arrays)))
-    monkeypatch.setattr("tractexp.model.model.LONGEST", 2 * LANES * 2 * drive.samples + 1)
+    monkeypatch.setattr("tractexp.model.model.MOST_STEPS_A_CALL", 2 * LANES * 2 * drive.samples + 1)
     parts = model.simulate(drive, values, 2)
     assert calls == [2 * LANES, LANES + 5]
     np.testing.assert_array_equal(parts.outputs, whole.outputs)
     np.testing.assert_array_equal(parts.miss, whole.miss)
     np.testing.assert_array_equal(model.errors(drive, values, 2).sums, sums.sums)
     calls.clear()
-    monkeypatch.setattr("tractexp.model.model.LONGEST", 1.0)
+    monkeypatch.setattr("tractexp.model.model.MOST_STEPS_A_CALL", 1.0)
     model.errors(drive, values, 2)
     assert calls == [LANES] * 3 + [5]
 

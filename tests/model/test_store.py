@@ -107,15 +107,15 @@ def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
     assert len({key, *(store.key(*other) for other in others)}) == 5
     (file,) = (folder / "descents").iterdir()
     file.write_bytes(file.read_bytes()[:50])
-    assert store.damaged(folder) == [file]
+    assert store.find_damaged_files(folder) == [file]
     store.DESCENTS.arrays(key, compute)
     assert len(computed) == 2
-    assert store.damaged(folder) == []
+    assert store.find_damaged_files(folder) == []
     earlier = folder / "code_0.kept"  # of a version before 0.2
     earlier.write_bytes(b"")
     for name in ("best.kept", "mine.entry", "descents/mine.entry"):  # of the user, whose folder it may be
         (folder / name).write_bytes(b"mine")
-    assert store.damaged(folder) == [earlier]
+    assert store.find_damaged_files(folder) == [earlier]
 
 
 def test_no_entry_is_unpickled(folder):

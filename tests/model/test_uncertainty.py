@@ -16,7 +16,7 @@ import tractexp
 from tractexp.identification import advice, agreement
 from tractexp.identification.advice import advise
 from tractexp.identification.agreement import compare_events
-from tractexp.identification.profile import checked
+from tractexp.identification.profile import check_by_profiles
 from tractexp.identification.uncertainty import conclude
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, judge
 from tractexp.inference.differences import central_differences
@@ -205,8 +205,8 @@ def test_the_papers_model_has_no_structural_symmetry(deep):
 def test_one_shallow_dip_leaves_c_weak_and_three_dips_identify_it(model):
     """Noise of 1 % throughout; what C trades against is said."""
     truth = study.TYPICAL
-    one = checked(study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty)
-    three = checked(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty)
+    one = check_by_profiles(study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty)
+    three = check_by_profiles(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty)
     assert one.verdicts["C"].word == UNIDENTIFIED  # beyond a crest at 0.75 smaller values fit as well
     assert "trades against" in one.verdicts["C"].detail
     assert "q_v (correlation -0.9" in one.verdicts["C"].detail
@@ -220,7 +220,7 @@ def test_without_static_load_its_exponent_means_nothing(model):
     t, U = study.Shape(0.5).voltage()
     rng = np.random.default_rng(4)
     power = study.printed(truth, t, U, 0.35, P0=truth[4]) + study.noise(rng, len(t), 0.002, 0.0)
-    known = checked(study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty)
+    known = check_by_profiles(study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty)
     assert known.verdicts["p_v"].word == UNIDENTIFIED
     assert known.verdicts["M"].word == IDENTIFIED
 
@@ -304,7 +304,7 @@ def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monk
         return lambda unit, lanes: (sizes.append(len(unit) / len(groups)), rows(unit, lanes))[1]
 
     monkeypatch.setattr(agreement, "only", counted)
-    assert agreement.disagreeing(known) == ([], [])
+    assert agreement.find_disagreeing_events(known) == ([], [])
     assert max(sizes) == known.likelihood.free + 2
 
 
@@ -320,7 +320,7 @@ def test_a_jacobian_takes_as_many_simulations_for_many_events_and_no_more_fits(m
     monkeypatch.setattr(
         agreement, "only", lambda likelihood, groups: (fits.append(groups), only(likelihood, groups))[1]
     )
-    assert agreement.disagreeing(uncertainty) == ([], [])
+    assert agreement.find_disagreeing_events(uncertainty) == ([], [])
     assert [len(groups) for groups in fits] == [1 + 2 * agreement.SUSPECTS]
 
 
@@ -332,9 +332,9 @@ def test_the_events_that_are_fitted_by_themselves_are_those_that_disagree_most(m
     (odd,) = records((0.4,), 0.003, seed=9, truth=changed)
     events = [*records(depths, 0.003), replace(odd, record=replace(odd.record, name="changed"))]
     uncertainty = study.judged(Problem(model, events), study.TYPICAL).uncertainty
-    few = agreement.disagreeing(uncertainty)
+    few = agreement.find_disagreeing_events(uncertainty)
     monkeypatch.setattr(agreement, "SUSPECTS", len(events))
-    assert few == agreement.disagreeing(uncertainty)
+    assert few == agreement.find_disagreeing_events(uncertainty)
     assert few[0] == ["changed"]
 
 

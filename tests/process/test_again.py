@@ -9,7 +9,7 @@ import yaml
 from command_line import run_command
 
 import tractexp.data
-from tractexp.cli.again import repeated
+from tractexp.cli.again import merge_settings
 
 TOLD = ["data=comtrade", "data.path=x.cfg", "data.train=[1]", "model=static_zip", "++model.bounds.a_Z=[0,1]", "seed=3",
         "optimizer=pso", "optimizer.population=9", "domain=waves"]  # fmt: skip
@@ -33,7 +33,7 @@ RECORDS = TOLD[:3]
 )  # fmt: skip
 def test_settings_stay_but_for_what_is_chosen_anew_or_not_read(settings, expected, tmp_path):
     result = [text.format(result=tmp_path / "result.json") for text in expected]
-    assert repeated(TOLD, settings, tmp_path) == result
+    assert merge_settings(TOLD, settings, tmp_path) == result
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ import yaml
 
 import tractexp
 import tractexp.data
-from tractexp.cli.again import again
+from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
 
 if os.name == "nt":
@@ -124,9 +124,9 @@ def kept(folder: Path) -> Path:
 
 def waiting(folder: Path) -> object:
     from tractexp.tracking import runfile
-    from tractexp.tracking.sync import _within, waiting
+    from tractexp.tracking.sync import _within, count_unsynced
 
-    waiting(folder)
+    count_unsynced(folder)
     one = runfile.read(folder)
     return one and _within(one.run, folder, lambda line: None)
 
@@ -166,8 +166,8 @@ def looked(folder: Path) -> object:
 
 
 DOORS = [  # the file, the folder that holds it as it should be, and what reads it
-    (".hydra/hydra.yaml", run_of, lambda folder: again([str(folder)])),
-    (".hydra/overrides.yaml", run_of, lambda folder: again([str(folder)])),
+    (".hydra/hydra.yaml", run_of, lambda folder: build_repeat_command([str(folder)])),
+    (".hydra/overrides.yaml", run_of, lambda folder: build_repeat_command([str(folder)])),
     (".hydra/config.yaml", run_of, compared),
     (".hydra/hydra.yaml", run_of, compared),
     ("result.json", run_of, compared),

@@ -18,7 +18,7 @@ from tractexp.api.identify import Identification
 from tractexp.errors import UserError
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Identified
-from tractexp.exchange.playback import played
+from tractexp.exchange.playback import play_back_export
 from tractexp.model.drive import Drive, Excitation
 from tractexp.plugin import build, discover
 
@@ -330,7 +330,7 @@ PLAYED = [
 def test_an_export_played_back_by_its_own_numbers_follows_the_fit(name, motor, static, effects, monkeypatch):
     form, load = build("format", {"name": name}), identified(motor, static, effects, power=47.0, ratio=0.7)
     monkeypatch.setattr(type(form), "simulated", lambda *_: None)
-    agreement, notes = played(form, form.text(load), load)
+    agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == []
     assert agreement.moved[0] > 0.15
     assert agreement.share < 1e-6
@@ -346,14 +346,14 @@ def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(name, rig
     monkeypatch.setattr(type(form), "simulated", lambda *_: None)
     text = form.text(load)
     assert right in text
-    assert played(form, text.replace(right, wrong, 1), load)[0].share > 0.01
+    assert play_back_export(form, text.replace(right, wrong, 1), load)[0].share > 0.01
 
 
 def test_what_a_format_leaves_out_is_in_the_agreement(monkeypatch):
     """The stator's transients, which the machines of ANDES lack."""
     form, load = build("format", {"name": "andes"}), identified("stator_flux")
     monkeypatch.setattr(type(form), "simulated", lambda *_: None)
-    assert played(form, form.text(load), load)[0].share > 1e-4
+    assert play_back_export(form, form.text(load), load)[0].share > 1e-4
 
 
 def test_an_export_says_its_load_base_powers_and_agreement(tmp_path):
@@ -377,7 +377,7 @@ def test_an_export_says_its_load_base_powers_and_agreement(tmp_path):
 def test_a_file_of_a_load_without_a_steady_state_is_no_refusal_but_said(monkeypatch):
     form, load = build("format", {"name": "powerfactory"}), identified()
     text = form.text(load).replace(";AS;55", ";AS;955")
-    agreement, notes = played(form, text, load)
+    agreement, notes = play_back_export(form, text, load)
     assert agreement is None
     assert notes[0].startswith("not played back: no steady state")
 
@@ -389,7 +389,7 @@ def test_where_the_simulator_fails_ours_plays_the_file_back_and_it_is_said(monke
         raise UserError("not played back in ANDES: it said nothing")
 
     monkeypatch.setattr(type(form), "simulated", fails)
-    agreement, notes = played(form, form.text(load), load)
+    agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == ["not played back in ANDES: it said nothing"]
     assert agreement.by.startswith("our own simulator")
 
@@ -421,7 +421,7 @@ def test_an_export_to_andes_is_played_back_there():
     """At another voltage, power and bus number than ANDES's own."""
     load = identified(effects=("stator_resistance",), bus=12, power=30.0, voltage=27.5)
     form = build("format", {"name": "andes"})
-    agreement, notes = played(form, form.text(load), load)
+    agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == []
     assert agreement.by.startswith("ANDES ")
     assert agreement.moved[0] > 0.15

@@ -65,7 +65,7 @@ def test_thinning_keeps_a_dip_of_one_sample_and_the_gap_beside_it():
     y = np.sin(x / 9000)
     y[31_234], y[40_000:40_500] = -7.0, np.nan
     shown_x, shown_y = style.thin(x, y)
-    assert len(shown_x) <= 1.01 * style.POINTS + 2
+    assert len(shown_x) <= 1.01 * style.MOST_POINTS_A_LINE + 2
     assert shown_y[shown_x == 31_234] == -7.0
     assert np.isnan(shown_y[(shown_x >= 40_000) & (shown_x < 40_500)]).all()
     assert np.isnan(shown_y).any()

@@ -151,13 +151,13 @@ with files.held(Path(sys.argv[1]), 1):
     holder = subprocess.Popen([sys.executable, "-c", script, str(tmp_path / "lock")], stdout=-1, text=True)
     try:
         assert holder.stdout.readline() == "held\n"
-        with pytest.raises(TimeoutError, match=r"another process has held .*lock"), files.held(tmp_path / "lock", 0.2):
+        with pytest.raises(TimeoutError, match=r"another process has held .*lock"), files.lock_file(tmp_path / "lock", 0.2):
             pass
     finally:
         holder.kill()
         holder.communicate()
     started = time.monotonic()
-    with files.held(tmp_path / "lock", 5):
+    with files.lock_file(tmp_path / "lock", 5):
         assert time.monotonic() - started < 1  # one that dies lets go of it
 
 

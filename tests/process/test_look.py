@@ -18,7 +18,7 @@ import tractexp.progress
 from tractexp.blocks import style
 from tractexp.errors import UserError
 from tractexp.filetypes.comtrade_writer import write
-from tractexp.overrides import assigned, override
+from tractexp.overrides import format_assignment, override
 from tractexp.recording import StatusChannel
 from tractexp.recording.quality import spectrum
 from tractexp.recording.trace import half_cycle_rms
@@ -378,7 +378,7 @@ def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(station, 
 def test_a_name_in_a_command_is_read_back(name):
     from hydra.core.override_parser.overrides_parser import OverridesParser
 
-    told = override(assigned("data.train", [name, "other.csv"]))
+    told = override(format_assignment("data.train", [name, "other.csv"]))
     assert OverridesParser.create().parse_override(told).value() == [name, "other.csv"]
 
 

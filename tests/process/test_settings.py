@@ -7,7 +7,7 @@ from command_line import run_command, start_command
 
 from tractexp.api.task import Task
 from tractexp.choices import CONF
-from tractexp.cli.chosen import given, refuse_unread
+from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
 from tractexp.config import register
 from tractexp.errors import UserError
 from tractexp.plugin import build, discover
@@ -30,7 +30,7 @@ def check(*overrides):
     from omegaconf import OmegaConf
 
     config = compose("config", list(overrides), return_hydra_config=True)
-    chosen = given(overrides, config.hydra.runtime.choices)
+    chosen = collect_chosen_settings(overrides, config.hydra.runtime.choices)
     task = build("task", OmegaConf.to_container(config.task))
     refuse_unread(task, chosen, task.needless())
     return config

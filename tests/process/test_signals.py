@@ -14,7 +14,7 @@ import pytest
 import sympy  # noqa: F401
 from command_line import run_command
 
-from tractexp.__main__ import terminated
+from tractexp.__main__ import end_on_signal
 
 if os.name == "nt":
     pytest.skip("ends a run by a signal", allow_module_level=True)
@@ -48,7 +48,7 @@ class Sender:
         self.thread.start()
 
     def _run(self) -> None:
-        while signal.getsignal(signal.SIGTERM) is not terminated:  # it would end the tests
+        while signal.getsignal(signal.SIGTERM) is not end_on_signal:  # it would end the tests
             time.sleep(0.01)
             if self.over:
                 return

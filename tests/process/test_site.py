@@ -11,7 +11,7 @@ from site_pages import api, catalogue, commands, criteria, markdown, tasks
 from tractexp import PUBLIC
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.extend import Effect, Parameter
-from tractexp.model.printed import changed
+from tractexp.model.printed import list_changed_lines
 from tractexp.plugin import discover, get
 
 ROOT = Path(__file__).parents[2]
@@ -106,7 +106,7 @@ def test_the_symbols_of_all_equations_have_one_index_and_one_exponent():
 
 def test_changed_equations_are_those_that_differ_or_came_in():
     before, after = ["a = 1", "b = 2", "a|_0 = 1"], ["a = 1", "b = 3", "c = 4", "a|_0 = 2"]
-    assert changed(before, after) == [("b = 2", "b = 3"), (None, "c = 4")]
+    assert list_changed_lines(before, after) == [("b = 2", "b = 3"), (None, "c = 4")]
 
 
 def test_every_task_has_a_page_with_its_settings_and_the_commands_that_pages_show(tmp_path):

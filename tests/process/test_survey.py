@@ -191,7 +191,7 @@ def test_a_mistake_of_ours_is_a_row_and_no_end(field, monkeypatch):
     def fails(path):
         raise ZeroDivisionError("of nothing")
 
-    monkeypatch.setattr(archive, "looked", fails)
+    monkeypatch.setattr(archive, "look_at_file", fails)
     (row,) = surveying.rows_of(str(field), "quiet.cfg")
     assert row["kind"] == "not read"
     assert "ZeroDivisionError: of nothing" in row["why"]

@@ -505,9 +505,9 @@ def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(error, sends,
     from tractexp.sweep import parent
 
     run, closed, sent = tracking.TrackedRun("experiment", "sweep", {}), [], []
-    monkeypatch.setattr(parent, "_described", lambda *_: run)
-    monkeypatch.setattr(parent, "_opened", lambda *_: "id")
-    monkeypatch.setattr(parent, "_closed", lambda folder, run, *_: closed.append(run.status))
+    monkeypatch.setattr(parent, "_describe_sweep", lambda *_: run)
+    monkeypatch.setattr(parent, "_open_parent_run", lambda *_: "id")
+    monkeypatch.setattr(parent, "_close_parent_run", lambda folder, run, *_: closed.append(run.status))
     monkeypatch.setattr(parent, "_send", lambda *_: sent.append(closed[-1]))
     jobs = [SimpleNamespace(config={"tracking": {"enabled": True, "uri": "sqlite:///x.db"}}, folder=tmp_path / "0")]
     with contextlib.suppress(RuntimeError, KeyboardInterrupt), parent.parent_run(tmp_path, jobs, [], afresh=False):

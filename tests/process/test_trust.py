@@ -12,7 +12,7 @@ import yaml
 from command_line import free_port, run_command
 
 import tractexp.data
-from tractexp.cli.again import again
+from tractexp.cli.again import build_repeat_command
 from tractexp.errors import UserError
 from tractexp.tracking import TrackedRun
 from tractexp.tracking.runfile import FILE, save
@@ -104,24 +104,24 @@ def test_what_the_folder_of_a_run_may_not_say_is_refused_by_its_name(setting, tm
 def test_what_is_refused_may_be_said_by_the_user(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = given(tmp_path / "given", "optimizer=pso", "tracking.uri=http://1.2.3.4")
-    assert again([str(folder), "tracking.uri=null"]) == ["optimizer=pso", "tracking.uri=null"]
+    assert build_repeat_command([str(folder), "tracking.uri=null"]) == ["optimizer=pso", "tracking.uri=null"]
 
 
 def test_configurations_of_others_are_looked_for_where_the_user_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = given(tmp_path / "given", "optimizer=pso", searched="/theirs")
     with pytest.raises(UserError, match="used configurations in /theirs, which only you can name"):
-        again([str(folder)])
-    assert again([str(folder), "--config-dir", "mine"]) == ["--config-dir", str(tmp_path / "mine"), "optimizer=pso"]
+        build_repeat_command([str(folder)])
+    assert build_repeat_command([str(folder), "--config-dir", "mine"]) == ["--config-dir", str(tmp_path / "mine"), "optimizer=pso"]
 
 
 def test_a_run_is_repeated_above_its_folder_or_here_and_nowhere_else(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "elsewhere").mkdir()
-    again([str(given(tmp_path / "given", "seed=1", cwd=str(tmp_path / "elsewhere")))])
+    build_repeat_command([str(given(tmp_path / "given", "seed=1", cwd=str(tmp_path / "elsewhere")))])
     assert Path.cwd() == tmp_path
     (tmp_path / "place").mkdir()
-    again([str(given(tmp_path / "place" / "runs" / "own", "seed=1", cwd=str(tmp_path / "place")))])
+    build_repeat_command([str(given(tmp_path / "place" / "runs" / "own", "seed=1", cwd=str(tmp_path / "place")))])
     assert Path.cwd() == tmp_path / "place"
 
 
@@ -129,7 +129,7 @@ def test_a_job_of_a_sweep_is_repeated_too(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = given(tmp_path / "sweep" / "0", "seed=2", cwd=str(tmp_path))
     (folder / ".hydra" / "hydra.yaml").write_text(yaml.safe_dump({"hydra": {"runtime": {"cwd": str(tmp_path)}}}))
-    assert again([str(folder)]) == ["seed=2"]
+    assert build_repeat_command([str(folder)]) == ["seed=2"]
 
 
 def test_a_second_sweep_in_a_folder_says_who_holds_it(tmp_path):
@@ -175,7 +175,7 @@ def test_a_damaged_configuration_is_a_sentence_and_takes_no_time(content, senten
     else:
         path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(UserError, match=sentence):
-        again([str(folder)])
+        build_repeat_command([str(folder)])
 
 
 # Runs that are brought into a store

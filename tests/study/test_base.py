@@ -16,7 +16,7 @@ from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
 from tractexp.provenance import digest
 from tractexp.record import Base, OwnBase, WaveEvent, detect, in_waves, on_own_base
-from tractexp.record.own_base import rebased
+from tractexp.record.own_base import convert_base
 from tractexp.tracking.model import Predictor
 
 QUICK = {"name": "multistart_least_squares", "starts": 2}
@@ -122,7 +122,7 @@ def test_records_of_other_megavolt_amperes_are_put_on_that_of_the_first(records)
 def test_harmonics_go_with_power_and_distortion_stays(records):
     more = {"P_3": 0.2 * records[0].P, "THD_u": 0.03 + 0 * records[0].P}
     event = detect(dataclasses.replace(scaled(records[0], 4.0), more=more))
-    made = rebased(event, 2.0, OwnBase(2.0)).record
+    made = convert_base(event, 2.0, OwnBase(2.0)).record
     assert np.array_equal(made.more["P_3"], more["P_3"] / 2)
     assert np.array_equal(made.more["THD_u"], more["THD_u"])
 
@@ -245,7 +245,7 @@ def test_a_plan_takes_the_values_of_an_identification_in_its_base(records, fits,
 
 def test_waveforms_are_rebased_with_their_record(tmp_path):
     event = in_waves(tractexp.read(table(tmp_path / "waves.csv", columns(constant())))[0])
-    made = rebased(event, 2.0, OwnBase(2.0))
+    made = convert_base(event, 2.0, OwnBase(2.0))
     assert isinstance(made, WaveEvent)
     assert np.allclose(made.currents, event.currents / 2, rtol=1e-9, equal_nan=True)
     assert made.peaks[1] == pytest.approx(2 * event.peaks[1])

@@ -18,7 +18,7 @@ from tractexp.studies.comparison import claims, floor, load
 from tractexp.studies.comparison.comparison import compare
 from tractexp.studies.comparison.floor import Floor, floor_of, polish
 from tractexp.studies.comparison.runs import PROBLEM, REST, SETTINGS, SearchRun, gather
-from tractexp.studies.comparison.runs import on as on_data
+from tractexp.studies.comparison.runs import select_runs_on as on_data
 from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, running_time, runtimes, summarize
 
 FLOOR = 8.1e-6

@@ -22,10 +22,10 @@ from tractexp.discrepancy import explanations
 from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.decide import holds
-from tractexp.discrepancy.disagreement import disagreement, examined
+from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.discrepancy.discrepancy_json import content, recommendation, write_left, write_model
-from tractexp.discrepancy.explanations import beneath, searched, without_needless
-from tractexp.discrepancy.held_out import assess, carried, closes_enough, compare_on
+from tractexp.discrepancy.explanations import beneath, search_effect_sets, without_needless
+from tractexp.discrepancy.held_out import assess, carry_fits, closes_enough, compare_on
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.judgement import judgements
 from tractexp.errors import UserError
@@ -35,7 +35,7 @@ from tractexp.inference.catalogue import catalogue
 from tractexp.inference.chance import BLURRED, scales
 from tractexp.inference.context import Context
 from tractexp.inference.effort import Effort
-from tractexp.inference.fit_effort import TOGETHER
+from tractexp.inference.fit_effort import FITS_AT_ONCE
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.goodness_of_fit import GoodnessOfFit, Scale, tail
 from tractexp.inference.injection import PUSHES
@@ -52,7 +52,7 @@ from tractexp.noise import Noise as PowerNoise
 from tractexp.noise.quiet import estimate
 from tractexp.noise.random_walk import Load, RandomWalk, Rest
 from tractexp.noise.random_walk import find as wandering
-from tractexp.noise.voltage import smoothed
+from tractexp.noise.voltage import smooth_voltage
 from tractexp.plugin import get
 from tractexp.record import Record, detect
 
@@ -121,7 +121,7 @@ def test_descents_on_several_cores_say_how_many_have_ended(monkeypatch):
     counted = []
     fit = base_fit(bench(base(), events(noise=LOUD)))
     monkeypatch.setattr(fit.context.effort, "parts", parts)
-    starts = [((name,), fit.fit.unit) for name in FEW] * TOGETHER
+    starts = [((name,), fit.fit.unit) for name in FEW] * FITS_AT_ONCE
     monkeypatch.setattr(store.DESCENTS, "read", lambda key: None)  # what was fitted before is read back at once
     refit(fit.context, fit.noise, starts)
     assert counted == [3, "ended", "ended", "ended"]
@@ -243,7 +243,7 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
 
 def test_an_identification_asks_for_more_before_it_says_that_a_load_wanders():
     rng = np.random.default_rng(9)
-    seen = lambda before: wandering(before, 0.002, steady(250), seen=observed.SEEN) is not None  # noqa: E731
+    seen = lambda before: wandering(before, 0.002, steady(250), seen=observed.LEAST_WANDERING) is not None  # noqa: E731
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
     walk = lambda: [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]  # noqa: E731
     assert sum(seen(calm()) for _ in range(150)) <= 3  # 0.3 %; of an investigation 6 %
@@ -372,10 +372,10 @@ def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
 
 def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
     clean, noisy = (events(noise=Noise(0.002, voltage=v), count=1)[0] for v in (0.0, 0.002))
-    untouched = smoothed(clean)
+    untouched = smooth_voltage(clean)
     assert untouched.event is clean
     assert not len(untouched.errors)
-    made = smoothed(noisy)
+    made = smooth_voltage(noisy)
     off = made.event.record.U - clean.record.U
     quiet = slice(0, clean.start - 20)
     assert off[quiet].std() < 0.3 * (noisy.record.U - clean.record.U)[quiet].std()
@@ -389,7 +389,7 @@ def test_smoothing_stops_beside_an_edge(monkeypatch):
 
     def as_recorded():
         """How many samples are left as recorded in all but one event of twenty."""
-        made = [smoothed(_event(time, U + rng.normal(0, 0.005, 1000))).errors for _ in range(60)]
+        made = [smooth_voltage(_event(time, U + rng.normal(0, 0.005, 1000))).errors for _ in range(60)]
         return np.quantile([(np.count_nonzero(errors, axis=1) == 1).sum() for errors in made], 0.95)
 
     assert as_recorded() < 200
@@ -408,7 +408,7 @@ def test_what_smoothing_leaves_of_the_voltages_noise_is_as_large_as_said():
     sizes, outside = [], []
     for _ in range(30):
         U = clean.record.U + 0.002 * rng.standard_normal(clean.record.samples)
-        made = smoothed(replace(clean, record=replace(clean.record, U=U)))
+        made = smooth_voltage(replace(clean, record=replace(clean.record, U=U)))
         off = made.event.record.U - clean.record.U
         _, values, basis = np.linalg.svd(made.errors, full_matrices=False)
         along = basis @ off
@@ -625,7 +625,7 @@ def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():
     stalls.unit[at.column["T_m"]] = stalls.unit[at.column["C"]] = 1.0
     stalls.unit[at.parameters(stalls.names)] = 1.0
     held = events(count=3)[2:]
-    other, units, noise = carried(made, held, [runs, stalls])
+    other, units, noise = carry_fits(made, held, [runs, stalls])
     assert not np.isfinite(other.residuals(units[1][None], stalls.names)).any()
     assert np.isfinite(noise.levels).all()
     judged = compare_on(made, held, runs, [runs, stalls])
@@ -668,7 +668,7 @@ def test_an_effect_is_looked_for_from_all_over_the_base_model_s_box(monkeypatch)
     assert single.deviance < first.fit.deviance - 1000
     assert found.names == ("shunt_capacitor",)
     monkeypatch.setattr(explanations, "in_the_box", lambda context, fit: [(fit.names, fit.unit)])
-    from_base = searched([first], {(): first.fit}, 1, lambda line: None)
+    from_base = search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
     assert min(f.deviance for f in from_base if f.names == ("shunt_capacitor",)) > first.fit.deviance - 1
 
 
@@ -697,7 +697,7 @@ def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
     (name,), first = planted.names, planted.first
     other = next(n for n in FEW if n != name)
     pair = refit(planted.context, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[0]
-    tests = examined(planted.base.quiet, pair, first.noise, 0)
+    tests = examine_fit(planted.base.quiet, pair, first.noise, 0)
     astray = replace(planted.explanations.refits[name,], deviance=first.fit.deviance)
     refits = {**planted.explanations.refits, (name,): astray}
     fewer = without_needless(planted.base, tests, refits, 0)

@@ -18,9 +18,15 @@ from tractexp.discrepancy.investigate import investigate
 from tractexp.inference.model_error import in_percent
 from tractexp.record.identity import Identity
 from tractexp.report import candidates, discrepancy, overlay
-from tractexp.report.candidate_rows import CHOSEN, beside, chance_level, list_candidates, why_not_the_most_helpful
-from tractexp.report.events import WITHIN
-from tractexp.wording import joined
+from tractexp.report.candidate_rows import (
+    CHOSEN,
+    chance_level,
+    describe_untestable_beside,
+    list_candidates,
+    why_not_the_most_helpful,
+)
+from tractexp.report.events import BAND_DEVIATIONS
+from tractexp.wording import join_words
 
 
 @pytest.fixture
@@ -93,7 +99,7 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
 def test_the_noise_band_holds_what_the_extended_model_leaves(named):
     shown = named.overlays[0]
     off = (shown.measured - shown.after) / shown.deviation
-    assert 0.93 < np.mean(np.abs(off) < WITHIN) < 0.98
+    assert 0.93 < np.mean(np.abs(off) < BAND_DEVIATIONS) < 0.98
     assert [o.held_out for o in named.overlays] == [False, False, True]
 
 
@@ -106,7 +112,7 @@ def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
     assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
     assert "2 more events, fitted" in words
     text = path.read_text(encoding="utf-8")
-    assert text.index("<details>") > [m.start() for m in re.finditer('class="chart"', text)][overlay.SHOWN - 1]
+    assert text.index("<details>") > [m.start() for m in re.finditer('class="chart"', text)][overlay.MOST_OPEN_OVERLAYS - 1]
 
 
 def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
@@ -125,7 +131,7 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
     assert bars["marker"]["color"][0] == candidates.COLORS[CHOSEN]
     assert charts[-1]["layout"]["shapes"][0]["x0"] == chance_level(named)
-    assert beside(named) in words
+    assert describe_untestable_beside(named) in words
 
 
 def promising(named, score):
@@ -234,7 +240,7 @@ def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path
     assert re.search(
         rf"the nearest, miss(es)? {after} of the response there, where the base model misses {before}", reason
     )
-    assert joined(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
+    assert join_words(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
     told = content(unexplained)["nearest"]["parameters"]
     assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
     words, _ = page(unexplained, tmp_path)

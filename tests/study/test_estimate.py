@@ -12,7 +12,7 @@ import tractexp
 from tractexp.blocks import Table
 from tractexp.identification import adequacy
 from tractexp.identification.adequacy import Grade, Surprise, grade_errors
-from tractexp.identification.estimate import estimate, polished
+from tractexp.identification.estimate import estimate, estimate_without_search
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.model_error import ModelError
@@ -20,7 +20,7 @@ from tractexp.inference.multistart import distinct
 from tractexp.inference.observed import Observed
 from tractexp.inference.problem import Problem
 from tractexp.noise import Noise
-from tractexp.report.identify import ended
+from tractexp.report.identify import tabulate_search_end
 
 TRUTH = study.TYPICAL
 
@@ -101,14 +101,14 @@ def test_result_and_page_hold_correlations_and_the_number_of_samples(fit, tmp_pa
 
 
 def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_where_they_differ(fit):
-    table = ended(fit)
+    table = tabulate_search_end(fit)
     by_name = {row[0]: row for row in table.rows}
     assert by_name["objective"][1:3] == [fit.result.search["objective"], fit.result.objective]
     assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.astray}
     far = replace(fit.result, search=fit.result.search | {"objective": 2 * fit.result.objective, "parameters": {
         **fit.result.search["parameters"], "T_m": 10.0}})  # fmt: skip
     away = replace(fit, result=far, behind=fit.behind)
-    assert {row[0] for row in ended(away).rows if row[4]} >= {"T_m"}
+    assert {row[0] for row in tabulate_search_end(away).rows if row[4]} >= {"T_m"}
     assert "T_m" in away.end_of_search
     assert "it stopped short of the minimum, at 2 times its objective" in away.end_of_search
 
@@ -164,7 +164,7 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
             study.event(t, U, study.printed(truth, t, U, 0.35) + study.noise(rng, len(t), 0.002, 0.0), name)
             for truth, name in ((TRUTH, "first"), (second, "second"))
         ]
-        pushed.append(polished(Problem(study.model(), events)).surprise)
+        pushed.append(estimate_without_search(Problem(study.model(), events)).surprise)
     assert (pushed[0].loudest, pushed[0].p < 1e-6) == (adequacy.PER_EVENT, True)
     assert pushed[1].p > adequacy.ADEQUATE_P
 
@@ -173,13 +173,13 @@ def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
     known, judged = fit.details.uncertainty, []
     monkeypatch.setattr(adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0)
     adequacy.surprise(Observed.of(known.likelihood.problem), known.likelihood, known.unit)
-    assert {*judged} == {(adequacy.DRAWS, 1)}
+    assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
 
 def test_p_of_noise_alone_is_no_smaller_than_it_says():
     """60 judgements of noise drawn anew: one in ten below 0.1, give or take."""
     observed = Observed.of(Problem(study.model(), [recorded()]))
-    known = polished(observed.problem).uncertainty
+    known = estimate_without_search(observed.problem).uncertainty
     clean = known.likelihood.residuals(known.unit[None])[0] + observed.drive.measured
     rng, p = np.random.default_rng(2), []
     for _ in range(60):
@@ -224,7 +224,7 @@ def test_correlated_noise_of_p_and_q_is_seen_and_used():
     common = 0.004 * rng.standard_normal(len(t))
     power = study.printed(TRUTH, t, U, 0.35) + common * np.array([[1.0], [0.8]])
     power += 0.0005 * rng.standard_normal(power.shape)
-    known = polished(Problem(study.model(), [study.event(t, U, power)])).uncertainty
+    known = estimate_without_search(Problem(study.model(), [study.event(t, U, power)])).uncertainty
     assert known.noise[0]["between_P_and_Q"] > 0.95
     apart = Likelihood.of(known.likelihood.problem, Noise.white(0.004, 0.0032))
     J = dense(apart.jacobian(known.unit)[1])
@@ -238,7 +238,7 @@ def test_noise_of_the_voltage_widens_the_intervals():
     rng = np.random.default_rng(8)
     noisy = clean.record.U + 0.003 * rng.standard_normal(clean.record.samples)
     spoiled = study.event(clean.record.t, noisy, np.array([clean.record.P, clean.record.Q]))
-    quiet, loud = (polished(Problem(study.model(), [e])).uncertainty for e in (clean, spoiled))
+    quiet, loud = (estimate_without_search(Problem(study.model(), [e])).uncertainty for e in (clean, spoiled))
     assert quiet.noise[0]["of_the_voltage"] == 0.0
     assert loud.noise[0]["of_the_voltage"] > 0.5
     assert (loud.half > quiet.half).all()
@@ -256,7 +256,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
     from tractexp.identification import estimate as module
 
     problem = Problem(study.model(), [recorded(seed=77)])
-    whole = polished(problem).uncertainty
+    whole = estimate_without_search(problem).uncertainty
 
     def one_bad_start(likelihood, points):
         from tractexp.inference.least_squares import descend
@@ -264,7 +264,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
         bad = likelihood.to_unit(TRUTH * np.array([1, 0.4, 0.45, 1, 1, 1, 0.5]))
         return descend(likelihood.rows, bad, np.ones_like(bad, dtype=bool))
 
-    monkeypatch.setattr(module, "explored", one_bad_start)
+    monkeypatch.setattr(module, "explore_minima", one_bad_start)
     monkeypatch.setattr(module, "along_least_certain", lambda likelihood, unit: unit[None])
     monkeypatch.setattr(module, "_remembered", type(module._remembered)())
     found = estimate(problem, TRUTH)
@@ -274,7 +274,7 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
 
 def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squares():
     """Had least squares left half as much, the likelihood would give up far more of Eq. (8) than it does on draws."""
-    fit = polished(Problem(study.model(), [recorded()]))
+    fit = estimate_without_search(Problem(study.model(), [recorded()]))
     known, likelihood = fit.uncertainty, fit.uncertainty.of_noise
     squares = Likelihood.of_squares(likelihood.problem, 0.004)
     rows = squares.with_initial_power.rows(known.unit[None])[0]

@@ -27,7 +27,7 @@ from tractexp.extend import Effect, Parameter, plugin
 from tractexp.inference import fit_effort, fitting
 from tractexp.inference.catalogue import catalogue
 from tractexp.inference.effort import Effort
-from tractexp.inference.fitting import Refit, scattered
+from tractexp.inference.fitting import Refit, scatter_starts
 from tractexp.inference.injection import PUSHES
 from tractexp.inference.kernels import Family, Kernels
 from tractexp.inference.linearization import tangent
@@ -163,7 +163,7 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     member = fit(better, 4, "saturation_curve")
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
-    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
+    monkeypatch.setattr(families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
     tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == [member]
@@ -188,7 +188,7 @@ def test_a_member_that_leaves_nothing_is_taken_where_a_textbook_effect_that_fits
     told = SimpleNamespace(fit=refits["magnetic_saturation",], noise=None, suffices=textbook_suffices)
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
-    monkeypatch.setattr(families, "examined", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=member_suffices))
+    monkeypatch.setattr(families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=member_suffices))
     tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == ([member] if named or textbook_suffices else [])
@@ -207,7 +207,7 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     monkeypatch.setattr(
         rival_sets, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
     )
-    monkeypatch.setattr(rival_sets, "examined", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0))
+    monkeypatch.setattr(rival_sets, "examine_fit", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0))
     last = SimpleNamespace(fit=chosen, noise=None, p_left=1.0)
     explained = SimpleNamespace(
         base=SimpleNamespace(context=at, quiet=None), last=last, chosen=chosen, faults=(),
@@ -345,7 +345,7 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
         turns.append(len(wanted))
         return [Refit(names, unit, ways[names[0]][len(turns) - 1], 0) for names, unit in wanted]
 
-    monkeypatch.setattr(fitting, "_descended", descended)
+    monkeypatch.setattr(fitting, "_run_descents", descended)
     monkeypatch.setattr(fitting, "_begun", descended)
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
     ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
@@ -461,7 +461,7 @@ def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
 def test_what_is_scattered_moves_all_times_and_no_size():
     at, refits = two_stages(0.2)
     ((names, unit), *_) = starts(at, at.catalogue["two_stage_trip"], refits)
-    points = np.array([point for _, point in scattered(at, Refit(names, unit, 0.0, 11))])
+    points = np.array([point for _, point in scatter_starts(at, Refit(names, unit, 0.0, 11))])
     moved = np.abs(points - unit)
     settings = at.coordinates.settings(names)
     still = np.setdiff1d(np.arange(len(unit)), settings)

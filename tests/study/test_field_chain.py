@@ -12,7 +12,7 @@ from tractexp.api.compose import model_of
 from tractexp.filetypes import comtrade
 from tractexp.identification.result import respond
 from tractexp.inference.problem import Problem
-from tractexp.record.window import average, sharpened
+from tractexp.record.window import average, sharpen_voltage
 
 DATA = Path(tractexp.__file__).parent / "data"
 NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")
@@ -34,7 +34,7 @@ def test_a_model_is_looked_at_through_the_window_where_it_follows_what_happens_w
 def test_the_voltage_reckoned_back_has_the_recorded_average():
     [event] = tractexp.read("tibet_50pct_comtrade", estimator="p_class")
     weights = event.record.window.on(event.record.step)
-    back = sharpened(event, weights, event.record.window.length).record.U
+    back = sharpen_voltage(event, weights, event.record.window.length).record.U
     inside = slice(len(weights), -len(weights))
     assert np.abs(average(back, weights) - event.record.U)[inside].max() < 5e-3
     assert np.abs(back - event.record.U).max() > 0.01

@@ -12,7 +12,7 @@ from scipy import stats
 import tractexp
 from tractexp.identification.result import Fit
 from tractexp.inference.model_error import ModelError, block_sums, in_percent, model_error, noise_variance
-from tractexp.noise.random_walk import SLOW
+from tractexp.noise.random_walk import WANDERING_COSINES
 
 
 @functools.cache
@@ -145,7 +145,7 @@ def test_an_error_depends_on_no_base_and_comes_back_as_it_was_stored():
 
 def test_too_few_samples_before_a_dip_show_no_noise():
     event = played(noise=4e-3).event
-    shorter = [replace(event, steady=slice(0, n)) for n in (4 * SLOW, 4 * SLOW + 1)]
+    shorter = [replace(event, steady=slice(0, n)) for n in (4 * WANDERING_COSINES, 4 * WANDERING_COSINES + 1)]
     assert noise_variance(shorter[0]) == 0.0 < noise_variance(shorter[1])
 
 

@@ -23,9 +23,16 @@ from tractexp.discrepancy.discrepancy_json import content
 from tractexp.discrepancy.investigate import investigate
 from tractexp.discrepancy.next_event import rivals
 from tractexp.discrepancy.next_event.choose import DECIDED, next_event
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, imagine_dips
 from tractexp.discrepancy.next_event.same import same
-from tractexp.discrepancy.next_event.separation import Chances, EventView, Separation, _reduced, seen, sided
+from tractexp.discrepancy.next_event.separation import (
+    Chances,
+    EventView,
+    Separation,
+    _reduce_blocks,
+    linearize_side,
+    seen,
+)
 from tractexp.domain import PHASORS
 from tractexp.errors import UserError
 from tractexp.extend import Effect, Parameter, sites
@@ -144,10 +151,10 @@ def test_a_rival_is_linearised_as_its_refit_moves(alike):
     """What a rival gains and loses by one mild event more is, linearised, what a refit of all parameters finds."""
     bench, noise, bare, fits = alike
     truth, rival, event = fits["stator_resistance"], fits["speed_dependent_torque"], ImaginedDip(0.1, 0.2)
-    sides = [sided(bench, noise, fit) for fit in (bare, truth, rival)]
+    sides = [linearize_side(bench, noise, fit) for fit in (bare, truth, rival)]
     views = [seen(bench, noise, side, [event])[0] for side in sides]
     separation = Separation(sides, bench.criteria)
-    rows = _reduced([np.vstack([v.f - views[0].f, v.K]) for v in views])
+    rows = _reduce_blocks([np.vstack([v.f - views[0].f, v.K]) for v in views])
     from tractexp.discrepancy.next_event.choose import _fitted_to
 
     linear = separation._deviance(2, (rows[2][0] - rows[1][0])[None], rows[2][1:])
@@ -161,7 +168,7 @@ def test_a_rival_is_linearised_as_its_refit_moves(alike):
 def test_rows_are_reduced_without_loss():
     rng = np.random.default_rng(1)
     blocks = [rng.normal(size=(3, 40)), rng.normal(size=(5, 40))]
-    made = _reduced(blocks)
+    made = _reduce_blocks(blocks)
     assert [b.shape for b in made] == [(3, 8), (5, 8)]
     assert np.concatenate(made) @ np.concatenate(made).T == pytest.approx(
         np.concatenate(blocks) @ np.concatenate(blocks).T
@@ -174,7 +181,7 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
     fit, at = fits["stator_resistance"], bench.coordinates
     unit = fit.unit.copy()
     unit[at.parameters(["time_skew", "load_change"])] += 0.1
-    sides = [sided(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
+    sides = [linearize_side(bench, noise, f) for f in (bare, fit, replace(fit, unit=unit))]
     event = ImaginedDip(0.5, 0.4)
     own, other = (seen(bench, noise, side, [event])[0].f for side in sides[1:])
     assert other == pytest.approx(own, abs=1e-9)
@@ -182,19 +189,19 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
 
 def test_what_a_model_does_not_survive_tells_nothing(alike):
     bench, noise, bare, fits = alike
-    sides = [sided(bench, noise, f) for f in (bare, fits["stator_resistance"], fits["leakage_loss"])]
+    sides = [linearize_side(bench, noise, f) for f in (bare, fits["stator_resistance"], fits["leakage_loss"])]
     lost = EventView(np.full(10, np.nan), np.zeros((3, 10)))
     assert not Separation(sides, bench.criteria).denied([lost] * 3, 1).any()
 
 
 def test_dips_switching_phase_jumps_and_rates_are_tried(alike):
     bench = alike[0]
-    events = imagined(bench)
+    events = imagine_dips(bench)
     assert {e.switched for e in events} == {True, False}
     assert {np.sign(e.jump) for e in events} == {-1.0, 0.0, 1.0}
     assert {e.rate for e in events} == {1, 4}
     assert not any(e.unbalance for e in events)
-    assert any(e.unbalance for e in imagined(bench, ["U2"]))
+    assert any(e.unbalance for e in imagine_dips(bench, ["U2"]))
     assert "with the frequency f" in ImaginedDip(0.3, 0.1, jump=20.0).words
     assert "tap or a capacitor bank" in ImaginedDip(0.04, 1.0, switched=True).words
 

@@ -16,7 +16,7 @@ from tractexp.studies.comparison.ablation import VariantFamily
 from tractexp.studies.comparison.comparison import _median
 from tractexp.studies.comparison.load import _readable
 from tractexp.studies.comparison.overall import on_functions
-from tractexp.studies.comparison.runs import parted
+from tractexp.studies.comparison.runs import part_runs
 from tractexp.sweep import sweeper
 
 JUDGING = {"targets": TARGETS, "ties": 1e-3, "floor": 1e-9, "reference": None}
@@ -38,7 +38,7 @@ def moved(runs, data, factors=None, budget=None):
 
 
 def several(runs, **more):
-    return judging.several(parted(runs, ["budget"]), "the test", JUDGING, **{
+    return judging.several(part_runs(runs, ["budget"]), "the test", JUDGING, **{
         "folder": None, "bbob": 0, "cores": 1, "progress": False, **more})  # fmt: skip
 
 

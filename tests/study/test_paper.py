@@ -33,7 +33,7 @@ def page(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tractexp.studies.paper.study.RANDOM", 30)
         patch.setattr("tractexp.studies.paper.figure_sections.RANDOM", 30)
-        patch.setattr("tractexp.studies.paper.orders.REPEATS", 5)
+        patch.setattr("tractexp.studies.paper.orders.TIMED_REPEATS", 5)
         done = run_command(*QUICK, "hydra.run.dir=run", "task.docs=docs/paper.md", cwd=folder)
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
@@ -364,8 +364,8 @@ def _study(seeds=1, budget=150):
 
 def test_descents_are_made_once_for_the_same_starts(memory, monkeypatch):
     """What least squares reach is kept beside the searches; another floor or start is another descent."""
-    made, descend = [], valleys.descended
-    monkeypatch.setattr(valleys, "descended", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k))
+    made, descend = [], valleys.run_descents
+    monkeypatch.setattr(valleys, "run_descents", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k))
     monkeypatch.setattr("tractexp.studies.paper.study.RANDOM", 4)
     first, again = (_study() for _ in range(2))
     for study in (first, again):
@@ -450,30 +450,30 @@ def read_alike(issa, ssa, pso, **others):
 
 def test_planted_rankings_are_judged_as_they_are():
     study = planted(10, read_alike(1.0, 2.0, 0.5))
-    assert claims.ranked(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
-    assert claims.ranked(study, "issa", "pso", "iterations")[0] == claims.REFUTED
-    assert claims.ranked(study, "ssa", "pso", "simulations")[0] == claims.REFUTED
+    assert claims.compare_ends(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
+    assert claims.compare_ends(study, "issa", "pso", "iterations")[0] == claims.REFUTED
+    assert claims.compare_ends(study, "ssa", "pso", "simulations")[0] == claims.REFUTED
 
 
 def test_a_verdict_that_depends_on_the_reading_says_so():
     """Equal with SD = 20, and ISSA lower with 10 perceivers, as the text can be read too."""
     study = planted(10, read_alike(2.0, 2.0, 3.0, issa_10_perceivers=1.0))
-    verdict, told = claims.ranked(study, "issa", "ssa", "iterations")
+    verdict, told = claims.compare_ends(study, "issa", "ssa", "iterations")
     assert verdict == "depends on the reading: confirmed only with the 10 perceivers of section 4.2"
     assert told.startswith(
         "with SD = 20 (section 4.3) medians 2.01 and 2.01 pu², p = 1, A = 0.50; with the 10 perceivers"
     )
     limited = planted(10, read_alike(1.0, 2.0, 3.0, pso_limited=0.5))
-    assert claims.ranked(limited, "issa", "pso", "iterations")[0].endswith(
+    assert claims.compare_ends(limited, "issa", "pso", "iterations")[0].endswith(
         "confirmed only with SD = 20 (section 4.3) and with the 10 perceivers of section 4.2"
     )
-    assert claims.ranked(limited, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
+    assert claims.compare_ends(limited, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
 
 
 def test_equal_optimizers_confirm_nothing_and_few_seeds_settle_nothing():
     equal, few = planted(10, read_alike(1.0, 1.0, 1.0)), planted(5, read_alike(1.0, 2.0, 3.0))
-    assert claims.ranked(equal, "issa", "ssa", "iterations")[0] == claims.REFUTED
-    assert claims.ranked(few, "issa", "ssa", "iterations")[0] == claims.OPEN
+    assert claims.compare_ends(equal, "issa", "ssa", "iterations")[0] == claims.REFUTED
+    assert claims.compare_ends(few, "issa", "ssa", "iterations")[0] == claims.OPEN
 
 
 def test_pairs_are_won_only_beyond_chance():
@@ -543,7 +543,7 @@ def test_shares_count_valleys_floors_and_bottoms():
 def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound():
     """Two bottoms of the shipped record, and what the page says of the way between them, recomputed from Eq. (3)."""
     problem, floor = _recipe(), 3.09e-5
-    ends = valleys.descended(problem, valleys.scattered(problem, 60, 0), floor)
+    ends = valleys.run_descents(problem, valleys.draw_uniform_points(problem, 60, 0), floor)
     (lowest, n, right), (second, m, left), *_ = ends.grouped()
     assert n + m > 40
     assert (lowest, second) == pytest.approx((3.085e-5, 4.168e-5), rel=1e-3)
@@ -563,7 +563,7 @@ def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound(
     low = grid < 0.56
     assert (np.diff(path.objective[low]) > 0).all()  # the higher C, the worse, up to the ridge
     assert path.objective[np.abs(grid - 0.65).argmin()] > 3 * lowest
-    again = valleys.descended(wide, np.array([left]), floor)
+    again = valleys.run_descents(wide, np.array([left]), floor)
     assert again.values[0, C] < 0.15
     assert 1.25 * lowest < again.objective[0] < second
 

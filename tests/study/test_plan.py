@@ -15,8 +15,16 @@ import tractexp as public
 from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.advice import advise
-from tractexp.identification.plan import DipShape, best_events, combined, depth_needed, each, forecast, over_depth
-from tractexp.identification.profile import checked
+from tractexp.identification.plan import (
+    DipShape,
+    add_information,
+    best_events,
+    depth_needed,
+    each,
+    forecast,
+    over_depth,
+)
+from tractexp.identification.profile import check_by_profiles
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
 from tractexp.model.model import compose
@@ -77,7 +85,7 @@ def test_the_best_two_events_are_those_of_all_pairs():
     chosen = best_events(archive, study.TYPICAL, least=0.0, most=2)
     informations = each(archive, study.TYPICAL)
     pairs = itertools.combinations(range(4), 2)
-    J = {pair: combined([informations[e] for e in pair]).J for pair in pairs}
+    J = {pair: add_information([informations[e] for e in pair]).J for pair in pairs}
     volumes = {pair: np.linalg.slogdet(rows.T @ rows)[1] for pair, rows in J.items()}
     assert {c.event for c in chosen} == set(max(volumes, key=volumes.get))
     assert best_events(archive, study.TYPICAL, least=0.0)[-1].name == "0.1"
@@ -108,7 +116,7 @@ def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_
 
     def judged(*others):
         events = [recorded(depth, 0.006, seed, name="other") for depth, seed in others]
-        return checked(study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty)
+        return check_by_profiles(study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty)
 
     known = judged()
     (said,) = [sentence for sentence in advise(known, GOOD) if sentence.startswith("for C:")]
@@ -248,5 +256,5 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
     planned = forecast(problem, study.TYPICAL, SHAPE, known)
     alone = forecast(problem, study.TYPICAL, SHAPE)
     monkeypatch.undo()
-    assert planned.half == pytest.approx(combined([known]).standard_errors * planned.half[0] / known.standard_errors[0])
+    assert planned.half == pytest.approx(add_information([known]).standard_errors * planned.half[0] / known.standard_errors[0])
     assert not np.isfinite(alone.half).any()

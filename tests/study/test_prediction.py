@@ -32,7 +32,7 @@ from tractexp.model.model import compose
 from tractexp.noise import Noise
 from tractexp.plugin import get
 from tractexp.record import Record, detect
-from tractexp.report.predicted import predicted
+from tractexp.report.predicted import add_prediction_section
 
 BLOCKS = 20
 SAMPLES, STEP = 400, 2e-3  # of a generated dip
@@ -382,11 +382,11 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     inexact, tmp_path, monkeypatch
 ):
     def page_of(evidence):
-        predicted(page := Report("candidates", ""), replace(inexact, evidence=evidence))
+        add_prediction_section(page := Report("candidates", ""), replace(inexact, evidence=evidence))
         return page.save(tmp_path / "page.html").read_text(encoding="utf-8")
 
     made = inexact.evidence
-    monkeypatch.setattr("tractexp.report.predicted.MOST", 0)
+    monkeypatch.setattr("tractexp.report.predicted.MOST_SHOWN_SETS", 0)
     shown = page_of(made)
     assert "undervoltage_trip" in shown
     assert "the base model" in shown

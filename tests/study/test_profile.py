@@ -10,7 +10,7 @@ from pages import charts, read, unpacked
 
 from tractexp.errors import UserError
 from tractexp.identification.posterior import PosteriorSample
-from tractexp.identification.profile import checked, profiles, revised
+from tractexp.identification.profile import check_by_profiles, profiles, revise_verdict
 from tractexp.identification.profile_lanes import End, LikelihoodProfile, Region
 from tractexp.identification.uncertainty import conclude, threshold
 from tractexp.identification.verdict import IDENTIFIED, UNIDENTIFIED, WEAK, ParameterVerdict, brief
@@ -75,7 +75,7 @@ def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_sa
     assert made["C"].ends == (End.BOUND, End.BOUND)
     assert made["C"].interval == pytest.approx((0.3, 0.99))
     assert made["C"].deviance.max() > 10
-    judged = checked(known)
+    judged = check_by_profiles(known)
     assert judged.verdicts["C"].word == UNIDENTIFIED
     assert "open upwards" in judged.verdicts["C"].detail
     assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
@@ -93,7 +93,7 @@ def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile
     With one parameter held at its truth after the other, the best fit from the truth is close enough to the optimum.
     """
     known = study.judged(Problem(study.model(), events((0.3,), deviation, seed, Q_s0)), study.TYPICAL).uncertainty
-    judged = checked(known)
+    judged = check_by_profiles(known)
     likelihood = judged.likelihood
     start = np.repeat(likelihood.to_unit(np.array(study.TYPICAL)), len(judged.names), axis=0)
     held = np.eye(len(judged.names), start.shape[1], dtype=bool)
@@ -121,13 +121,13 @@ def test_two_minima_and_open_sides_change_the_verdict():
     base = LikelihoodProfile(
         "C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ()
     )
-    assert revised(good, base, 0, 1).word == IDENTIFIED
-    twice = revised(good, replace(base, minima=(0.58,)), 0, 1)
+    assert revise_verdict(good, base, 0, 1).word == IDENTIFIED
+    twice = revise_verdict(good, replace(base, minima=(0.58,)), 0, 1)
     assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
-    upwards = revised(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
+    upwards = revise_verdict(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
     assert (upwards.word, "open upwards" in upwards.detail) == (WEAK, True)
-    assert revised(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
-    assert revised(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
+    assert revise_verdict(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
+    assert revise_verdict(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
 
 
 def test_the_posterior_confirms_the_intervals(quiet):
@@ -232,7 +232,7 @@ def test_a_verdict_repeats_no_interval():
     profile = LikelihoodProfile(
         "C", np.array([0.3, 0.5, 0.9]), np.array([5.0, 0.0, 5.0]), (0.31, 0.88), (End.CLOSED, End.CLOSED), ()
     )
-    verdict = str(revised(by_curvature, profile, 0.0, 1.0))
+    verdict = str(revise_verdict(by_curvature, profile, 0.0, 1.0))
     assert verdict == "weakly identified: trades against T_m (correlation 0.98)"
     assert brief(verdict) == "weakly identified"
     assert brief("identified") == "identified"

@@ -7,7 +7,7 @@ from test_discrepancy import FAST, LOUD, base, bench, events
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.inference import fit_effort, fitting
 from tractexp.inference.base_fit import base_fit
-from tractexp.inference.promising import promising
+from tractexp.inference.promising import select_promising_starts
 
 TRIP = ("undervoltage_trip",)
 
@@ -26,11 +26,11 @@ def planted():
 
 def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
     at, noise, units, nuisances = planted
-    kept = promising(at, noise, TRIP, units, nuisances, fit_effort.MOST_STARTS)
+    kept = select_promising_starts(at, noise, TRIP, units, nuisances, fit_effort.MOST_STARTS)
     assert len(units) == 2 * fit_effort.MOST_STARTS
     assert len(kept) == fit_effort.MOST_STARTS
     best = lambda these: min(  # noqa: E731
-        f.deviance for f in fitting._descended(at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT)
+        f.deviance for f in fitting._run_descents(at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT)
     )
     assert best(kept) == pytest.approx(best(units), abs=1.0)
 
@@ -40,16 +40,16 @@ def test_what_changes_nothing_promises_least(planted):
     at, noise, units, nuisances = planted
     never = at.coordinates.placed(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
     still = at.coordinates.placed(units[1], {"tripped_share": 0.0})
-    kept = promising(at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units))
+    kept = select_promising_starts(at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units))
     assert not any(np.array_equal(k, u) for k in kept for u in (never, still))
 
 
 def test_few_starts_are_taken_as_they_are_and_the_order_is_kept(planted):
     at, noise, units, nuisances = planted
     spent = at.effort.total
-    assert promising(at, noise, TRIP, units[:5], nuisances, 5) is not None
+    assert select_promising_starts(at, noise, TRIP, units[:5], nuisances, 5) is not None
     assert at.effort.total == spent
-    kept = promising(at, noise, TRIP, units, nuisances, 7)
+    kept = select_promising_starts(at, noise, TRIP, units, nuisances, 7)
     places = [int(np.flatnonzero((units == k).all(axis=1))[0]) for k in kept]
     assert places == sorted(places)
 
@@ -57,5 +57,5 @@ def test_few_starts_are_taken_as_they_are_and_the_order_is_kept(planted):
 def test_it_costs_a_simulation_for_each_start_and_two_for_each_nuisance(planted):
     at, noise, units, nuisances = planted
     spent = at.effort.total
-    promising(at, noise, TRIP, units, nuisances, 7)
+    select_promising_starts(at, noise, TRIP, units, nuisances, 7)
     assert at.effort.total - spent == len(units) + 2 * len(nuisances) + 1

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from test_discrepancy import FAST, events
 
-from tractexp.discrepancy.remainder import MOST, remainders
+from tractexp.discrepancy.remainder import MOST_SHAPES, remainders
 from tractexp.noise import Autoregression, Noise
 
 LEVEL = 0.002
@@ -97,4 +97,4 @@ def test_noise_has_no_shape_white_or_colored(made):
         drawn = LEVEL * colored.draw(np.random.default_rng(seed), 1, lengths)[0]
         spoken += bool(found(made, drawn))
     assert spoken <= 2
-    assert len(found(made, 20 * LEVEL * np.random.default_rng(5).standard_normal((2, sum(lengths))))) <= MOST
+    assert len(found(made, 20 * LEVEL * np.random.default_rng(5).standard_normal((2, sum(lengths))))) <= MOST_SHAPES

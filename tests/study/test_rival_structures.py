@@ -8,7 +8,7 @@ import uncertainty as study
 
 from hidden_effects import Case, Noise
 from hidden_effects.generator import make, truth
-from tractexp.identification.estimate import polished
+from tractexp.identification.estimate import estimate_without_search
 from tractexp.identification.rivals import RivalStructure, _structures, with_rivals
 from tractexp.identification.verdict import IDENTIFIED, WEAK
 from tractexp.inference.problem import Problem
@@ -22,7 +22,7 @@ SEED = 5
 def judged(case):
     """The judgement of the first two events of a case of the independent generator, and the truth."""
     dips = [detect(Record(f"event{k}", **r).check()) for k, r in enumerate(make(case, SEED))]
-    return with_rivals(polished(Problem(study.model(), dips)).uncertainty), truth(case, SEED)["load"]
+    return with_rivals(estimate_without_search(Problem(study.model(), dips)).uncertainty), truth(case, SEED)["load"]
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +79,7 @@ def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
     known = replace(known, rivals=())
     j = known.names.index("T_m")
     far = RivalStructure("other", 1.0, {"T_m": float(1.5 * known.values[j])})
-    told = dict(module._moved(known, replace(known, rivals=(far,))))
+    told = dict(module._find_moved_parameters(known, replace(known, rivals=(far,))))
     assert list(told) == ["T_m"]
     assert known.verdicts["T_m"].word == IDENTIFIED
     assert told["T_m"].word == WEAK
@@ -96,8 +96,8 @@ def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(mi
     value = float(known.values[j])
     known = replace(known, profiled=dict(known.profiled) | {"T_m": (0.88 * value, 1.12 * value)})
     rivals = tuple(RivalStructure(f"by {share}", 1.0, {"T_m": share * value}) for share in (0.9, 1.1))
-    assert dict(module._moved(known, replace(known, rivals=rivals[:1]))) == {}
-    assert module.WITHIN == 0.2
-    both = dict(module._moved(known, replace(known, rivals=rivals)))
+    assert dict(module._find_moved_parameters(known, replace(known, rivals=rivals[:1]))) == {}
+    assert module.IDENTIFIED_SHARE == 0.2
+    both = dict(module._find_moved_parameters(known, replace(known, rivals=rivals)))
     assert both["T_m"].word == WEAK
     assert known.verdicts["T_m"].word == IDENTIFIED

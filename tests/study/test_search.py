@@ -11,7 +11,7 @@ from hypothesis.extra.numpy import arrays
 from tractexp import progress
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import APART, Elite, _Residuals, least_squares_from, race
+from tractexp.identification.polish import LEAST_START_DISTANCE, Elite, _Residuals, least_squares_from, race
 from tractexp.identification.search import Limits, search
 from tractexp.parameter import best_distinct
 from tractexp.plugin import build
@@ -108,10 +108,10 @@ def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
     assert progress.share(3, 30, 4, None) == 0.75
     assert progress.share(5, 30, 4, None) is None
     assert progress.share(5, 30, 4, 60) == 0.5
-    assert [progress.remaining(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
+    assert [progress.describe_remaining_time(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
     monkeypatch.setattr(progress, "_lively", lambda: False)
-    with progress.searching(4, None) as tell:
+    with progress.report_search(4, None) as tell:
         tell(5, 0.25, 30)
     assert capsys.readouterr().out == "  iteration 5: 30 simulations, best objective 0.25\n"
 
@@ -158,8 +158,8 @@ def test_residuals_count_and_refuse_like_objectives():
 
 def test_best_distinct_takes_the_best_and_leaves_its_neighbors():
     unit = np.array([[0.5, 0.5], [0.51, 0.5], [0.9, 0.5], [0.5, 0.05]])
-    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), APART, 10).tolist() == [1, 2, 3]
-    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), APART, 2).tolist() == [1, 2]
+    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 10).tolist() == [1, 2, 3]
+    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 2).tolist() == [1, 2]
 
 
 @given(arrays(float, (40, 2), elements=st.floats(0, 1)), st.integers(0, 99))
@@ -172,7 +172,7 @@ def test_the_elite_lies_apart_in_order_and_holds_the_best(unit, seed):
     assert elite.f[0] == f.min()
     assert (np.diff(elite.f) > 0).all()
     apart = np.abs(elite.x[:, None] - elite.x).max(axis=2)
-    assert (apart[~np.eye(len(elite.x), dtype=bool)] > APART).all()
+    assert (apart[~np.eye(len(elite.x), dtype=bool)] > LEAST_START_DISTANCE).all()
 
 
 def test_the_elite_has_no_refused_points():

@@ -10,7 +10,7 @@ import pytest
 
 import tractexp
 from tractexp.domain import WAVES, domain_of
-from tractexp.domain.playback import as_phasors, unsettled
+from tractexp.domain.playback import as_phasors, measure_unsteadiness
 from tractexp.errors import UserError
 from tractexp.identification.advice import better_domain
 from tractexp.identification.plan import DipShape, forecast
@@ -116,11 +116,11 @@ def test_the_periodic_steady_state_is_measured_by_what_still_changes(fit):
     assert one.unsettled == fit.result.events[0]["unsettled"] < 1e-3
     decay = np.exp(-(np.arange(len(event.record.t)) / event.rate) * event.f0)  # to 1/e in a cycle
     turning = np.stack([event.turn.real, event.turn.imag, 0 * decay])
-    assert unsettled(event, turning) < 1e-4
+    assert measure_unsteadiness(event, turning) < 1e-4
     last = decay[event.lead - round(event.rate / event.f0) : event.lead]
     grown = turning * (1 + decay)
     told = np.sqrt(np.mean((last * (np.e - 1)) ** 2)) / np.sqrt(np.mean((1 + last) ** 2))
-    assert unsettled(event, grown) == pytest.approx(told, rel=0.02)
+    assert measure_unsteadiness(event, grown) == pytest.approx(told, rel=0.02)
 
 
 def test_a_fit_in_waveforms_is_saved_and_read_back(fit, tmp_path):

@@ -31,7 +31,7 @@ from independent.circuit import (
 from independent.fault import Fault, vector
 from independent.sampler import CurrentTransformer, Sampler
 from independent.source import OMEGA
-from tractexp.noise.waves import covariances, of_waves, predicted
+from tractexp.noise.waves import covariances, of_waves, solve_levinson
 from tractexp.record import in_waves
 
 MACHINE = Machine(Rs=0.03, Xs=0.10, Xm=3.2, Rr=0.018, Xr=0.18, H=0.7)
@@ -149,7 +149,7 @@ def test_the_sampler_adds_what_it_says():
 def test_levinson_gives_back_the_autoregression_of_its_covariances():
     a = 0.9 * np.exp(0.3j)
     lags = np.arange(30)
-    made = predicted(a**lags / (1 - abs(a) ** 2))
+    made = solve_levinson(a**lags / (1 - abs(a) ** 2))
     assert made.order == 1
     assert made.coefficients[1, 0] == pytest.approx(a)
     assert made.deviation[1] == pytest.approx(1.0)
@@ -169,7 +169,7 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
     assert np.std(white.real) == pytest.approx(1.0, abs=0.05)
     lagged = [abs(np.vdot(white[k:], white[:-k])) / np.vdot(white, white).real for k in range(1, 40)]
     assert max(lagged) < 5 / np.sqrt(len(white))
-    least = predicted(np.r_[covariances(answer, 48)[0] + 0.25, covariances(answer, 48)[1:]]).deviation[-1]
+    least = solve_levinson(np.r_[covariances(answer, 48)[0] + 0.25, covariances(answer, 48)[1:]]).deviation[-1]
     assert noise.pairs[0][0].deviation[-1] == pytest.approx(least, rel=0.03)
 
 

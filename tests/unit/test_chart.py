@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pages import unpacked
 
-from tractexp.blocks.chart import MOST, Chart
+from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
 
 BLUE = "#0072B2"
 
@@ -25,7 +25,7 @@ def test_a_long_curve_keeps_its_spike():
     y = np.zeros(1_000_000)
     y[654_321] = 1.0
     (trace,) = Chart("t", ["y"]).line("y", np.arange(1e6), y, BLUE).plain()["data"]
-    assert len(unpacked(trace["y"])) < 2 * MOST
+    assert len(unpacked(trace["y"])) < 2 * MOST_LINE_POINTS
     assert unpacked(trace["x"])[unpacked(trace["y"]).argmax()] == 654_321
 
 

@@ -41,7 +41,7 @@ def test_the_signed_rank_test_is_exact_for_few_seeds():
     a = np.arange(6.0)
     assert st.wilcoxon(a, a + np.arange(1, 7)) == (pytest.approx(2 / 64), 21.0)
     assert st.wilcoxon(a + np.arange(1, 7), a)[1] == -21.0
-    assert 2 / 2**st.LEAST_SEEDS < st.ALPHA < 2 / 2 ** (st.LEAST_SEEDS - 1)
+    assert 2 / 2**st.LEAST_SEEDS < st.SIGNIFICANCE_LEVEL < 2 / 2 ** (st.LEAST_SEEDS - 1)
 
 
 def test_equal_samples_show_nothing():

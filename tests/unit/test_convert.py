@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
-from tractexp.filetypes.sidecar import beside
-from tractexp.filetypes.tidy import recording_of, restored, unique, write_record, write_recording
+from tractexp.filetypes.sidecar import read_sidecar
+from tractexp.filetypes.tidy import recording_of, restore_recording, unique, write_record, write_recording
 from tractexp.plugin import build
 from tractexp.record import Base, Record
 from tractexp.record.window import Window
@@ -136,7 +136,7 @@ class TestTables:
         channels.append(Channel("x", np.array(data.draw(st.lists(st.floats(), min_size=n, max_size=n)))))
         recording = Recording("x", channels, [Segment(0, n, 1000.0, 0.0)])
         table, _ = write_recording(recording, tmp_path_factory.mktemp("any") / f"rec{ending}")
-        made = restored(str(table), beside(str(table)).recording)
+        made = restore_recording(str(table), read_sidecar(str(table)).recording)
         for x, y in zip(recording.channels, made.channels, strict=True):
             if abs(x.offset) < 1e3 * x.gain * 32768:  # else the offset swallows the digits of a step
                 np.testing.assert_array_equal(x.values(), y.values())

@@ -351,7 +351,7 @@ def test_dips_and_swells_are_the_same_in_any_unit_of_voltage(size):
 def test_the_end_of_a_dip_that_never_ends_is_that_of_the_record():
     t = np.arange(1000) / 1000
     U = np.where(t < 0.5, 1.0, 0.6)
-    (dip,) = dips.numbered([Record("long", t, U, 0.8 * U, 0.3 * U, source="long.csv")], "long.csv", 1.0, 10.0)
+    (dip,) = dips.cut_dips([Record("long", t, U, 0.8 * U, 0.3 * U, source="long.csv")], "long.csv", 1.0, 10.0)
     assert (dip.start, dip.end) == (0.5, t[-1])
 
 

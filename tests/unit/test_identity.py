@@ -5,9 +5,9 @@ import dataclasses
 import numpy as np
 
 import tractexp
-from tractexp.api.setup import recorded
+from tractexp.api.setup import describe_records
 from tractexp.record import Base, Record, detect
-from tractexp.record.identity import UNKNOWN, Identity, described, distinct, label, title
+from tractexp.record.identity import UNKNOWN, Identity, describe_identities, distinct, label, title
 from tractexp.record.record import LOAD
 
 SOURCE = {
@@ -50,10 +50,10 @@ def test_a_base_that_nobody_told_is_said_to_be_unknown():
 def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns():
     known = Identity.at(record())
     one, other = (Identity.at(record(base=Base(), identity={}, source=f"{name}.csv")) for name in "ab")
-    assert described([one, one]) == [f"a.csv; {UNKNOWN}"]
-    assert described([one, other]) == ["a.csv", "b.csv", f"{UNKNOWN} of each"]
-    assert described([one, known, other])[-1] == f"{UNKNOWN} of a.csv, b.csv"
-    assert described([known, one]) == [str(known.recording), str(one)]
+    assert describe_identities([one, one]) == [f"a.csv; {UNKNOWN}"]
+    assert describe_identities([one, other]) == ["a.csv", "b.csv", f"{UNKNOWN} of each"]
+    assert describe_identities([one, known, other])[-1] == f"{UNKNOWN} of a.csv, b.csv"
+    assert describe_identities([known, one]) == [str(known.recording), str(one)]
 
 
 def test_dips_of_one_recording_are_one_load():
@@ -65,7 +65,7 @@ def test_dips_of_one_recording_are_one_load():
 
 
 def test_the_console_says_of_each_recording_once_what_it_is_of():
-    lines = [*recorded([detect(record(1)), detect(record(2))], [])]
+    lines = [*describe_records([detect(record(1)), detect(record(2))], [])]
     assert [line for line in lines if "MVA" in line] == [f"  record: {Identity.at(record()).recording}"]
     assert lines[0].startswith("fit: north_dip1")
 

@@ -10,7 +10,7 @@ from tractexp.domain import PHASORS, WAVES
 from tractexp.domain.port import Port
 from tractexp.errors import UserError
 from tractexp.identification.linear_network import CRITERION, HELD_OUT, best, black_boxes
-from tractexp.identification.projection import Projection, basis, decaying
+from tractexp.identification.projection import Projection, basis, compute_pole_response
 from tractexp.record import Record, detect
 from tractexp.record.synthetic import synthetic_event
 
@@ -31,7 +31,7 @@ def planted(v, poles, shares, step=1 / RATE):
     """What a network draws (N,) in the frame, by its definition: C du/dt and each pole's share of s / (s - p)."""
     u = v - 1
     i = (P0 - 1j * Q0) * v + C * np.gradient(u, step)
-    return i + sum(g * (u + p * decaying(u, p, step)) for g, p in zip(shares, poles, strict=True))
+    return i + sum(g * (u + p * compute_pole_response(u, p, step)) for g, p in zip(shares, poles, strict=True))
 
 
 def in_waves(v, i, start=640):
@@ -69,7 +69,7 @@ def test_a_pole_responds_as_scipy_simulates_it(pole):
     a, b = pole.real, pole.imag
     system = signal.StateSpace([[a, -b], [b, a]], np.eye(2), np.eye(2), np.zeros((2, 2)))
     _, x, _ = signal.lsim(system, np.stack([u.real, u.imag], axis=1), np.arange(len(u)) / RATE)
-    np.testing.assert_allclose(decaying(u, pole, 1 / RATE), x[:, 0] + 1j * x[:, 1], atol=1e-12)
+    np.testing.assert_allclose(compute_pole_response(u, pole, 1 / RATE), x[:, 0] + 1j * x[:, 1], atol=1e-12)
 
 
 def test_a_planted_network_comes_back_from_waves():
@@ -102,7 +102,7 @@ def test_what_noise_leaves_of_the_poles_is_what_their_covariance_says():
 def test_planted_poles_come_back_from_p_and_q():
     """Of real P and Q an oscillating pole and its mirror: two of the network."""
     u, p, g = power_dip(), -12 + 2j * np.pi * 3, 0.4 - 0.8j
-    x = decaying(u + 0j, p, 0.005)
+    x = compute_pole_response(u + 0j, p, 0.005)
     P, Q = 2 * (g * x).real + 1.5 * u, 2 * ((0.3 + 0.6j) * x).real + 2.2 * u
     boxes = black_boxes(PHASORS, [in_phasors(u, P + 1j * Q)], most=2)
     for pole in boxes[2].poles:
@@ -185,7 +185,7 @@ def test_a_single_phase_has_a_network_of_its_own():
     v = np.concatenate([np.ones(before), voltage(negative=0.0)]) * np.exp(2j * np.pi * F0 * t)
     quarter = round(RATE / F0 / 4)
     u = v.real + 1j * np.concatenate([v.imag[:quarter], v.real[:-quarter]])
-    i = (0.6 * u + 100 * decaying(u, -30.0, 1 / RATE)).real
+    i = (0.6 * u + 100 * compute_pole_response(u, -30.0, 1 / RATE)).real
     I = 2 * np.mean((i * np.exp(-2j * np.pi * F0 * t))[before:start])
     made = synthetic_event("made", t, u * np.exp(-2j * np.pi * F0 * t), (1.0, I.real, -I.imag), F0, start, start + 190)
     i[:before] = np.nan
@@ -214,7 +214,7 @@ def test_the_zero_sequence_has_a_path_of_resistance_and_inductance():
     t = np.arange(1600) / RATE
     v = voltage()
     zero = np.where(t >= 0.2, 0.2 * np.cos(2 * np.pi * F0 * t), 0.0)
-    i_zero = 500 * decaying(zero + 0j, -25.0, 1 / RATE).real
+    i_zero = 500 * compute_pole_response(zero + 0j, -25.0, 1 / RATE).real
     event = in_waves(v, planted(v, POLES, SHARES))
     event = replace(event, v_zero=zero, currents=np.stack([*event.currents[:2], i_zero]))
     path = black_boxes(WAVES, [event], most=0)[0].networks[1]

@@ -5,7 +5,7 @@ import pytest
 import tractexp
 from tractexp.composition import read_choice
 from tractexp.errors import UserError
-from tractexp.model_file import DEEPEST, LARGEST, read_model_file
+from tractexp.model_file import DEEPEST_VALUES, LARGEST, read_model_file
 from tractexp.overrides import overrides
 
 GOOD = """\
@@ -54,8 +54,8 @@ def test_a_file_may_begin_with_a_shipped_choice(write):
         ("effects: ['???']", "no references to others"),
         ("effects: !!python/object/apply:os.system [ls]", "not the YAML of a model"),
         ("a: &a [1]\nb: *a", "alias"),
-        ("fixed: " + "[" * (DEEPEST + 5) + "]" * (DEEPEST + 5), f"more than {DEEPEST} levels"),
-        ("fixed: " + "[" * 100_000, f"more than {DEEPEST} levels"),
+        ("fixed: " + "[" * (DEEPEST_VALUES + 5) + "]" * (DEEPEST_VALUES + 5), f"more than {DEEPEST_VALUES} levels"),
+        ("fixed: " + "[" * 100_000, f"more than {DEEPEST_VALUES} levels"),
         ("fixed: {1: 2}", "keys are names"),
         ("- a list", "must hold keys and values"),
         ("fixed: {C", "not the YAML of a model"),

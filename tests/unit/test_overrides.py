@@ -8,7 +8,7 @@ from nasty import NASTY
 from omegaconf import OmegaConf
 
 from tractexp.errors import UserError
-from tractexp.overrides import assigned, override, overrides, survey_of, typed
+from tractexp.overrides import build_typed_command, format_assignment, override, overrides, survey_of
 
 FILES = [
     "站北.cfg", "name (1).cfg", "a=b.cfg", "Ф1 #2.cfg", "{x}.cfg", "it's.cfg", "~/x.cfg", "[1].cfg", "a b.cfg",
@@ -74,7 +74,7 @@ def composed(words):
 
 @pytest.mark.parametrize("name", [name for name in NASTY if name and name.isprintable() and name != "???"])
 def test_a_command_that_is_printed_means_the_name_that_it_holds(name):
-    printed = shlex.split(typed({"name": "csv", "path": name, "train": [name, "b"]}))
+    printed = shlex.split(build_typed_command({"name": "csv", "path": name, "train": [name, "b"]}))
     assert [*composed(printed[1:])] == ["csv", name, [name, "b"]]
     *_, path = shlex.split(survey_of(name))
     assert [*composed([path])] == [name]
@@ -83,7 +83,7 @@ def test_a_command_that_is_printed_means_the_name_that_it_holds(name):
 @pytest.mark.parametrize("name", [name for name in NASTY if name and not name.isprintable()])
 def test_a_name_that_cannot_be_printed_is_refused_in_one_line(name):
     with pytest.raises(UserError) as refused:
-        overrides([assigned("data.path", name)])
+        overrides([format_assignment("data.path", name)])
     assert len(str(refused.value).splitlines()) == 1
 
 

@@ -26,7 +26,7 @@ def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path
 
 def test_the_part_keeps_its_license_its_lines_and_bars_and_no_map(whole):
     part = gzip.decompress(base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', script())[1])).decode()
-    assert part.startswith(plotly.needed(whole))
+    assert part.startswith(plotly.select_needed_modules(whole))
     assert part[:200] == whole[:200]
     assert "Licensed under the MIT license" in part[:200]
     assert plotly.TRACE in part
@@ -37,9 +37,9 @@ def test_the_part_keeps_its_license_its_lines_and_bars_and_no_map(whole):
 
 @pytest.mark.parametrize("text", ["", "var Plotly=(()=>{})();", "1"])
 def test_a_library_that_is_made_otherwise_is_taken_whole(text):
-    assert plotly.needed(text) == text
+    assert plotly.select_needed_modules(text) == text
 
 
 def test_a_library_without_a_known_register_is_taken_whole(whole):
     other = whole.replace(".register([", ".enroll([")
-    assert plotly.needed(other) == other
+    assert plotly.select_needed_modules(other) == other

@@ -21,13 +21,13 @@ from tractexp import plugin, provenance
 )  # fmt: skip
 def test_records_and_load_of_a_run_are_repeated(monkeypatch, arguments, settings, expected):
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
-    assert provenance.again(*settings) == expected
+    assert provenance.build_again_command(*settings) == expected
 
 
 def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
     arguments = ["--config-dir", "old", "data=archive", "data.path=my records", "model=old", "model.fixed.C=0.8"]
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
-    command = provenance.again("--config-dir", "conf", "model=extended", of=("data",))
+    command = provenance.build_again_command("--config-dir", "conf", "model=extended", of=("data",))
     assert command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
 
 
@@ -36,11 +36,11 @@ def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
     monkeypatch.setattr(provenance, "_placed", [])
     monkeypatch.chdir(tmp_path)
-    provenance.placed(tmp_path / "outputs" / "run")
-    assert provenance.again("task=discrepancy") == "tractexp again outputs/run task=discrepancy"
-    assert provenance.again("model=extended", of=("data",)).startswith("tractexp model=extended data=comtrade")
+    provenance.remember_folder(tmp_path / "outputs" / "run")
+    assert provenance.build_again_command("task=discrepancy") == "tractexp again outputs/run task=discrepancy"
+    assert provenance.build_again_command("model=extended", of=("data",)).startswith("tractexp model=extended data=comtrade")
     monkeypatch.setattr(provenance, "_started", ["tractexp", "data=tibet"])
-    assert provenance.again("task=discrepancy") == "tractexp task=discrepancy data=tibet"
+    assert provenance.build_again_command("task=discrepancy") == "tractexp task=discrepancy data=tibet"
 
 
 @pytest.mark.parametrize(("package", "line"), [("tractexp_plugins", 2), ("tractexp.api", 0), ("", 0)])

@@ -75,7 +75,7 @@ def test_markdown_has_the_name_in_one_line_and_ends_no_block(name):
     assert re.sub(r"\\([^\w\s])", r"\1", line) == " ".join(name.splitlines())
     assert not re.search(r"(?<!\\)(?:\\\\)*[`<>|*_$\[\]]", line)
     assert quoting.markdown_again(line) == line
-    fence, *inside, last = quoting.fenced(name).split("\n")
+    fence, *inside, last = quoting.fence_markdown(name).split("\n")
     assert fence == last == "`" * len(fence)
     assert not any(fence in each for each in inside)
 

@@ -7,7 +7,7 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.record import Record
-from tractexp.record.dips import numbered
+from tractexp.record.dips import cut_dips
 from tractexp.record.direction import direction
 
 N = 100
@@ -35,7 +35,7 @@ def test_the_dips_of_one_record_are_numbered_from_one():
     t = np.arange(3000) / 1000
     U = np.where(((t > 0.5) & (t < 0.6)) | ((t > 2.0) & (t < 2.2)), 0.7, 1.0)
     whole = Record("whole", t, U, np.ones(3000), np.full(3000, 0.5), source="made")
-    first, second = numbered([whole], "made", 0.3, 0.8)
+    first, second = cut_dips([whole], "made", 0.3, 0.8)
     assert [(d.number, d.result.name, d.result.source) for d in (first, second)] == [
         (1, "whole_dip1", "made dip 1"), (2, "whole_dip2", "made dip 2"),
     ]  # fmt: skip

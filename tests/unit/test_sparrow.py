@@ -449,7 +449,7 @@ def test_a_covariant_flock_may_be_turned_stretched_and_shifted():
 def test_covariant_perceivers_have_the_covariance_of_the_better_half():
     better = np.random.default_rng(2).standard_normal((15, 3)) @ [[1, 2, 0], [0, 0.3, 0.1], [0, 0, 2]]
     best = np.array([5.0, -1.0, 2.0])
-    drawn = covariant.varied(best, better, 200_000, np.random.default_rng(4))
+    drawn = covariant.draw_varied_points(best, better, 200_000, np.random.default_rng(4))
     np.testing.assert_allclose(drawn.mean(axis=0), best, atol=0.03)
     np.testing.assert_allclose(np.cov(drawn.T), np.cov(better.T, bias=True), rtol=0.02, atol=0.02)
 
@@ -463,9 +463,9 @@ def test_a_way_never_leads_from_a_sparrow_to_itself():
 
 def test_a_sparrow_takes_at_least_one_coordinate():
     x = np.zeros((50, 4))
-    taken = covariant.mixed(x, x + 1, 0.0, np.random.default_rng(0))
+    taken = covariant.mix_coordinates(x, x + 1, 0.0, np.random.default_rng(0))
     assert (taken.sum(axis=1) == 1).all()
-    assert (covariant.mixed(x, x + 1, 1.0, np.random.default_rng(0)) == 1).all()
+    assert (covariant.mix_coordinates(x, x + 1, 1.0, np.random.default_rng(0)) == 1).all()
 
 
 def test_a_collapsed_covariant_flock_is_drawn_anew():

@@ -14,10 +14,10 @@ import pytest
 from tractexp.errors import UserError
 from tractexp.progress import FIRST_LINE
 from tractexp.sweep import launcher, progress, recorder
-from tractexp.sweep.job import SweepJob, shared
+from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.placing import place
-from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, objective, read, returned
+from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, objective, read, select_returned_metrics
 from tractexp.tracking import TrackedRun, runfile
 from tractexp.tracking.sweepfile import folder_of
 
@@ -55,9 +55,9 @@ def test_a_job_starts_as_running_with_nothing_spent(jobs):
 
 
 def test_a_variant_leaves_out_what_all_jobs_share(jobs):
-    assert shared(jobs) == {"budget=500"}
-    assert shared(jobs[:1]) == set()
-    assert [one.variant(shared(jobs)) for one in jobs] == ["pso c1=0", "pso c1=0", "pso c1=1", "pso c1=1"]
+    assert find_shared_overrides(jobs) == {"budget=500"}
+    assert find_shared_overrides(jobs[:1]) == set()
+    assert [one.variant(find_shared_overrides(jobs)) for one in jobs] == ["pso c1=0", "pso c1=0", "pso c1=1", "pso c1=1"]
     assert jobs[0].variant(()) == "pso budget=500 c1=0"
 
 
@@ -144,12 +144,12 @@ def test_jobs_in_threads_print_into_their_own_files_and_what_is_beside_them_does
 
 def test_a_job_returns_where_its_search_ended_or_what_is_named():
     measured = {"search_objective": 2e-3, "objective": 3e-5, "search_simulations_to_floor": None}
-    assert returned(measured, None) == 2e-3
-    assert returned(measured, ["objective"]) == 3e-5
-    assert returned(measured, ["objective", "search_simulations_to_floor"]) == [3e-5, float("inf")]
-    assert returned({"probability": 0.5}, None) is None
+    assert select_returned_metrics(measured, None) == 2e-3
+    assert select_returned_metrics(measured, ["objective"]) == 3e-5
+    assert select_returned_metrics(measured, ["objective", "search_simulations_to_floor"]) == [3e-5, float("inf")]
+    assert select_returned_metrics({"probability": 0.5}, None) is None
     with pytest.raises(UserError, match=r"sweep\.returns names objectiv, .*did you mean 'objective'\?"):
-        returned(measured, ["objectiv"])
+        select_returned_metrics(measured, ["objectiv"])
 
 
 def test_what_a_job_measured_comes_back_and_of_one_that_failed_nothing_counts(jobs):

@@ -7,7 +7,7 @@ import pytest
 
 import tractexp
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import grouping, numbers
+from tractexp.filetypes.cells import find_group_mark, numbers
 from tractexp.filetypes.clock import times
 from tractexp.plugin import build
 from tractexp.record import detect
@@ -122,9 +122,9 @@ def test_digits_in_groups(tmp_path, monkeypatch, values, mark):
 
 
 def test_what_may_be_a_decimal_mark_is_no_group():
-    assert grouping([["0,125", "110,250"]], ",") == ""
-    assert grouping([["0.125", "110,250"]], ".") == ","
-    assert grouping([["0.125", "110,25"]], ".") == ""
+    assert find_group_mark([["0,125", "110,250"]], ",") == ""
+    assert find_group_mark([["0.125", "110,250"]], ".") == ","
+    assert find_group_mark([["0.125", "110,25"]], ".") == ""
     assert numbers(["1,234,567.5", "999.5", "-12,000"], group=",").tolist() == [1234567.5, 999.5, -12000]
 
 

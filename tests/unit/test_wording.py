@@ -2,7 +2,7 @@
 
 import pytest
 
-from tractexp.wording import alternatives, in_words, joined, listed, percent, with_error
+from tractexp.wording import alternatives, in_words, join_words, list_figures, percent, with_error
 
 
 @pytest.mark.parametrize(
@@ -25,8 +25,8 @@ def test_a_value_has_the_digits_that_its_error_leaves(value, error, told):
 
 
 def test_names_are_listed_as_in_a_sentence():
-    assert [joined(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == ["", "a", "a and b", "a, b and c"]
-    assert joined(("a", "b"), "or") == "a or b"
+    assert [join_words(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == ["", "a", "a and b", "a, b and c"]
+    assert join_words(("a", "b"), "or") == "a or b"
 
 
 def test_a_share_is_never_more_than_all_or_less_than_nothing():
@@ -44,5 +44,5 @@ def test_alternatives_that_share_a_name_are_told_by_it():
 
 
 def test_many_figures_are_told_by_their_ends():
-    assert listed([0.2, 0.1, 0.4, 0.3], percent) == "10% to 40%"
-    assert listed([0.2, 0.1], percent) == "20% and 10%"
+    assert list_figures([0.2, 0.1, 0.4, 0.3], percent) == "10% to 40%"
+    assert list_figures([0.2, 0.1], percent) == "20% and 10%"

@@ -61,7 +61,7 @@ class Choice(Plain):
         None is the default of `conf/config.yaml`.
         """
         if isinstance(chosen, Choice):
-            return cls(chosen.name, completed(group, chosen.node))
+            return cls(chosen.name, complete_settings(group, chosen.node))
         chosen = defaults()[group] if chosen is None else chosen
         check_kind(group, chosen, str | Mapping[str, Any] | Sequence[Any])
         if isinstance(chosen, Sequence) and not isinstance(chosen, str):
@@ -71,7 +71,7 @@ class Choice(Plain):
             raise UserError(f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings")
         name = str(asked.pop("name"))
         node = {**read_choice(group, name), **asked}
-        return cls(name, completed(group, node))
+        return cls(name, complete_settings(group, node))
 
     @classmethod
     def several(cls, group: str, chosen: Any) -> "list[Choice]":
@@ -91,7 +91,7 @@ class Choice(Plain):
         return plugin.build(group, self.node)
 
 
-def completed(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
+def complete_settings(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
     """A plugin's node with every setting, checked; what was left out has its default."""
     kinds = get_type_hints(plugin.get(group, node["name"]))
     for key, value in node.items():

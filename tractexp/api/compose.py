@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from tractexp import quoting
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Table
-from tractexp.choices import choices, defaults, replaced
+from tractexp.choices import choices, defaults, read_replacements
 from tractexp.composition import read_choice
 from tractexp.errors import UserError, among, check_choice, setting
 from tractexp.outcome import Plain, Tabulated
@@ -68,9 +68,9 @@ class LoadModel(Portable, Plain, Tabulated):
     @functools.cached_property
     def parameters(self) -> Mapping[str, Any]:
         """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit, about, symbol)."""
-        from tractexp.inference.problem import narrowed
+        from tractexp.inference.problem import narrow_bounds
 
-        return {p.name: p for p in narrowed(self.model.parameters, self.bounds)}
+        return {p.name: p for p in narrow_bounds(self.model.parameters, self.bounds)}
 
     def with_(self, **changes: Any) -> "LoadModel":
         """The model with what is given (not None) in place; bounds and fixed values are added to those there are."""
@@ -172,7 +172,7 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     """
     if domain is not None:
         check_choice("domain", domain, sorted(choices()[DOMAIN]))
-        return replace(model_of(given or replaced(DOMAIN, domain).get(GROUP)), domain=domain)
+        return replace(model_of(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain)
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):

@@ -17,11 +17,11 @@ from tractexp.plugin import build, discover, plugin
 from tractexp.progress import console
 from tractexp.record import Event, Reader, Record
 from tractexp.recording import Recording, Writer
-from tractexp.recording.cut import cut
+from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
 
 WHAT = ("recording", "events")
-MARGIN = 0.1  # s of waveforms kept about a dip's record, for the windows of its first and last phasors
+DIP_MARGIN = 0.1  # s of waveforms kept about a dip's record, for the windows of its first and last phasors
 Part = tuple[str, Recording | Record]  # what is written, and its name
 
 
@@ -82,7 +82,7 @@ def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
     records = [*read.train, *read.validate]
     if waves and writer.waves:
         whole = reader.recording()
-        return [(one.name, cut(whole, one.t[0] - MARGIN, one.t[-1] + MARGIN)) for one in records]
+        return [(one.name, cut_recording(whole, one.t[0] - DIP_MARGIN, one.t[-1] + DIP_MARGIN)) for one in records]
     return [(one.name, one) for one in records]
 
 
@@ -95,7 +95,7 @@ def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
     files: list[Path] = []
     for path, (_, part) in zip(paths, parts, strict=True):
         files += writer.recording(part, path) if isinstance(part, Recording) else writer.record(part, path)
-    return Converted(files, [_said(part, path) for path, (_, part) in zip(paths, parts, strict=True)])
+    return Converted(files, [_describe_written_part(part, path) for path, (_, part) in zip(paths, parts, strict=True)])
 
 
 def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
@@ -131,7 +131,7 @@ def _read_from(source: str) -> Iterator[Path]:
             yield Path(text)
 
 
-def _said(part: Recording | Record, path: Path) -> str:
+def _describe_written_part(part: Recording | Record, path: Path) -> str:
     if isinstance(part, Record):
         return f"{path.name}: {part.samples} samples of {', '.join([*part.channels, *part.more])}"
     status = f" and {len(part.status)} status channels" if part.status else ""

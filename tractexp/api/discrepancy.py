@@ -18,7 +18,7 @@ from tractexp.api.compose import LoadModel, model_of
 from tractexp.api.identify import Identification
 from tractexp.api.read import dips_together
 from tractexp.api.response import Response
-from tractexp.api.setup import Given, recorded
+from tractexp.api.setup import Given, describe_records
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.blocks.terminal import show
@@ -29,9 +29,9 @@ from tractexp.identification.search import History, SearchResult, search
 from tractexp.inference.problem import Problem
 from tractexp.outcome import Written
 from tractexp.plugin import get, plugin
-from tractexp.progress import Progress, console, say, telling
-from tractexp.provenance import again
-from tractexp.wording import joined, shown_in_words, with_error
+from tractexp.progress import Progress, console, say, tell_stages
+from tractexp.provenance import build_again_command
+from tractexp.wording import join_words, shown_in_words, with_error
 
 if TYPE_CHECKING:
     from tractexp.discrepancy.investigate import Findings as Steps
@@ -310,7 +310,7 @@ def investigate(
         train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
         false_alarms=thresholds.false_alarms, criteria=dict(criteria or {}),
     )  # fmt: skip
-    return _concluded(question, _steps(question, progress))
+    return _build_investigation(question, _steps(question, progress))
 
 
 def _steps(question: Question, progress: Progress) -> "Steps":
@@ -318,7 +318,7 @@ def _steps(question: Question, progress: Progress) -> "Steps":
     from tractexp.discrepancy.investigate import investigate as findings_of
 
     q, base = question, question.model
-    with telling(progress) as tell:
+    with tell_stages(progress) as tell:
         if base.shown:
             tell(shown_in_words(base.shown))
         if base.priors:
@@ -337,13 +337,13 @@ def _search_end(seed: int, problem: Problem) -> np.ndarray:
     return end.values
 
 
-def _concluded(question: Question, steps: "Steps") -> Investigation:
+def _build_investigation(question: Question, steps: "Steps") -> Investigation:
     from tractexp.discrepancy.discrepancy_json import content
 
-    return Investigation(question, files.plain(content(steps)), _estimated(question, steps), steps)
+    return Investigation(question, files.plain(content(steps)), _estimate_extended_model(question, steps), steps)
 
 
-def _estimated(question: Question, steps: "Steps") -> Result:
+def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
     """The graded model's parameters as a result, which predicts and is logged as a model."""
     base, graded, effort = question.model, steps.final_grade, steps.context.effort
     values, problem = graded.values, graded.problem
@@ -362,14 +362,14 @@ def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str
 
     lines, domain = [], result.question.model.domain
     if model := paths.get(MODEL_FILE.name):
-        which = f", which has {joined(result.names)}" if result.verdict == "tied" else ""
+        which = f", which has {join_words(result.names)}" if result.verdict == "tied" else ""
         lines.append(f"use the extended model{which}: {use_of(domain, model)}")
         if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
             lines.append(f"use it as the base model: {investigate_with(domain, model)}")
     if result.content["adequacy"]["grade"] != Grade.ADEQUATE:
         context = result.steps.context
         better = [why for why in map(context.domain.better, context.events) if why][:1]
-        in_waves = again("task=discrepancy", "domain=waves", of=("data", "task"))
+        in_waves = build_again_command("task=discrepancy", "domain=waves", of=("data", "task"))
         lines += [f"next: {why}: {in_waves}" for why in better]
     if term := paths.get(PLUGIN):
         lines.append(f"use the proposed term: {adopt_term(term)}")
@@ -385,7 +385,7 @@ class Discrepancy(Task, call=investigate):
 
     def perform(self, job: Job, **instead: Any) -> Investigation:
         train, held = job.events_of_fit
-        for line in recorded(train, held, "hold out"):
+        for line in describe_records(train, held, "hold out"):
             say(line)
         job.prepare_log()
         return super().perform(job, records=train, validate=held, progress=lambda line: say(f"  {line}"), **instead)

@@ -15,8 +15,8 @@ from tractexp.identification.result import load
 from tractexp.outcome import Outcome
 from tractexp.plugin import build, plugin
 from tractexp.progress import say
-from tractexp.provenance import again
-from tractexp.record.identity import described
+from tractexp.provenance import build_again_command
+from tractexp.record.identity import describe_identities
 
 if TYPE_CHECKING:
     from tractexp.exchange.format import Identified
@@ -73,7 +73,7 @@ def export(
     does not describe the load it was fitted to, or is no physical load.
     """
     from tractexp.exchange.format import Identified
-    from tractexp.exchange.playback import played
+    from tractexp.exchange.playback import play_back_export
 
     check_range("task.bus", bus, 1)
     check_range("task.power", power, 1e-6)
@@ -94,12 +94,12 @@ def export(
     text = form.text(identified)
     notes = [
         *against,
-        *filter(None, described(fit.result.identities)),
+        *filter(None, describe_identities(fit.result.identities)),
         _base_sentence(identified, base, own.ratio, guessed=power is None and not own.in_mva),
         _powers(identified),
         *form.notes(identified),
     ]
-    agreement, more = played(form, text, identified) if playback else (None, [])
+    agreement, more = play_back_export(form, text, identified) if playback else (None, [])
     if agreement is not None:
         more.append(agreement.said(identified.power, ("MW", "Mvar")))
     share = None if agreement is None else agreement.share
@@ -111,7 +111,7 @@ def _objections(fit: Identification) -> list[str]:
     against = []
     if fit.grade == Grade.WRONG_MODEL:
         sentence = fit.result.adequacy["sentence"]
-        against.append(f"{sentence}; find what it lacks by {again('task=discrepancy')}, or choose another model")
+        against.append(f"{sentence}; find what it lacks by {build_again_command('task=discrepancy')}, or choose another model")
     if fit.doubts:
         against.append(f"this model is no physical load: {' and '.join(fit.doubts)}")
     return against

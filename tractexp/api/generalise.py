@@ -119,10 +119,10 @@ def generalise(
         )
     chosen = Choice.several("optimizer", optimizers)
     tell(progress, setup.lines())
-    return _generalised(setup, list(_searched(setup, chosen, seeds, progress)))
+    return _judge_generalization(setup, list(_run_searches(setup, chosen, seeds, progress)))
 
 
-def _searched(
+def _run_searches(
     setup: Setup, optimizers: Sequence[Choice], seeds: int, progress: Progress
 ) -> "Iterable[tuple[Result, list[Fit]]]":
     """The estimate, then where each search ended, with the fits of the held-out events."""
@@ -143,7 +143,7 @@ def _searched(
                 yield conclude(problem, end, values, fits, seed, node, name), fits[fitted:]
 
 
-def _generalised(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
+def _judge_generalization(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
     from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)

@@ -26,8 +26,8 @@ from tractexp.inference.problem import Problem
 from tractexp.outcome import FORMS, Written
 from tractexp.plugin import plugin
 from tractexp.progress import Progress, counter, tell
-from tractexp.provenance import again
-from tractexp.wording import epsilon, joined
+from tractexp.provenance import build_again_command
+from tractexp.wording import epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.exchange.operating_point import OperatingPoint
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 FIXED = "fixed"
 FORMS[Result] = (asdict, lambda content: Result.of(content, "the saved result"))
-MOVED = 2.0  # standard errors from which a rival structure's move is told
+LEAST_TOLD_MOVE = 2.0  # standard errors from which a rival structure's move is told
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -125,13 +125,13 @@ class Identification(Written):
     @classmethod
     def of(cls, setup: FitSpec, end: SearchResult, progress: Progress = False) -> "Identification":
         """Judge what a search found."""
-        result, details = _concluded(setup, end, progress)
+        result, details = _conclude_identification(setup, end, progress)
         return cls(result, setup, end, details)
 
     @functools.cached_property
     def details(self) -> FitDetails:
         """What stands behind the result: computed again where this was loaded."""
-        return self.behind or _concluded(self.spec, self.search_result)[1]
+        return self.behind or _conclude_identification(self.spec, self.search_result)[1]
 
     @property
     def spec(self) -> FitSpec:
@@ -279,7 +279,7 @@ class Identification(Written):
         for rival in self.result.rival_structures:
             for e in (self.parameters[name] for name in rival["parameters"]):
                 value, before = rival["parameters"][e.name], far.get(e.name, ("", e.value))[1]
-                if abs(value - e.value) > max(MOVED * (e.standard_error or 0.0), abs(before - e.value)):
+                if abs(value - e.value) > max(LEAST_TOLD_MOVE * (e.standard_error or 0.0), abs(before - e.value)):
                     far[e.name] = rival["name"], value
         return far
 
@@ -316,7 +316,7 @@ class Identification(Written):
         ratio = self.result.search["objective"] / self.result.objective if self.result.objective else float("inf")
         why = f"it stopped short of the minimum, at {ratio:.3g} times its objective" if ratio > 1 else "it is elsewhere"
         lie = "lies" if len(away) == 1 else "lie"
-        return f"; its {joined(away)} {lie} outside the estimate's interval: {why}"
+        return f"; its {join_words(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
         end = None if self.end is None else asdict(self.end)
@@ -391,12 +391,12 @@ def identify(
         raise Stopped.of(stop, result=setup.so_far(end or getattr(stop, "state", None))) from None
 
 
-def _concluded(setup: FitSpec, end: SearchResult, progress: Progress = False) -> tuple[Result, FitDetails]:
+def _conclude_identification(setup: FitSpec, end: SearchResult, progress: Progress = False) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
     from tractexp.identification.grade import grade_estimate, grade_model
-    from tractexp.identification.profile import checked
+    from tractexp.identification.profile import check_by_profiles
     from tractexp.identification.rivals import with_rivals
     from tractexp.identification.yardstick import yardstick
 
@@ -406,7 +406,7 @@ def _concluded(setup: FitSpec, end: SearchResult, progress: Progress = False) ->
     graded = grade_model(problem, setup.validate, end.values, shown)
     uncertainty = graded.uncertainty
     if setup.check_intervals:
-        profiled = checked(uncertainty, counter("points at most on the profiles", progress))
+        profiled = check_by_profiles(uncertainty, counter("points at most on the profiles", progress))
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
@@ -440,7 +440,7 @@ def _with_priors(problem: Problem, result: Result) -> list[str]:
     point = OperatingPoint.of(result)
     if problem.priors or not (point and point.doubt) or not departures(problem, problem.defaults[None]).size:
         return []
-    return [f"hold the motor to what machines usually are: {again('model.priors=true')}"]
+    return [f"hold the motor to what machines usually are: {build_again_command('model.priors=true')}"]
 
 
 @plugin

@@ -10,7 +10,7 @@ from tractexp.api.arguments import public
 from tractexp.api.compose import DOMAIN
 from tractexp.api.read import Dips, dips_of, dips_together
 from tractexp.api.response import Response, response_of
-from tractexp.api.setup import recorded
+from tractexp.api.setup import describe_records
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import choices, defaults
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tractexp.identification.linear_network import BlackBox
     from tractexp.identification.result import Fit
 
-MOST = 12  # poles that may be asked for
+MOST_ASKED_POLES = 12  # poles that may be asked for
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -48,12 +48,12 @@ class NetworkFit(Written):
     @functools.cached_property
     def box(self) -> "BlackBox":
         """The network; of a loaded result it is fitted again."""
-        return _fitted(self)[0]
+        return _fit_networks(self)[0]
 
     @functools.cached_property
     def fits(self) -> "list[Fit]":
         """What it calculates of each event beside what was recorded."""
-        return _played(self.box, self)
+        return _play_network(self.box, self)
 
     @property
     def poles(self) -> list[dict[str, float]]:
@@ -110,22 +110,22 @@ def linear_network(
     """
     domain = domain or defaults()[DOMAIN]
     check_choice("domain", domain, sorted(choices()[DOMAIN]))
-    check_range("task.poles", poles, 0, MOST)
+    check_range("task.poles", poles, 0, MOST_ASKED_POLES)
     train, held_out = dips_together(records, validate)
     request = NetworkFit(train, held_out, domain, poles, {})
-    tell(progress, recorded(train, held_out))
-    box, boxes = _fitted(request)
+    tell(progress, describe_records(train, held_out))
+    box, boxes = _fit_networks(request)
     return NetworkFit(train, held_out, domain, poles, files.plain(_content(request, box, boxes)))
 
 
-def _fitted(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
+def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
     """The network for the events of a call, and those of fewer and of more poles."""
     from tractexp.domain import DOMAINS
-    from tractexp.identification.linear_network import MOST, black_boxes, selection
+    from tractexp.identification.linear_network import MOST_VECTOR_POLES, black_boxes, selection
 
     domain = DOMAINS[of.domain]
     train, held_out = domain.events(of.train), domain.events(of.validate)
-    boxes = black_boxes(domain, train, MOST if of.order is None else of.order)
+    boxes = black_boxes(domain, train, MOST_VECTOR_POLES if of.order is None else of.order)
     if of.order is None:
         return selection(boxes, train, held_out), boxes
     if len(boxes) <= of.order:
@@ -142,7 +142,7 @@ def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
     return Fit(role=role, **vars(box.play(box.domain.event(event))))
 
 
-def _played(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
+def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
     from tractexp.identification.result import TRAIN, VALIDATE
 
     return [_play(box, e, role) for role, events in ((TRAIN, of.train), (VALIDATE, of.validate)) for e in events]
@@ -153,10 +153,10 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
     from tractexp.identification.yardstick import network_in_words
     from tractexp.inference.model_error import ModelError
 
-    fits = _played(box, of)
+    fits = _play_network(box, of)
     error, by_poles = model_errors(fits), []
     for one in boxes:
-        own = model_errors(_played(one, of))
+        own = model_errors(_play_network(one, of))
         held = own["held_out"] and own["held_out"]["value"]
         by_poles.append({"poles": len(one.poles), "model_error": own["value"], "held_out": held})
     sentence = f"{network_in_words(len(box.poles))} leaves {ModelError.of(error)}"

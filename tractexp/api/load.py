@@ -6,7 +6,7 @@ from pathlib import Path
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.errors import UserError, among
-from tractexp.outcome import MARK, Outcome, saved
+from tractexp.outcome import MARK, Outcome, read_saved_result
 
 
 @public
@@ -22,7 +22,7 @@ def load(path: str | Path) -> Outcome:
         from tractexp.identification.result import load as read_result
 
         return Identification(read_result(Path(path)))
-    content = saved(path)
+    content = read_saved_result(path)
     kinds = result_kinds()
     if content["kind"] not in kinds:
         why = among(content["kind"], kinds, "Kinds")

@@ -42,7 +42,7 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
 def _estimates(fit: "Identification") -> dict[str, float]:
     """Each estimate with the ends of its interval, and on the base of the file where that differs."""
     metrics: dict[str, float] = {}
-    for name, one in _named(fit.parameters).items():
+    for name, one in _name_for_tracking(fit.parameters).items():
         metrics[name] = one.value
         if one.interval is not None:
             metrics |= {f"{name}_low": one.interval[0], f"{name}_high": one.interval[1]}
@@ -70,7 +70,7 @@ def _errors(fit: "Identification") -> dict[str, float]:
 def _of_search(fit: "Identification") -> dict[str, float]:
     """Where the optimizer itself ended, and after how many simulations it was within 1 % of the estimate."""
     metrics = {f"search_{key}": fit.result.search[key] for key in ENDED}
-    metrics |= {f"search_{name}": one.search for name, one in _named(fit.parameters).items()}
+    metrics |= {f"search_{name}": one.search for name, one in _name_for_tracking(fit.parameters).items()}
     history = fit.search_result.history
     there = np.flatnonzero(history.objective <= FLOOR * fit.result.objective)
     reached = float(history.simulations[there[0]]) if there.size else float("inf")
@@ -90,6 +90,6 @@ def _curves(fit: "Identification") -> dict[str, Any]:
     }
 
 
-def _named(parameters: "Mapping[str, Estimate]") -> "dict[str, Estimate]":
+def _name_for_tracking(parameters: "Mapping[str, Estimate]") -> "dict[str, Estimate]":
     """Parameters by the names that MLflow takes: T_m[1] is T_m_1."""
     return {name.replace("[", "_").rstrip("]"): one for name, one in parameters.items()}

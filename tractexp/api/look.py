@@ -15,14 +15,14 @@ from tractexp.api.read import node_of, record_from_dict, record_to_dict, table
 from tractexp.blocks import Report, Table
 from tractexp.errors import UserError
 from tractexp.outcome import Tabulated, Written
-from tractexp.overrides import typed
-from tractexp.progress import Progress, staged
+from tractexp.overrides import build_typed_command
+from tractexp.progress import Progress, tell_late_stages
 from tractexp.record import Event, Record
-from tractexp.record.wave_event import COARSEST, smeared
-from tractexp.recording.feeder import can_be_named, unrecognised
+from tractexp.record.wave_event import COARSEST, describe_smearing
+from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
 
@@ -113,7 +113,7 @@ class Look(Written):
         """
         import pandas
 
-        return pandas.DataFrame(series(_picked(_picked(self.views, file, "file").sights, feeder, "load")))
+        return pandas.DataFrame(series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load")))
 
     def waveforms(self, file: int = 0) -> Any:
         """A frame of all channels of a file in primary values: t [s], then each channel [kV, kA, ...].
@@ -122,7 +122,7 @@ class Look(Written):
         """
         import pandas
 
-        recording = _picked(self.views, file, "file").recording
+        recording = _pick_item(self.views, file, "file").recording
         if recording is None:
             raise UserError(f"{self.content['files'][file]['file']} is a table of U, P and Q, without waveforms")
         t = np.concatenate([s.t for s in recording.segments])
@@ -142,7 +142,7 @@ class Look(Written):
             for file, load in self._loads
             for event in load["events"]
         ]
-        title = f"{counted(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
+        title = f"{count_noun(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
@@ -155,7 +155,7 @@ class Look(Written):
         """Notes, channels, why the loads are such, all events and all commands."""
         from tractexp.report import look_console
 
-        return look_console.everything(self.content)
+        return look_console.build_full_report(self.content)
 
     def report(self) -> Report:
         from tractexp.report import look
@@ -187,7 +187,7 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     if not flat:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
     distinct = list(dict.fromkeys(map(_source, flat)))
-    with staged(progress) as stage:
+    with tell_late_stages(progress) as stage:
         views = []
         for k, source in enumerate(distinct, start=1):
             of = f"{k} of {len(distinct)}: " * (len(distinct) > 1)
@@ -264,7 +264,7 @@ def _content(view: View) -> dict[str, Any]:
     else:
         last = recording.segments[-1]
         shown = any(each.feeder is None or each.feeder.currents for each in view.sights)
-        lacks = "" if shown else unrecognised(recording)
+        lacks = "" if shown else explain_unrecognized(recording)
         content |= {
             "station": recording.station, "device": recording.device,
             "start": recording.start and recording.start.isoformat(),
@@ -330,7 +330,7 @@ def command(view: View, shown: Sight) -> str:
         return ""
     usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
     settings = {**view.node, **choice}
-    text = typed({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+    text = build_typed_command({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
     return f"{text} domain=waves" if waves_serve(view, shown) else text
 
 
@@ -343,7 +343,7 @@ def waves_serve(view: View, shown: Sight) -> bool:
     ends = [(s, s.start + (s.stop - s.first) / s.rate) for s in view.recording.waveforms()]
     there = next((s for s, end in ends if s.start <= first.start and first.end <= end), None)
     fine = there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
-    return fine and bool(smeared(first.end - first.start, first.U2 or 0.0, f))
+    return fine and bool(describe_smearing(first.end - first.start, first.U2 or 0.0, f))
 
 
 def _is_usual(setting: Any, value: Any) -> bool:
@@ -364,7 +364,7 @@ def _sums(shown: Sight) -> dict[str, Any]:
     return sums
 
 
-def _picked(items: Sequence[Any], k: int, what: str) -> Any:
+def _pick_item(items: Sequence[Any], k: int, what: str) -> Any:
     if not -len(items) <= k < len(items):
         raise UserError(f"there is no {what} {k}; there are {len(items)}, counted from 0")
     return items[k]

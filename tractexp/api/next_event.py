@@ -11,7 +11,7 @@ from tractexp.api.setup import Setup
 from tractexp.blocks import Report, Table
 from tractexp.errors import MODEL, TASK, UserError, setting
 from tractexp.outcome import Written
-from tractexp.progress import Progress, telling
+from tractexp.progress import Progress, tell_stages
 from tractexp.record.identity import title_of
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ class Recommended(Written):
         return next_event.report(self.event, title_of(e.record for e in self.setup.train))
 
 
-def recommended(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
+def recommend_event(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
     """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
     sets = sets_of(rivals)
     event = _event(setup, sets, progress)
@@ -98,5 +98,5 @@ def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) ->
     m = setup.model
     if m.per_event:
         raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
-    with telling(progress) as tell:
+    with tell_stages(progress) as tell:
         return event_for(m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell)

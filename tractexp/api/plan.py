@@ -11,7 +11,7 @@ import numpy as np
 from tractexp import files
 from tractexp.api.arguments import public
 from tractexp.api.identify import Identification
-from tractexp.api.next_event import Recommended, recommended
+from tractexp.api.next_event import Recommended, recommend_event
 from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
@@ -50,7 +50,7 @@ class Forecasts(Written):
     @functools.cached_property
     def planned(self) -> Planned:
         """What stands behind the page; of a loaded result it is computed again."""
-        return self.behind or _planned(self.setup, **self.asked)
+        return self.behind or _forecast_plan(self.setup, **self.asked)
 
     @property
     def depth_needed(self) -> float | None:
@@ -122,18 +122,18 @@ def plan(
         check_range("task.noise", noise, 1e-9, 1.0)
     setup = Setup.of(records, model, bounds=bounds, fixed=fixed, substeps=substeps, domain=domain)
     if rivals:
-        return recommended(setup, rivals, progress)
+        return recommend_event(setup, rivals, progress)
     if isinstance(values, Identification):
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
         "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
         "jump": jump, "unbalance": unbalance, "values": values, "least": least, "events": events,
     }  # fmt: skip
-    planned = _planned(setup, **asked)
+    planned = _forecast_plan(setup, **asked)
     return Forecasts(setup, asked, files.plain(_content(planned)), planned)
 
 
-def _planned(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
+def _forecast_plan(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
              **given: Any) -> Planned:  # fmt: skip
     """Everything forecast: how deep, over what, and the best events."""
     problem, recorded = setup.problem, setup.train
@@ -151,7 +151,7 @@ def _planned(setup: Setup, parameter: str, within: float, values: Any, least: fl
     scans = _scans(problem, at, shape)
     needed = planning.depth_needed(scans[DEPTH][1], parameter, within)
     best = planning.best_events(problem, at, least, events) if len(recorded) > 1 else []
-    return Planned(problem, at, origin, _described(shape), needed, scans, best, least, events)
+    return Planned(problem, at, origin, _describe_shape(shape), needed, scans, best, least, events)
 
 
 def chosen_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
@@ -186,9 +186,9 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
     """Free values (d,) to plan at, where they are from, and the noise that the fit showed."""
     problem = setup.problem_of([event])
     if values == FIT:
-        from tractexp.identification.estimate import polished
+        from tractexp.identification.estimate import estimate_without_search
 
-        fit = polished(problem)
+        fit = estimate_without_search(problem)
         origin = f"the estimate of {event.record.name}"
         if not fit.surprise.adequate:
             origin += ", though more than noise is left there, which the forecast counts as noise"
@@ -220,7 +220,7 @@ def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     return scans | {shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])}
 
 
-def _described(shape: DipShape) -> str:
+def _describe_shape(shape: DipShape) -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
     first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
     names = shape.domain.channels

@@ -15,7 +15,7 @@ from tractexp.errors import UserError, among
 from tractexp.outcome import FORMS, Tabulated
 from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
 from tractexp.record.dips import around
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
 GROUP = "data"
@@ -42,7 +42,7 @@ class Dips(Tabulated, list[Event]):
         ]  # fmt: skip
         columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
                    "channels"]  # fmt: skip
-        return Table(columns, rows, counted(len(self), "dip"), words=(8,))
+        return Table(columns, rows, count_noun(len(self), "dip"), words=(8,))
 
     def summary(self) -> Report:
         """The table, and what a reader or the detection found odd."""

@@ -11,7 +11,7 @@ from tractexp.api.read import Dips, dips_together
 from tractexp.api.task import OF_MODEL
 from tractexp.errors import check_range
 from tractexp.outcome import Plain
-from tractexp.progress import Progress, searching
+from tractexp.progress import Progress, report_search
 from tractexp.record import Event, describe
 from tractexp.record.identity import Identity
 from tractexp.schema import LEAST
@@ -75,18 +75,18 @@ class Setup(Given):
         model = f"model: {problem.model.title}, {problem.space.dimension} parameters"
         steps = f"Runge-Kutta steps: {problem.step.describe(problem.events)}"
         shown = [shown_in_words(self.model.shown)] if self.model.shown else []
-        return [*recorded(self.train, self.validate), f"{model}; {steps}", *shown]
+        return [*describe_records(self.train, self.validate), f"{model}; {steps}", *shown]
 
     def search(self, optimizer: Choice, seed: int, progress: Progress) -> "SearchResult":
         """Search, and show how far that is."""
         from tractexp.identification.search import search
 
         plugin = optimizer.build("optimizer")
-        with searching(plugin.end(self.budget), self.budget, progress) as callback:
+        with report_search(plugin.end(self.budget), self.budget, progress) as callback:
             return search(self.problem, plugin, seed, self.limits, callback)
 
 
-def recorded(train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate") -> Iterator[str]:
+def describe_records(train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate") -> Iterator[str]:
     """What is read, a sentence for each event and each of its notes, and of each recording which load it is of."""
     said: list[Identity] = []
     for role, group in (("fit", train), (held_out, validate)):

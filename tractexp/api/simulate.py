@@ -156,11 +156,11 @@ def simulate(
     own = fit.result.base if fit else None
     ratio = own.ratio if own else 1.0
     before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in powers.items()}
-    played = [respond_to(load.model, at, e, own) for e in events] or [_played(load, at, dip, before, ratio)]
+    played = [respond_to(load.model, at, e, own) for e in events] or [_play_dip(load, at, dip, before, ratio)]
     return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
 
 
-def _played(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
+def _play_dip(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
     """The response to a dip made by hand, `ratio` times the power that the model draws on its own base."""
     t, shape = dip.voltage()
     U = before["U0"] * shape

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 from tractexp import files, quoting
 from tractexp.api.arguments import public
 from tractexp.api.look import Listed
-from tractexp.api.surveying import keys, looked
+from tractexp.api.surveying import keys, look_at_files
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.errors import DATA, UserError, check_range
 from tractexp.outcome import Written
-from tractexp.overrides import typed
+from tractexp.overrides import build_typed_command
 from tractexp.plugin import discover, get, plugin
-from tractexp.progress import Progress, counting, staged
+from tractexp.progress import Progress, count_parts, tell_late_stages
 from tractexp.record import detect
 from tractexp.recording import archive
 from tractexp.report import survey as shown
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from tractexp.identification.plan import ChosenEvent
 
 ROWS = "rows"  # in the folder of `keep`: an entry for each file that was looked at
-CANDIDATES = 300  # events that are read again to be ranked: those of the greatest depth over noise
+MOST_RANKED_EVENTS = 300  # events that are read again to be ranked: those of the greatest depth over noise
 LEAST_NOISE = 1e-4  # of P: what shows less is not told from what shows so much
 PICTURES = ("U_picture", "P_picture")
 ABOUT = {
@@ -130,8 +130,8 @@ def survey(
     entries = {name: store.read(key) for name, key in names.items()} if keep else {}
     rows = {name: json.loads(entry) for name, entry in entries.items() if entry is not None}
     fresh = [name for name in names if name not in rows]
-    with counting("files", len(fresh), progress) as count:
-        for name, fresh_rows in looked(place, fresh, cores or -1):
+    with count_parts("files", len(fresh), progress) as count:
+        for name, fresh_rows in look_at_files(place, fresh, cores or -1):
             rows[name] = files.plain(fresh_rows)
             store.write(names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode())
             count()
@@ -141,14 +141,14 @@ def survey(
     }  # fmt: skip
     if informative is None:
         return Surveyed(content)
-    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:CANDIDATES]
+    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:MOST_RANKED_EVENTS]
     settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
-    with staged(progress) as stage:
+    with tell_late_stages(progress) as stage:
         stage(f"choosing among {len(worth)} events")
         best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
     content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
-    content["command"] = typed({"name": reader, "path": str(folder), "train": [c.name for c in best]})
+    content["command"] = build_typed_command({"name": reader, "path": str(folder), "train": [c.name for c in best]})
     return Surveyed(content)
 
 
@@ -196,7 +196,7 @@ class Survey(Task, call=survey, given=("folder", "keep")):
             return result
         model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
         data = {"name": node["name"], "path": node["path"], "train": result.informative}
-        return Surveyed({**result.content, "command": typed(data, *model)})
+        return Surveyed({**result.content, "command": build_typed_command(data, *model)})
 
     def logged(self, job: Job, result: Surveyed) -> dict[str, Any]:
         rows = result.content["rows"]

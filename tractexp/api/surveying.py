@@ -25,18 +25,18 @@ COLUMNS = (
     "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
 )  # fmt: skip
 KILLED = "the program was killed at this file, as where the computer's memory is too small for it"
-FEW = 2  # files that this process looks at sooner than others have started
+MOST_OWN_FILES = 2  # files that this process looks at sooner than others have started
 UNRECOGNISED = "no voltages and currents of one load were recognised"
-POINTS = 48  # of a small picture
+PICTURE_POINTS = 48  # of a small picture
 AROUND = (0.1, 0.3)  # s before and after an event in its picture
-LONGEST = 5.0  # s of an event there
+LONGEST_PICTURED_EVENT = 5.0  # s of an event there
 
 
 def rows_of(folder: str, file: str) -> Rows:
     """The rows of one file, `file` being its path within the folder. Nothing that happens in here is an error."""
     row: dict[str, Any] = dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
     try:
-        view = archive.looked(Path(folder, file))
+        view = archive.look_at_file(Path(folder, file))
         rows = [
             row | _event(view, file, number, shown, event)
             for number, shown in enumerate(view.sights, 1)
@@ -84,14 +84,14 @@ def _pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
     """U and P about an event, as shares of the greatest in the picture, few points each."""
     columns = series(shown)
     t, what = columns["t"], event.what
-    first, stop = np.searchsorted(t, [what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1]])
+    first, stop = np.searchsorted(t, [what.start - AROUND[0], min(what.end, what.start + LONGEST_PICTURED_EVENT) + AROUND[1]])
     return {f"{name}_picture": _few(columns[name][first:stop]) for name in ("U", "P")}
 
 
 def _few(values: np.ndarray) -> list[float | None]:
     """At most `POINTS` values (n,), the lowest and the highest of each stretch, as shares of the greatest size."""
-    if len(values) > POINTS:
-        parts = np.array_split(values, POINTS // 2)
+    if len(values) > PICTURE_POINTS:
+        parts = np.array_split(values, PICTURE_POINTS // 2)
         ends = [sorted((int(np.argmin(p)), int(np.argmax(p)))) for p in parts]
         values = np.array([p[k] for p, pair in zip(parts, ends, strict=True) for k in pair])
     finite = values[np.isfinite(values)]
@@ -99,12 +99,12 @@ def _few(values: np.ndarray) -> list[float | None]:
     return [round(float(v) / size, 3) if size and np.isfinite(v) else None for v in values]
 
 
-def looked(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
+def look_at_files(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
     """(file, its rows) of files within a folder, as they are done, on so many processes (-1: one for each core).
 
     A file at which a process is killed is looked at again by itself; if that one is killed too, its row says so.
     """
-    workers = Workers(cores if len(names) > FEW else 1)
+    workers = Workers(cores if len(names) > MOST_OWN_FILES else 1)
     with contextlib.closing(workers.results(functools.partial(rows_of, str(folder)), names)) as results:
         for name, rows in results:
             yield name, rows or [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}]

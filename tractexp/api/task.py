@@ -134,7 +134,7 @@ class Task(Plugin):
         say()
         if self.draws(job):
             paths += result.write_drawings(job.folder)
-        listed(paths)
+        print_paths(paths)
         self.log(job, result, paths)
 
     def log(self, job: "Job", result: Any, paths: list[Path]) -> None:
@@ -166,7 +166,7 @@ def _plain(kind: Any) -> Any:
     return list[get_args(kind)[0]] if get_origin(kind) is not None else kind
 
 
-def listed(paths: Iterable[Path]) -> None:
+def print_paths(paths: Iterable[Path]) -> None:
     """Print what was written."""
     for path in paths:
         say(f"  {path}")

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from tractexp import files, quoting, store
 from tractexp.blocks import plotly, style
 
-MOST = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
+MOST_LINE_POINTS = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
 SETTINGS = {
     "responsive": True,
@@ -30,24 +30,24 @@ SETTINGS = {
 LICENSE = "// plotly.js, copyright Plotly, Inc., MIT license"
 PAPER = 680  # pixels, the width of a printed page
 PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its entries without the name, a letter
-GAP = 0.045  # of the height, between panels
+PANEL_GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
-SHOWN = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
+MOST_DRAWN_POINTS = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
 TICK = 28  # letters of a trace's name beside its axis
-HELD = 32767  # the greatest of 16 bits; the least stands for a gap
+GREATEST_CODE = 32767  # the greatest of 16 bits; the least stands for a gap
 
 
 @functools.cache
 def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
-    drawing = files.packaged("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
-    drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(SHOWN))
-    program = store.TEXTS.get(store.key("charts", plotly.digest(), drawing), lambda: packed(plotly.code() + drawing))
-    return "\n".join([files.packaged("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");'])
+    drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
+    drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
+    program = store.TEXTS.get(store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing))
+    return "\n".join([files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");'])
 
 
-def packed(program: str) -> bytes:
+def pack_program(program: str) -> bytes:
     """A program as gzip and base 64 pack it: two fifths of its length, and the same for the same program."""
     return base64.b64encode(gzip.compress(program.encode(), mtime=0))
 
@@ -88,7 +88,7 @@ class Chart:
 
     @staticmethod
     def _laid_out(labels: Sequence[str], heights: Sequence[float], log: bool) -> dict[str, dict[str, Any]]:
-        room = (1 - GAP * (len(labels) - 1)) / sum(heights)
+        room = (1 - PANEL_GAP * (len(labels) - 1)) / sum(heights)
         top, axes = 1.0, {}
         for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
             low = max(top - share * room, 0.0)
@@ -97,7 +97,7 @@ class Chart:
             if log:
                 axis |= {"type": "log", "exponentformat": "power"}
             axes[_axis("yaxis", k)] = axis
-            top = low - GAP
+            top = low - PANEL_GAP
         return axes
 
     def line(
@@ -108,10 +108,10 @@ class Chart:
 
         Without `legend` it is named where it is pointed at only.
         """
-        x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST)
+        x, y = style.thin(np.asarray(x, dtype=float), np.asarray(y, dtype=float), MOST_LINE_POINTS)
         shape = {"shape": "hv"} if step else {}
         line = {"color": color, "width": width, "dash": dash, **shape}
-        packed: dict[str, Any] = {"x": _packed(x, "f8"), "y": _packed(y, "f4")}
+        packed: dict[str, Any] = {"x": _pack_numbers(x, "f8"), "y": _pack_numbers(y, "f4")}
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def samples(
@@ -125,13 +125,13 @@ class Chart:
         """
         line = {"color": color, "width": width, "dash": dash}
         reading: dict[str, Any] = {"panel": self._panels[panel], "label": label or name}
-        return self._add(name, panel, mode="lines", line=line, samples=_coded(start, step, y), **reading)
+        return self._add(name, panel, mode="lines", line=line, samples=_encode_curve(start, step, y), **reading)
 
     def phasors(
         self, name: str, start: float, step: float, y: NDArray[np.complex128], color: str, panel: int
     ) -> "Chart":
         """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as arrows."""
-        coded = {"re": _coded(start, step, y.real), "im": _coded(start, step, y.imag)}
+        coded = {"re": _encode_curve(start, step, y.real), "im": _encode_curve(start, step, y.imag)}
         return self._add(name, panel, mode="lines", line={"color": color}, silent=True, x=[None], y=[None],
                          phasor=coded, panel=self._panels[panel])  # fmt: skip
 
@@ -167,7 +167,7 @@ class Chart:
             }  # fmt: skip
         if hover:
             trace |= {"text": [quoting.html(t) for t in hover], "hovertemplate": "%{text}<extra></extra>"}
-        return self._add(name, panel, mode="markers", x=_listed(x), y=_listed(y), **trace)
+        return self._add(name, panel, mode="markers", x=_list_values(x), y=_list_values(y), **trace)
 
     def bars(
         self, name: str, labels: Sequence[str], values: Sequence[float], color: str | Sequence[str], panel: int = 0, *,
@@ -177,7 +177,7 @@ class Chart:
         self._axes[_axis("yaxis", panel)] |= {"autorange": "reversed", "type": "category"}
         trace: dict[str, Any] = {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
         return self._add(
-            name, panel, kind="bar", orientation="h", x=_listed(values), y=_listed(labels),
+            name, panel, kind="bar", orientation="h", x=_list_values(values), y=_list_values(labels),
             marker={"color": color if isinstance(color, str) else list(color)},
             hovertemplate="%{y}: %{x:.4g}<extra></extra>", **trace,
         )  # fmt: skip
@@ -189,9 +189,9 @@ class Chart:
         """What lies between two curves, lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
         quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
-        quiet["x"] = _packed(np.asarray(x, dtype=float), "f8")
-        self._add(name, panel, y=_packed(lower, "f4"), silent=True, **quiet)
-        return self._add(name, panel, y=_packed(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
+        quiet["x"] = _pack_numbers(np.asarray(x, dtype=float), "f8")
+        self._add(name, panel, y=_pack_numbers(lower, "f4"), silent=True, **quiet)
+        return self._add(name, panel, y=_pack_numbers(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
 
     def shade(
         self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3,
@@ -317,22 +317,22 @@ def _height(panel: int | None) -> dict[str, Any]:
     return {"yref": "paper" if panel is None else f"{_axis('y', panel)} domain", "y0": 0, "y1": 1}
 
 
-def _coded(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
+def _encode_curve(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
     """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan is a gap."""
     finite = np.isfinite(y)
     low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
-    offset, scale = (low + high) / 2, max((high - low) / (2 * HELD), 1e-300)
-    held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -HELD - 1).astype("<i2")
+    offset, scale = (low + high) / 2, max((high - low) / (2 * GREATEST_CODE), 1e-300)
+    held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -GREATEST_CODE - 1).astype("<i2")
     coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
     return coded | {"offset": offset, "scale": scale}
 
 
-def _packed(values: np.ndarray, kind: str) -> dict[str, str]:
+def _pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
     """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
     return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
 
 
-def _listed(values: Sequence[Any] | np.ndarray) -> list[Any]:
+def _list_values(values: Sequence[Any] | np.ndarray) -> list[Any]:
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
     return [quoting.html(v) if isinstance(v, str) else None if v != v else v for v in plain]
 

@@ -16,7 +16,7 @@ from tractexp.blocks import Report, Table
 from tractexp.blocks import block as blocks
 from tractexp.blocks.chart import script
 
-SHORT = 14  # letters of a word that never needs a second line
+LONGEST_UNBROKEN_WORD = 14  # letters of a word that never needs a second line
 
 
 def page(report: Report) -> str:
@@ -24,7 +24,7 @@ def page(report: Report) -> str:
     figures = itertools.count(1)
     title, lead = quoting.html(report.title), quoting.html(report.lead)
     head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
-    style = files.packaged("blocks/page.css")
+    style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
     body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
@@ -105,7 +105,7 @@ def _below(caption: str) -> str:
 
 def _table(table: Table) -> str:
     """A table; the first column is to the left, the others are figures but for those that hold words."""
-    long = [any(len(row[i]) > SHORT for row in table.cells) for i in range(len(table.columns))]
+    long = [any(len(row[i]) > LONGEST_UNBROKEN_WORD for row in table.cells) for i in range(len(table.columns))]
     kinds = {i: "words" if long[i] else "short" for i in table.words}
     marks = [f'<{{0}} class="{kinds[i]}">' if i in kinds else "<{0}>" for i in range(len(table.columns))]
 
@@ -129,7 +129,7 @@ def _inline(drawing: str, prefix: str, label: str) -> str:
     return drawing.replace("<svg", f'<svg role="img" aria-label="{quoting.html(label)}"', 1)
 
 
-def _displayed(latex: str) -> str:
+def _enlarge_fractions(latex: str) -> str:
     """Fractions that are inside nothing else in their full size, as LaTeX has them in a displayed equation."""
     depth = itertools.accumulate((c == "{") - (c == "}") for c in latex)
     outside = {m.start() for m in re.finditer(r"\\frac", latex)} & {i for i, d in enumerate(depth) if d == 0}
@@ -140,10 +140,10 @@ def _displayed(latex: str) -> str:
 def _typeset(latex: str) -> str:
     """SVG of an equation, from the store or drawn; "" for LaTeX beyond mathtext."""
     key = store.key(store.version("matplotlib"), latex)
-    return store.DRAWINGS.get(key, lambda: _drawing(_displayed(latex))).decode()
+    return store.DRAWINGS.get(key, lambda: _draw_equation(_enlarge_fractions(latex))).decode()
 
 
-def _drawing(latex: str) -> bytes:
+def _draw_equation(latex: str) -> bytes:
     """An SVG document, of no bytes where mathtext refuses the LaTeX."""
     from matplotlib import rc_context
     from matplotlib.figure import Figure

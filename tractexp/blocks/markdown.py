@@ -23,7 +23,7 @@ def _parts(block: blocks.Block) -> Iterator[str]:
         case blocks.Items(texts):
             yield "\n".join(f"- {quoting.markdown(text)}" for text in texts)
         case blocks.CodeBlock(text):
-            yield quoting.fenced(text)
+            yield quoting.fence_markdown(text)
         case blocks.Equation(latex):
             yield f"$$ {latex} $$"
         case Table():

@@ -30,7 +30,7 @@ def library() -> Path:
 
 def code() -> str:
     """The library as pages carry it."""
-    return needed(library().read_text(encoding="utf-8"))
+    return select_needed_modules(library().read_text(encoding="utf-8"))
 
 
 def digest() -> str:
@@ -38,7 +38,7 @@ def digest() -> str:
     return hashlib.sha256(library().read_bytes() + Path(__file__).read_bytes()).hexdigest()
 
 
-def needed(whole: str) -> str:
+def select_needed_modules(whole: str) -> str:
     """What our charts need of the library; all of it where it is made otherwise than known."""
     common, lazy = COMMON.search(whole), LAZY.search(whole)
     if not (common and lazy):

@@ -19,7 +19,7 @@ PHASES = ("#E69F00", "#009E73", "#56B4E9")  # a, b, c: none of them is a model's
 FAINT = "#666666"
 BEHIND = "#CFCFCF"  # what is there to compare with, behind what is shown
 
-POINTS = 800  # a line has at most about this many: a page is narrower than that
+MOST_POINTS_A_LINE = 800  # a line has at most about this many: a page is narrower than that
 SETTINGS: Any = {
     "svg.fonttype": "none",  # text stays text: searchable, readable by machines, no fonts to embed
     "svg.hashsalt": "tractexp",
@@ -41,7 +41,7 @@ SETTINGS: Any = {
 }
 
 
-def thin(x: np.ndarray, y: np.ndarray, points: int = POINTS) -> tuple[np.ndarray, np.ndarray]:
+def thin(x: np.ndarray, y: np.ndarray, points: int = MOST_POINTS_A_LINE) -> tuple[np.ndarray, np.ndarray]:
     """At most about `points` of (x, y), both (n,): the lowest and highest of each of `points`/2 stretches, and gaps.
 
     No dip or spike is lost, however short. nan is kept, so that a gap stays a gap.

@@ -7,7 +7,7 @@ from typing import Any
 from tractexp.blocks.block import CodeBlock, Heading, Items, Paragraphs, Report, Table, VerdictBlock
 from tractexp.wording import one_line
 
-WIDTH = 200  # characters of a line of text that is no terminal's
+PLAIN_LINE_WIDTH = 200  # characters of a line of text that is no terminal's
 
 
 def show(report: Report, console: Any) -> None:
@@ -42,7 +42,7 @@ def plain(report: Report) -> str:
 
     text = io.StringIO()
     show(
-        report, Console(file=text, highlight=False, soft_wrap=True, width=WIDTH, color_system=None, force_jupyter=False)
+        report, Console(file=text, highlight=False, soft_wrap=True, width=PLAIN_LINE_WIDTH, color_system=None, force_jupyter=False)
     )
     return "\n".join(line.rstrip() for line in text.getvalue().rstrip().splitlines())
 

@@ -20,14 +20,14 @@ RESULT = "result.json"
 SEARCHED = "--config-dir"
 
 
-def again(arguments: list[str]) -> list[str]:
+def build_repeat_command(arguments: list[str]) -> list[str]:
     """The arguments of `tractexp` that repeat a run with other settings, in the folder where that ran.
 
     What the task does not read is left out, and a setting of a group goes with the choice of another there. A task that
     takes a result (`task.parameters`) is given that of the run. The folder may be somebody else's: what it may say is
     in `repeatable`. Raises `UserError` where it holds no run, or says more.
     """
-    parser = argparse.ArgumentParser(prog="tractexp again", description=(again.__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(prog="tractexp again", description=(build_repeat_command.__doc__ or "").partition("\n")[0])
     parser.add_argument("folder", metavar="RUN_FOLDER", help="the folder of an earlier run")
     parser.add_argument("settings", metavar="KEY=VALUE", nargs="*", help="what is to be different, as task=discrepancy")
     parser.add_argument(SEARCHED, help="a folder of configurations of your own that the run used")
@@ -36,7 +36,7 @@ def again(arguments: list[str]) -> list[str]:
     if odd := [text for text in chosen.settings if "=" not in text]:
         raise UserError(f"{odd[0]} is no setting; give KEY=VALUE, as task=discrepancy")
     settle(folder)
-    lines, cwd, searched = _stored(folder)
+    lines, cwd, searched = _read_stored_run(folder)
     if searched and chosen.config_dir is None:
         raise UserError(
             f"{folder} used configurations in {searched[0]}, which only you can name: where they are yours, give"
@@ -44,12 +44,12 @@ def again(arguments: list[str]) -> list[str]:
         )
     given = [SEARCHED, str(Path(chosen.config_dir).absolute())] if chosen.config_dir else []
     _enter(cwd, folder)
-    result = [*given, *repeated(lines, chosen.settings, folder)]
+    result = [*given, *merge_settings(lines, chosen.settings, folder)]
     say(f"that is: {quoting.shell('tractexp', *result)}")
     return result
 
 
-def repeated(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
+def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
     """Earlier settings that still count beside newer ones, and these. Raises `UserError` for one not taken over."""
     settings = list(settings)
     keys = {_key(text) for text in settings}
@@ -74,7 +74,7 @@ def _key(text: str) -> str:
     return text.partition("=")[0].lstrip("+~").partition("@")[0]
 
 
-def _stored(folder: Path) -> tuple[list[str], Path, list[str]]:
+def _read_stored_run(folder: Path) -> tuple[list[str], Path, list[str]]:
     """The settings that were chosen for a run, where it ran, and the folders that it read configurations from."""
     try:
         whole, arguments = (files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml"))

@@ -11,7 +11,7 @@ from tractexp.errors import UserError
 OF = {"domain": "model.domain"}  # groups that choose for another, and what
 
 
-def given(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
+def collect_chosen_settings(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
     """{key: value} of what was chosen on the command line, by a sweep or by an experiment, and not by default."""
     experiment = choices.get("experiment")
     chosen = dict(_by_experiment(str(experiment))) if experiment else {}

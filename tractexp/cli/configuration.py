@@ -21,6 +21,6 @@ def contents(config: Any) -> Mapping[str, str]:
     }
 
 
-def named(config: Any) -> frozenset[Path]:
+def list_named_files(config: Any) -> frozenset[Path]:
     """What a configuration, as plain data, may name as files that the run reads."""
     return frozenset(Path(text).absolute() for text in texts(config) if "\0" not in text)

@@ -19,7 +19,7 @@ from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences
 
 DOES = "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what is wrong."
-ROOM = 500e6  # bytes of a disk that is not nearly full
+LEAST_FREE_BYTES = 500e6  # bytes of a disk that is not nearly full
 BUSY = 2.0  # s to wait for a store that another process writes to
 
 Finding = tuple[str, str]
@@ -97,7 +97,7 @@ def disk(folder: Path) -> Iterator[Finding]:
     free = shutil.disk_usage(place).free
     if not os.access(place, os.W_OK):
         yield WRONG, f"{place} may not be written: results need another folder (hydra.run.dir=...)"
-    elif free < ROOM:
+    elif free < LEAST_FREE_BYTES:
         yield WRONG, f"only {free / 1e6:.0f} MB are free on the disk of {place}: make room before a sweep"
     else:
         yield SOUND, f"{free / 1e9:.1f} GB are free on the disk of {place}"
@@ -105,7 +105,7 @@ def disk(folder: Path) -> Iterator[Finding]:
 
 def caches() -> Iterator[Finding]:
     """Whether the store can be written and its entries be read."""
-    from tractexp.store import CODE, cache_folder, damaged
+    from tractexp.store import CODE, cache_folder, find_damaged_files
 
     try:
         folder = cache_folder()
@@ -113,7 +113,7 @@ def caches() -> Iterator[Finding]:
     except (OSError, UserError) as error:
         yield WRONG, f"nothing can be kept of what is compiled: {error}"
         return
-    gone = [*damaged(folder), *files.leftovers(folder)]
+    gone = [*find_damaged_files(folder), *files.leftovers(folder)]
     for path in gone:
         path.unlink(missing_ok=True)
     if gone:
@@ -192,7 +192,7 @@ def runs(uri: str) -> Iterator[Finding]:
     client: Any = open_store(uri)
     with sentences(uri):
         closed = [*owner.closed, *owner.close_stale(client)]
-        running = owner.running(client)
+        running = owner.list_running(client)
     if closed:
         yield HEALED, f"{len(closed)} runs whose process had ended are closed as KILLED"
     unknown = [run for run in running if owner.gone(run.data.tags.get(owner.TAG, "")) is None]

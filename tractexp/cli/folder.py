@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from tractexp import quoting
-from tractexp.overrides import assigned
+from tractexp.overrides import format_assignment
 from tractexp.progress import say
 from tractexp.run_folder import RESULTS
 
@@ -17,6 +17,6 @@ def choose_command(folder: str, *settings: str) -> list[str]:
         say(f"page: {page}")
     if pages:
         return []
-    arguments = ["task=survey", assigned("data.path", folder), *settings]
+    arguments = ["task=survey", format_assignment("data.path", folder), *settings]
     say(f"that is: {quoting.shell('tractexp', *arguments)}")
     return arguments

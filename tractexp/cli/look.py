@@ -28,14 +28,14 @@ def look(arguments: list[str]) -> int:
     if not paths:
         raise UserError("tractexp look: give a file beside the settings, e.g. tractexp look station.cfg")
     from tractexp.api.look import look as looked
-    from tractexp.api.task import call, listed
+    from tractexp.api.task import call, print_paths
     from tractexp.blocks.terminal import show
 
     view = call(looked, *paths, **{s[1]: _value(s[2]) for s in settings})
     rest = f"  everything: {quoting.shell('tractexp', 'look', *chosen.file, '--all')}"
     show(view.everything() if chosen.all else view.summary().text(rest), console())
     usual = FOLDER / f"{Path(paths[0]).stem}_{time.strftime('%Y-%m-%d_%H-%M-%S')}"
-    listed(view.write(chosen.folder or files.new_folder(usual)))
+    print_paths(view.write(chosen.folder or files.new_folder(usual)))
     return 0
 
 

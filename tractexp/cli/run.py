@@ -7,7 +7,7 @@ from typing import Any
 from tractexp import credentials, provenance
 from tractexp.api.task import Job
 from tractexp.cli import configuration
-from tractexp.cli.chosen import given, refuse_unread
+from tractexp.cli.chosen import collect_chosen_settings, refuse_unread
 from tractexp.errors import Stopped, UserError
 from tractexp.plugin import build, get
 from tractexp.run_folder import RunFolder, run_folder
@@ -29,14 +29,14 @@ def run(config: Any) -> None:
         with contextlib.suppress(OSError):  # where it is not empty
             folder.rmdir()
         raise
-    with run_folder(folder, configuration.contents(config), configuration.named(plain)) as place:
+    with run_folder(folder, configuration.contents(config), configuration.list_named_files(plain)) as place:
         try:
-            provenance.placed(folder)
-            perform(Job(plain, choices, folder, given=given(hydra.overrides.task, choices), placed=place.place))
+            provenance.remember_folder(folder)
+            perform(Job(plain, choices, folder, given=collect_chosen_settings(hydra.overrides.task, choices), placed=place.place))
             place.conclude()
         except KeyboardInterrupt as stop:
             saved = so_far(stop, place)
-            raise Stopped(f"{_how(stop)}; {saved or again(config)}", getattr(stop, "code", 130)) from None
+            raise Stopped(f"{_how(stop)}; {saved or describe_stopped_task(config)}", getattr(stop, "code", 130)) from None
 
 
 def _how(stop: KeyboardInterrupt) -> str:
@@ -61,7 +61,7 @@ def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
     )
 
 
-def again(config: Any) -> str:
+def describe_stopped_task(config: Any) -> str:
     """What becomes of a task that was stopped and has kept nothing in its folder."""
     if getattr(get("task", config["task"]["name"]), "resumes", False):
         return "the same command goes on where it was"

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.disagreement import disagreement, examined
+from tractexp.discrepancy.disagreement import disagreement, examine_fit
 from tractexp.inference.base_fit import fitted_from
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
@@ -128,5 +128,5 @@ class AllEvents:
 
     def _measure(self, fit: Refit, alone: Refit, seed: int) -> JointFit:
         louder = (self.plain.deviance - fit.deviance) - (self.bare.deviance - alone.deviance)
-        p_left = examined(self.quiet, fit, self.level, seed, plain=True).p_left
+        p_left = examine_fit(self.quiet, fit, self.level, seed, plain=True).p_left
         return JointFit(replace(fit, unit=self._narrow(fit)), louder, p_left)

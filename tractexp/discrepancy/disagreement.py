@@ -131,10 +131,10 @@ class Disagreement:
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
-    return examined(base.quiet, base.fit, base.noise, seed)
+    return examine_fit(base.quiet, base.fit, base.noise, seed)
 
 
-def examined(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Disagreement:
+def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Disagreement:
     """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known.
 
     Taken as known the noise makes every test sharper: what even those do not doubt needs no draws that estimate it

@@ -12,7 +12,7 @@ from tractexp.discrepancy.decide import CANDIDATE, NAMED, TIED, UNEXPLAINED, is_
 from tractexp.discrepancy.evidence import SetEvidence
 from tractexp.discrepancy.explain import find_status
 from tractexp.discrepancy.forms import by_name, forms
-from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, closed, share_closed
+from tractexp.discrepancy.gap import SPREAD, Curves, GapTest, measure_closed_share, share_closed
 from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import estimates
@@ -24,8 +24,8 @@ from tractexp.errors import DATA
 from tractexp.identification.adequacy import Grade
 from tractexp.identification.grade import Misfit
 from tractexp.inference.model_error import ModelError, in_percent
-from tractexp.provenance import again
-from tractexp.wording import joined
+from tractexp.provenance import build_again_command
+from tractexp.wording import join_words
 
 PLUGIN = f"{generate.NAME}.py"  # of a proposal, beside the page
 MODEL_FILE = Path("conf", "model", "extended.yaml")  # beside the page
@@ -88,14 +88,14 @@ def recommendation(investigation: Findings) -> str:
         if grade is not Grade.ADEQUATE:
             return "find what is missing still: by further events, or with the extended model as the base model"
         held = investigation.held
-        rest = f"; these events cannot tell {joined(list(held))}, which it holds" if held else ""
+        rest = f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
         return f"use the extended model{rest}; judge it on further events as they come"
     return "use the base model; what is missing, if anything, is below the limits given for each effect"
 
 
 def recommend_confirmation(findings: Findings) -> str:
     """Which event would confirm a candidate, as a sentence."""
-    names, evidence = joined(findings.names), findings.evidence
+    names, evidence = join_words(findings.names), findings.evidence
     if evidence.is_predicted:
         return f"record a further event and hold it out, too: those held out took part in choosing {names}"
     expected = np.array(findings.train.by_event)
@@ -141,7 +141,7 @@ def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
 
 
 def _gap(before: Curves, after: Curves) -> dict[str, Any]:
-    return {"before": _curves(before), "after": _curves(after), "closed": files.plain(closed(before, after))}
+    return {"before": _curves(before), "after": _curves(after), "closed": files.plain(measure_closed_share(before, after))}
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
@@ -263,12 +263,12 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
 
 def use_of(domain: str, model: Path | str) -> str:
     """The command that fits the model of a file to the records of this run."""
-    return again(*DOMAINS[domain].setting.split(), f"model={model}", of=("data",))
+    return build_again_command(*DOMAINS[domain].setting.split(), f"model={model}", of=("data",))
 
 
 def investigate_with(domain: str, model: Path | str) -> str:
     """The command that investigates the model of a file as the base model, by the records and settings of this run."""
-    return again("task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task"))
+    return build_again_command("task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task"))
 
 
 def adopt_term(plugin: Path) -> str:
@@ -303,7 +303,7 @@ def write_model(investigation: Findings, node: Mapping[str, Any], path: Path, ho
 
 def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mapping[str, float]) -> list[str]:
     """What the extended model is, and why it holds what it holds, a sentence each."""
-    lines = [f"The base model with what was found missing: {joined(investigation.names)}."]
+    lines = [f"The base model with what was found missing: {join_words(investigation.names)}."]
     if not investigation.verdict.complete:
         left = investigation.judged(investigation.final_grade).error.value
         lines.append(f"Something is missing still: it misses {in_percent(left)} of the load's response.")
@@ -312,10 +312,10 @@ def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mappi
     elif investigation.context.load.window is not None:
         lines.append("window: as in the base model.")
     if given := [name for name in node["fixed"] if name not in held]:
-        lines.append(f"fixed {joined(given)}: as in the base model.")
+        lines.append(f"fixed {join_words(given)}: as in the base model.")
     if held:
         lines.append(
-            f"fixed {joined(list(held))}: the events of the investigation cannot tell; leave out what yours can tell."
+            f"fixed {join_words(list(held))}: the events of the investigation cannot tell; leave out what yours can tell."
         )
     return lines
 

@@ -22,7 +22,7 @@ from tractexp.inference.fitting import Names, Refit
 from tractexp.noise import Noise
 
 FINEST = 0.1  # of the noise: a model's squared error is told no finer
-SMALLEST = 1e-12  # pu^2, the least squared error of a model without noise
+LEAST_SQUARED_ERROR = 1e-12  # pu^2, the least squared error of a model without noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +42,7 @@ class PredictedError:
     def left(self) -> float:
         """The squares beyond the noise, no less than can be told of them."""
         noise = float(self.noise.sum())
-        return max(float(self.squares.sum()) - noise, FINEST * noise, SMALLEST)
+        return max(float(self.squares.sum()) - noise, FINEST * noise, LEAST_SQUARED_ERROR)
 
     @property
     def error(self) -> float:

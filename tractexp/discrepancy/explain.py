@@ -21,15 +21,15 @@ from tractexp.discrepancy.decide import (
     rank_sets,
 )
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
-from tractexp.discrepancy.gap import Curves, closed, curves
-from tractexp.discrepancy.held_out import carried
+from tractexp.discrepancy.gap import Curves, curves, measure_closed_share
+from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.chance import by_draws
 from tractexp.inference.context import Context
 from tractexp.inference.model_error import in_percent
 from tractexp.record import Event
-from tractexp.wording import alternatives, joined, listed, percent
+from tractexp.wording import alternatives, join_words, list_figures, percent
 
 CHOSEN_BY = "what is left is more than noise, and the held-out events were used to choose"
 MOST_NEAR = 4  # sets that are told where nothing explains
@@ -51,7 +51,7 @@ class Nearest:
     @property
     def closed(self) -> tuple[float, float]:
         """The share of the gap that is closed on the fitted and on the held-out events, nan without any."""
-        return closed(*self.curves), closed(*self.carried) if self.carried else np.nan
+        return measure_closed_share(*self.curves), measure_closed_share(*self.carried) if self.carried else np.nan
 
 
 def find_nearest_sets(verdict: Verdict, evidence: Evidence, validate: Sequence[Event]) -> Nearest | None:
@@ -66,10 +66,10 @@ def find_nearest_sets(verdict: Verdict, evidence: Evidence, validate: Sequence[E
     before, *after = (curves(context, fit.unit, evidence.last.noise, fit.names) for fit in fits)
     there = None
     if validate:
-        other, units, noise = carried(context, validate, fits[:2])
+        other, units, noise = carry_fits(context, validate, fits[:2])
         pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
         there = pair if np.isfinite([one.deviance for one in pair]).all() else None  # else no steady state there
-    others = [(row.fit.names, closed(before, one)) for row, one in zip(rows[1:], after[1:], strict=True)]
+    others = [(row.fit.names, measure_closed_share(before, one)) for row, one in zip(rows[1:], after[1:], strict=True)]
     return Nearest(rows[0], others, (before, after[0]), there)
 
 
@@ -79,7 +79,7 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
         return None
     assert evidence.noise is not None
     fits = [row.told for row in verdict.kept]
-    labels = [joined(label_effects(names, context)) for names in verdict.sets]
+    labels = [join_words(label_effects(names, context)) for names in verdict.sets]
     return next_event(context, evidence.noise, evidence.base.fit, fits, labels)
 
 
@@ -117,7 +117,7 @@ def _explain_word(verdict: Verdict, evidence: Evidence, nearest: Nearest | None,
     if verdict.word == UNEXPLAINED and not adequate:
         return explain_rest(evidence, nearest, context)
     if adequate and (evidence.rows[0].fit.names or evidence.faults):
-        seemed = " or ".join(joined(label_effects(row.names, context)) for row in adequate)
+        seemed = " or ".join(join_words(label_effects(row.names, context)) for row in adequate)
         return _explain_denial(verdict.word, seemed, adequate[0], context)
     if verdict.word == UNEXPLAINED:
         return "the fitted events alone show no disagreement, but all events together do"
@@ -135,7 +135,7 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
     if row.gap is None:
         return "no event was held out to confirm it"
     doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
-    return f"the held-out events are too mild to show {joined(doubtful)}"
+    return f"the held-out events are too mild to show {join_words(doubtful)}"
 
 
 def label_effects(names: Sequence[str], context: Context) -> list[str]:
@@ -148,7 +148,7 @@ def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -
     if len(labels) > 1:
         sets = {row.fit.names for row in evidence.rows if len(row.fit.names) == len(names)}
         fitted = len(sets - {tuple(names)})
-        sentence = f"{joined(labels)} explain the disagreement"
+        sentence = f"{join_words(labels)} explain the disagreement"
         return (
             f"{sentence}, and none of the {fitted} other sets of {len(names)} that were fitted does"
             if fitted
@@ -167,7 +167,7 @@ def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
 
 def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
-    shares = listed([row.gap.explained for row in verdict.kept if row.gap is not None], percent)
+    shares = list_figures([row.gap.explained for row in verdict.kept if row.gap is not None], percent)
     labels = alternatives([label_effects(names, context) for names in verdict.sets])
     others = sum(bool(context.criteria.rejects(row.behind)) for row in evidence.rows)
     verb = "explains" if len(verdict.kept) == 1 and len(verdict.names) == 1 else "explain"
@@ -192,18 +192,18 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
     ]  # fmt: skip  # what leaves less does so by chance
     worse = [f"the base model misses {_size(evidence.base)}"]
     if rest:
-        following = joined(label_effects(rest[0].names, context))
+        following = join_words(label_effects(rest[0].names, context))
         worse.append(f"the next best of {len(rest)} other sets ({following}) {_size(rest[0])}")
     worse.append(_describe_term(evidence))
     labels = alternatives([label_effects(names, context) for names in verdict.sets])
-    off = listed([row.predicted.error for row in chosen], in_percent)
+    off = list_figures([row.predicted.error for row in chosen], in_percent)
     if len(chosen) > 1:
         sentence = (
             f"{labels}: they predict the held-out events within {off} of the response, which cannot tell them apart"
         )
     else:
         sentence = f"{labels} {'predicts' if size == 1 else 'predict'} the held-out events within {off} of the response"
-    return f"{sentence}, where {joined(worse)}{_describe_shared(first, evidence, context)}; {CHOSEN_BY}"
+    return f"{sentence}, where {join_words(worse)}{_describe_shared(first, evidence, context)}; {CHOSEN_BY}"
 
 
 def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) -> str:
@@ -212,7 +212,7 @@ def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) 
     if divides(chosen, evidence.base, context.criteria.divides):
         return ""
     best = min((row for row in evidence.every if row.prediction is not None), key=lambda row: row.predicted.left)
-    labels = joined(label_effects(best.names, context))
+    labels = join_words(label_effects(best.names, context))
     return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
 
 
@@ -225,7 +225,7 @@ def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) 
     if nearest is None and not evidence.faults:
         return f"{_deny_all(context)} helps more than chance does: what the base model leaves {chance}; {loudest}"
     names, faults = label_effects(best.fit.names, context), label_effects(evidence.faults, context)
-    sentence = f"{joined(names)} beside {joined(faults)}" if names and faults else joined(names or faults)
+    sentence = f"{join_words(names)} beside {join_words(faults)}" if names and faults else join_words(names or faults)
     ending = "s" if len(names or faults) == 1 else ""
     share = f"help{ending}"
     if nearest and np.isfinite(nearest.closed[0]):
@@ -243,10 +243,10 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
         return f"{_deny_all(context)} {better}, which misses {bare} of the response there"
     if evidence.term is not None:  # it beats the set that would be kept
         beaten = find_leading(evidence, criteria, criteria.divides)[0]
-        name = joined(label_effects(beaten.names, context))
+        name = join_words(label_effects(beaten.names, context))
         misses = f"misses {_size(beaten)} of the response of the held-out events"
         return f"{name} would be named, but {misses}, and {_describe_term(evidence)}"
-    labels = joined(label_effects(near.names, context))
+    labels = join_words(label_effects(near.names, context))
     why = f"a name must divide that by {criteria.divides:g}"
     if divides(near, evidence.base, criteria.divides):
         needed = needs_all(near, evidence, criteria)
@@ -290,7 +290,7 @@ def _describe_objection(best: SetEvidence, context: Context) -> str:
     if best.gap.is_denied:
         return "there it fits no better than the base model"
     if needless := [name for name, gap in best.without.items() if gap.is_denied]:
-        return f"there it fits no better than without {joined(label_effects(needless, context), 'or')}"
+        return f"there it fits no better than without {join_words(label_effects(needless, context), 'or')}"
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
         f" {by_draws(best.p_of_all)}"

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
 from tractexp.discrepancy.families import against_members
 from tractexp.discrepancy.window_search import behind_window
 from tractexp.inference.base_fit import BaseFit
@@ -41,7 +41,7 @@ COMBINED = 14  # effects whose sets are ranked exhaustively
 PATCHED = 4  # sets of one size that are tried before a further effect is added
 WIDELY = 3  # single effects with thresholds or times that are searched to the end
 RANKS = 2  # settings of a candidate to start from
-FAMILIES = 50  # added to the seed of the draws at members of families
+FAMILY_SEED_OFFSET = 50  # added to the seed of the draws at members of families
 LEAST_START = 0.1  # smallest relevant sizes that a start moves at least
 
 Refits = Mapping[Names, Refit]
@@ -85,7 +85,7 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
     while steps[-1].asks_for_more and worth_another(steps) and len(steps) < MOST_STEPS:
         size = len(steps[-1].fit.names) + 1
         ground = beneath(first, steps[-1].fit) if size > 1 else first
-        fits = searched([ground, *steps[1:]], refits, size, base.context.effort.say)
+        fits = search_effect_sets([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= {f.names: f for f in fits}
         if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
             return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
@@ -126,7 +126,7 @@ def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Ref
     if chdtrc(parameters, gained) < context.criteria.further_name_p:
         return tests
     refits[fewer.names] = fewer
-    return without_needless(base, examined(base.quiet, fewer, tests.noise, seed), refits, seed)
+    return without_needless(base, examine_fit(base.quiet, fewer, tests.noise, seed), refits, seed)
 
 
 def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
@@ -136,12 +136,12 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
     """
     if not base.context.domain.calibrated or not base.context.criteria.further_name_p:
         return tests
-    tests, fits = against_members(base, tests, refits, seed + FAMILIES)
+    tests, fits = against_members(base, tests, refits, seed + FAMILY_SEED_OFFSET)
     refits |= {f.names: f for f in fits}
     return tests
 
 
-def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
+def search_effect_sets(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
     """The most promising sets of one size refitted, single effects from all over the base model's box, too; the best
     first. `steps` begin with one without effects.
     """
@@ -150,14 +150,14 @@ def searched(steps: Sequence[Disagreement], refits: Refits, size: int, say: Call
         return []
     one, many = ("effect", "effects") if size == 1 else (f"set of {size}", f"sets of {size}")
     say(f"refitting {len(wanted)} {one if len(wanted) == 1 else many}")
-    fits = refitted(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
+    fits = refit_sets(context, noise, [s for n in wanted for s in starts(steps, refits, n)])
     if size == 1:
         boxes = each_apart(lambda fit: in_the_box(context, fit), fits, context.effort)
-        fits = best_of([*fits, *refitted(context, noise, list(itertools.chain(*boxes)))])
+        fits = best_of([*fits, *refit_sets(context, noise, list(itertools.chain(*boxes)))])
     return best_of(no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits))
 
 
-def refitted(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
+def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
     """The sets of these starts refitted, those near the best exactly; the best first."""
     fits = rough_refit(context, noise, begin)
     near = [f for f in fits if f.cost < fits[0].cost + NEAR_BEST]
@@ -206,11 +206,11 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
 
     Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the better.
     """
-    best = examined(base.quiet, ranked[0], noise, seed)
+    best = examine_fit(base.quiet, ranked[0], noise, seed)
     if not best.asks_for_more:
         return best
     for other in [f for f in ranked[1:PATCHED] if f.cost < ranked[0].cost + NEAR_BEST]:
-        there = examined(base.quiet, other, noise, seed)
+        there = examine_fit(base.quiet, other, noise, seed)
         if not there.asks_for_more and there.p_left > best.p_left:
             return there
     return best
@@ -250,7 +250,7 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
         for rank in range(RANKS):
             point = from_fit.unit
             for name in missing:
-                point = _placed(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
+                point = _place_candidate(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
             begin.append((names, point))
     return begin
 
@@ -275,7 +275,7 @@ def in_the_box(context: Context, fit: Refit) -> list[Start]:
     return [(fit.names, units[k]) for k in chosen]
 
 
-def _placed(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
+def _place_candidate(at: Disagreement, name: str, rank: int, unit: np.ndarray) -> np.ndarray:
     """Coordinates (D,) with a candidate at its one-step size and its `rank`-th best setting."""
     ranked, candidate = at.projection.ranked[name], at.context.catalogue[name]
     score = ranked[min(rank, len(ranked) - 1)]

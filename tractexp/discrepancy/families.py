@@ -12,7 +12,7 @@ from collections.abc import Container, Mapping, Sequence
 import numpy as np
 from scipy.special import chdtrc
 
-from tractexp.discrepancy.disagreement import Disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement, examine_fit
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.catalogue import Candidate
 from tractexp.inference.context import Context
@@ -41,7 +41,7 @@ def against_members(
         near = not tests.suffices and fit.cost < tests.fit.cost + NEAR_BEST
         if not near and not worth(fit, tests.fit, context.criteria.further_name_p):
             continue
-        there = examined(base.quiet, fit, noise, seed + k)
+        there = examine_fit(base.quiet, fit, noise, seed + k)
         if there.suffices:
             return there, [there.fit, *(f for f in fits if f is not fit)]
     return tests, fits if tests.suffices else []
@@ -78,7 +78,7 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
         textbook_values = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
         begun += [
             (ground, textbook_values),
-            *((ground, textbook_values | shared) for shared in _shared(member, textbook_values)),
+            *((ground, textbook_values | shared) for shared in _share_textbook_size(member, textbook_values)),
         ]
     if textbook is None or not effect.nests_textbook:
         begun += [(unit, {}) for unit in (bare, *off_bounds(context, bare))]
@@ -93,7 +93,7 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
     return wanted
 
 
-def _shared(member: Candidate, textbook_values: Mapping[str, float]) -> list[dict[str, float]]:
+def _share_textbook_size(member: Candidate, textbook_values: Mapping[str, float]) -> list[dict[str, float]]:
     """The textbook's size in equal parts, where a member has further sizes: a small second one beside the whole first
     may end as a patch of it. None where it has no further one."""
     mine = [textbook_values[p.name] for p in member.sizes if p.name in textbook_values]

@@ -12,7 +12,7 @@ from tractexp.inference.interval import interval_factor
 from tractexp.model.parts import Curve, Effect
 
 CATALOGUE, OTHER = "catalogue", "other"
-STEP = 0.05  # of a standard error: the step by which a curve's slopes are taken
+SLOPE_STEP = 0.05  # of a standard error: the step by which a curve's slopes are taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +84,7 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
 
 def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:
     """How the curve (n,) moves with one parameter."""
-    h = STEP * error
+    h = SLOPE_STEP * error
     up, down = (effect.curve(**{**values, name: values[name] + side * h}) for side in (1, -1))
     assert up is not None
     assert down is not None

@@ -9,13 +9,13 @@ from tractexp.domain.playback import relative_error
 from tractexp.inference.context import Context
 from tractexp.inference.differences import two_sided
 from tractexp.inference.injection import PUSHES, perturbations
-from tractexp.inference.linearization import resting
+from tractexp.inference.linearization import find_active_bounds
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise
-from tractexp.noise.span import spanned
+from tractexp.noise.span import compute_basis
 
 SPREAD = 2 * 1.645  # roots of what is expected: in 95 % of cases no more than so many are lacking of it
-SAME = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
+LEAST_DISTINCT_PUSH = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class GapTest:
     @property
     def closed(self) -> float:
         """The share of the squared model error that is gone."""
-        return closed(self.before, self.after)
+        return measure_closed_share(self.before, self.after)
 
     @property
     def explained(self) -> float:
@@ -90,7 +90,7 @@ def share_gone(factor: float) -> float:
     return 1 - 1 / factor**2
 
 
-def closed(before: Curves, after: Curves) -> float:
+def measure_closed_share(before: Curves, after: Curves) -> float:
     """The share of the squared model error that is gone between two curves."""
     return share_closed(before.error, after.error)
 
@@ -133,7 +133,7 @@ def gap(
     """
     before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
-    changes = pushed(context, extended, names, noise) if changes is None else changes
+    changes = compute_pushed_changes(context, extended, names, noise) if changes is None else changes
     left = beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
     rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(context.drive.channels, -1)
@@ -142,7 +142,7 @@ def gap(
     return GapTest(before, after, float(gained), left, float(np.sum(rows**2)), shown, noise, context, units, by_event)
 
 
-def pushed(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
+def compute_pushed_changes(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
     """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
     points, _ = perturbations(context, unit)
     return context.whiten(noise, context.changes(unit, points, names, [PUSHES] * len(points)))
@@ -160,7 +160,7 @@ def beyond_chance(
     rows = np.nan_to_num(context.whiten(noise, raw))
     r, k = rows[0], len(fitted)
     nuisance = rows[1 : 1 + k] - rows[1 + k :]
-    nuisance = nuisance[~resting(context, unit, fitted, nuisance @ r)]
+    nuisance = nuisance[~find_active_bounds(context, unit, fitted, nuisance @ r)]
     Q = np.linalg.qr(nuisance.T)[0]
-    basis = spanned(changes - (changes @ Q) @ Q.T, SAME)
+    basis = compute_basis(changes - (changes @ Q) @ Q.T, LEAST_DISTINCT_PUSH)
     return float(np.sum((basis @ r) ** 2) - len(basis))

@@ -10,9 +10,9 @@ from tractexp.discrepancy.all_events import AllEvents
 from tractexp.discrepancy.decide import find_adequate, holds
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
-from tractexp.discrepancy.gap import GapTest, beyond_chance, gap, pushed, share_gone
+from tractexp.discrepancy.gap import GapTest, beyond_chance, compute_pushed_changes, gap, share_gone
 from tractexp.inference.context import Context
-from tractexp.inference.fitting import Names, Refit, refit, settled
+from tractexp.inference.fitting import Names, Refit, fit_initial_power, refit
 from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
@@ -137,8 +137,8 @@ def closes_enough(row: SetEvidence) -> bool:
 
 def exceeds_noise(both: AllEvents) -> bool:
     """Whether perturbations of the base model would gain more on the held-out events than noise leaves there."""
-    there, (unit,), noise = carried(both.fitted, both.events, [both.bare])
-    left = beyond_chance(there, unit, (), noise, there.coordinates.before, pushed(there, unit, (), noise))
+    there, (unit,), noise = carry_fits(both.fitted, both.events, [both.bare])
+    left = beyond_chance(there, unit, (), noise, there.coordinates.before, compute_pushed_changes(there, unit, (), noise))
     return left > both.fitted.criteria.shown
 
 
@@ -146,7 +146,7 @@ def compare_on(
     context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[Names, GapTest]:
     """Compare a model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
-    other, units, noise = carried(context, events, [bare, *extended])
+    other, units, noise = carry_fits(context, events, [bare, *extended])
     before = other.coordinates.before
     return {
         fit.names: gap(other, units[0], unit, fit.names, noise, before, bare.names)
@@ -154,7 +154,7 @@ def compare_on(
     }
 
 
-def carried(
+def carry_fits(
     context: Context, events: Sequence[Event], fits: Sequence[Refit]
 ) -> tuple[Context, list[np.ndarray], Noise]:
     """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
@@ -164,10 +164,10 @@ def carried(
     """
     other = context.on(Records.of(events, context.records.window))
     at = other.coordinates.at_measured_power
-    units = [settled(other, at(fit.unit), white(other), fit.names) for fit in fits]
+    units = [fit_initial_power(other, at(fit.unit), white(other), fit.names) for fit in fits]
     noise = white(other)
     for unit, fit in zip(reversed(units), reversed(fits), strict=True):
         if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():
             noise = QuietNoise.at(other, unit).of(unit, left)
             break
-    return other, [settled(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
+    return other, [fit_initial_power(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise

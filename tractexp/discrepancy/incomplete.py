@@ -9,18 +9,18 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tractexp.discrepancy.decide import find_nearest, find_predicting, rank_sets
-from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.disagreement import examine_fit
 from tractexp.discrepancy.evidence import Evidence, PredictedDeviance, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.discrepancy.gap import curves
-from tractexp.discrepancy.held_out import carried, compare_on
+from tractexp.discrepancy.held_out import carry_fits, compare_on
 from tractexp.discrepancy.least_squares import least_squares_tests
 from tractexp.discrepancy.prediction import predict_errors
 from tractexp.inference.fitting import refit
 from tractexp.record import Event
 
-JUDGED = 10  # sets of the search by likelihood that are judged on the held-out events
-LOUD = 2.0  # deviance of a sample from which what the base model leaves is more of it than the noise
+MOST_JUDGED_SETS = 10  # sets of the search by likelihood that are judged on the held-out events
+LEAST_LOUD_DEVIANCE = 2.0  # deviance of a sample from which what the base model leaves is more of it than the noise
 
 
 def predict_held_out(evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
@@ -31,8 +31,8 @@ def predict_held_out(evidence: Evidence, explained: Explanations, events: Sequen
         return evidence
     context = explained.base.context
     context.effort.say("judging what leaves something on the held-out events")
-    there, (unit,), noise = carried(context, events, [evidence.base.fit])
-    if curves(there, unit, noise).chi2_per_sample > LOUD:
+    there, (unit,), noise = carry_fits(context, events, [evidence.base.fit])
+    if curves(there, unit, noise).chi2_per_sample > LEAST_LOUD_DEVIANCE:
         return _predict_by_error(explained, events, seed)
     return _predict_by_deviance(evidence, explained, events, seed)
 
@@ -52,7 +52,7 @@ def _predict_by_deviance(evidence: Evidence, explained: Explanations, events: Se
     }  # fmt: skip
     if evidence.faults or not fits:
         return evidence
-    wanted = sorted(fits.values(), key=lambda fit: fit.cost)[:JUDGED]
+    wanted = sorted(fits.values(), key=lambda fit: fit.cost)[:MOST_JUDGED_SETS]
     fitted = refit(context, noise, [(fit.names, at.without_faults(fit.unit, ())) for fit in wanted], faults=())
     gaps = compare_on(context, events, bare, fitted[::-1])  # the best last: there the noise is its
     whole = max((gaps[fit.names] for fit in fitted), key=lambda gap: gap.gain)
@@ -70,7 +70,7 @@ def _predict_by_deviance(evidence: Evidence, explained: Explanations, events: Se
         return evidence
 
     def test(row: SetEvidence) -> SetEvidence:
-        tests = examined(explained.base.quiet, row.fit, noise, seed, plain=True)
+        tests = examine_fit(explained.base.quiet, row.fit, noise, seed, plain=True)
         return replace(row, tests=tests, p_left=tests.p_left)
 
     tested = [test(row) for row in kept]

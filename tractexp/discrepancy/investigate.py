@@ -17,7 +17,7 @@ from tractexp.discrepancy.grades import Grader
 from tractexp.discrepancy.held_out import judge_held_out
 from tractexp.discrepancy.incomplete import predict_held_out
 from tractexp.discrepancy.next_event.choose import NextEvent
-from tractexp.discrepancy.overlay import Overlay, left, of_fit, on_fitted, on_held_out
+from tractexp.discrepancy.overlay import Overlay, find_remainder, of_fit, on_fitted, on_held_out
 from tractexp.discrepancy.places import DisagreementInterval, places
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.proposal.propose import ProposalResult, propose
@@ -38,7 +38,7 @@ from tractexp.inference.problem import Problem
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +231,7 @@ class Findings:
     def headline(self) -> str:
         """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
         if self.names and self.remainder:
-            return f"beside {joined(self.names)} this is left: {self.remainder[0]}"
+            return f"beside {join_words(self.names)} this is left: {self.remainder[0]}"
         remainders_left = [
             (shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes
         ]
@@ -246,7 +246,7 @@ class Findings:
     def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
-        return left(fitted, noise, level) or left(beyond, replace(noise, input_modes=None), level)
+        return find_remainder(fitted, noise, level) or find_remainder(beyond, replace(noise, input_modes=None), level)
 
     @property
     def base_values(self) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.discrepancy.explain import Nearest
 from tractexp.discrepancy.gap import GapTest
-from tractexp.discrepancy.held_out import carried
+from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.places import DisagreementInterval
 from tractexp.discrepancy.remainder import Remainder, remainders
 from tractexp.domain import domain_of
@@ -59,7 +59,7 @@ def on_held_out(
         assert gap.context is not None
         return _each(gap.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
     fits = [bare, *([nearest.row.fit] if nearest else [])]
-    other, units, noise = carried(context, withheld, fits)
+    other, units, noise = carry_fits(context, withheld, fits)
     before, *near = [
         other.residuals(unit[None], fit.names)[0] + other.drive.measured for unit, fit in zip(units, fits, strict=True)
     ]
@@ -72,7 +72,7 @@ def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     return _each(context, noise, (calculated, None, None), (), held_out=False)
 
 
-def left(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:
+def find_remainder(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:
     """What the model that comes nearest leaves of these events, the loudest shape first."""
     if not overlays:
         return []

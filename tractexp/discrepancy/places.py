@@ -32,12 +32,12 @@ def places(at: Disagreement) -> list[DisagreementInterval]:
             context.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
             float(sum(excess[windows.index(c)] for c in group) / total),
         )
-        for group in _joined([c for c, yes in zip(windows, loud, strict=True) if yes])
+        for group in _join_windows([c for c, yes in zip(windows, loud, strict=True) if yes])
     ]  # fmt: skip
     return sorted(standing_out, key=lambda p: -p.share)
 
 
-def _joined(windows: list[ResidualWindow]) -> list[list[ResidualWindow]]:
+def _join_windows(windows: list[ResidualWindow]) -> list[list[ResidualWindow]]:
     """Cells of one channel that follow each other, together."""
     groups: list[list[ResidualWindow]] = []
     for window in sorted(windows, key=lambda c: (c.event, c.channel, c.part.start)):

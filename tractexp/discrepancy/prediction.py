@@ -12,7 +12,7 @@ import numpy as np
 
 from tractexp.discrepancy.decide import find_predicting, rank_sets
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
-from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, searched, wide_starts
+from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, search_effect_sets, wide_starts
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
@@ -26,7 +26,7 @@ from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-FAMILIES = 2  # single effects whose families are tried, and to which a second is added
+MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
 SHARING = 10.0  # blocks that share the response: where two or three hold all of it, nothing is clear of chance
 
@@ -92,17 +92,17 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
     def add(fits: Iterable[Refit]) -> None:
         refits.update({f.names: f for f in best_of([*refits.values(), *fits])})
 
-    add(searched([ground], refits, 1, say))
+    add(search_effect_sets([ground], refits, 1, say))
     add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
     carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[:CARRIED]
     if carried:
         add(refit(context, noise, [(f.names, at.at_measured_power(f.unit)) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
-    of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:FAMILIES]}
+    of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:MOST_TRIED_FAMILIES]}
     add(member_fits(context, noise, refits, of_family))
     of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
-    for single in of_load[:FAMILIES]:
-        add(searched([ground, ground.at(context, single, noise)], refits, 2, say))
+    for single in of_load[:MOST_TRIED_FAMILIES]:
+        add(search_effect_sets([ground, ground.at(context, single, noise)], refits, 2, say))
     return refit(context, noise, [(f.names, at.without_faults(f.unit, ())) for f in refits.values()], faults=())
 
 

@@ -17,19 +17,19 @@ from numpy.typing import NDArray
 from tractexp.domain import domain_of
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
-from tractexp.noise.color import FEWEST, SMALLEST
+from tractexp.noise.color import FEWEST_NOISE_SAMPLES, SMALLEST_DEVIATION
 from tractexp.noise.quiet import estimate
 from tractexp.record import Event
 
-MOST = 4  # shapes that are told
-DECAYS = 6  # time constants tried, from two samples to the length of the record after the dip
+MOST_SHAPES = 4  # shapes that are told
+TRIED_TIME_CONSTANTS = 6  # time constants tried, from two samples to the length of the record after the dip
 FREQUENCIES = 512  # tried at most with each of them
-HIGHEST = 0.45  # of the sampling rate
-SHORTEST = 8  # samples of a shape
-ROUNDS = 2  # of polishing the frequency and the decay, then the start
+HIGHEST_RELATIVE_FREQUENCY = 0.45  # of the sampling rate
+SHORTEST_SHAPE = 8  # samples of a shape
+POLISH_ROUNDS = 2  # of polishing the frequency and the decay, then the start
 STAYS = 3.0  # lengths of the rest of the record: what takes so long to die away does not
 PULSE = 3.0  # samples: what is over sooner is a pulse
-HOPELESS = 0.6  # of what a shape must gain: one that gains less before it is polished never does
+LEAST_UNPOLISHED_GAIN = 0.6  # of what a shape must gain: one that gains less before it is polished never does
 SPARING = 2.0  # of log(samples): what the two more numbers of a ringing must gain over a decay
 
 
@@ -98,7 +98,7 @@ class _Shape(NamedTuple):
     def rings(self, samples: int) -> bool:
         """Whether there is a cycle of it in so many samples and half of one before it dies away, and samples enough."""
         lasts = min(2 * self.decay, samples - self.start)
-        return lasts >= SHORTEST and self.frequency * lasts >= 1
+        return lasts >= SHORTEST_SHAPE and self.frequency * lasts >= 1
 
     def templates(self, samples: int) -> np.ndarray:
         """Its shapes of unit size, (1 or 2, samples): cosine and sine of a ringing."""
@@ -127,7 +127,7 @@ class _Stretch:
         """
         drive, domain = Drive.of([domain_of(event).excitation(event)]), domain_of(event)
         valid, before = drive.weights > 0, slice(0, event.start)
-        if not domain.noise_from_model and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST:
+        if not domain.noise_from_model and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST_NOISE_SAMPLES:
             noise = estimate(_level(residual[:, before]), valid[:, before], [before])
         return cls(event, residual, replace(noise, random_walk=None, input_modes=input_modes), drive)
 
@@ -176,10 +176,10 @@ def remainders(
     excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
     shapes: list[Remainder] = []
-    while len(shapes) < MOST and (candidates := [(one, e) for e, one in enumerate(loudest) if one]):
+    while len(shapes) < MOST_SHAPES and (candidates := [(one, e) for e, one in enumerate(loudest) if one]):
         (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
         _, sizes, curve = stretches[e].fitted(shape, channel)
-        shapes.append(_described(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
+        shapes.append(_describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
         stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
         loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
     return shapes
@@ -191,24 +191,24 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     The bound on chance is that of as many independent tries as there are starts, decays and frequencies.
     """
     white = stretch.white(stretch.residual[None])[0]
-    tried, candidates = _searched(white, max(stretch.event.start - 2, 0))
+    tried, candidates = _search_shapes(white, max(stretch.event.start - 2, 0))
     sparing = SPARING * np.log(white.size)
     best = max(candidates, key=lambda f: f[0] - sparing * bool(f[1].frequency))
     limit = 2 * np.log(tried / false_alarms)
-    if best[0] < HOPELESS * limit:
+    if best[0] < LEAST_UNPOLISHED_GAIN * limit:
         return None
-    polished = max((_polished(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0])
+    polished = max((_refine_shape(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0])
     return polished if polished[0] > limit else None
 
 
-def _searched(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
+def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
     """How many shapes were tried in white rows (C, n) from sample `first` on, and the best of each kind."""
     length = white.shape[1] - first
-    decays = np.geomspace(2.0, max(length, 4), DECAYS)
+    decays = np.geomspace(2.0, max(length, 4), TRIED_TIME_CONSTANTS)
     shapes = [(float(d), 0.0) for d in (*decays, np.inf)]
-    for d in decays[decays >= SHORTEST / 2]:
+    for d in decays[decays >= SHORTEST_SHAPE / 2]:
         spacing = max(1 / (2 * length), 1 / (8 * d))
-        frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST, spacing)[:FREQUENCIES]
+        frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST_RELATIVE_FREQUENCY, spacing)[:FREQUENCIES]
         shapes += [(float(d), float(f)) for f in frequencies]
     best: dict[bool, tuple[float, _Shape]] = {}
     for decay, frequency in shapes:
@@ -233,15 +233,15 @@ def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
 
     power = series(abs(z) ** 2).real
     if not frequency:
-        return (sums.real**2 / power).max(axis=0)[: 1 - SHORTEST]
+        return (sums.real**2 / power).max(axis=0)[: 1 - SHORTEST_SHAPE]
     double = series(z * z)
     cc, ss, cs = (power + double.real) / 2, (power - double.real) / 2, double.imag / 2
     a, b, determinant = sums.real, sums.imag, cc * ss - cs**2
     gain = (ss * a**2 - 2 * cs * a * b + cc * b**2) / np.maximum(determinant, 1e-9)
-    return np.where(determinant > 0.01 * power**2 / 4, gain, 0.0).max(axis=0)[: 1 - SHORTEST]
+    return np.where(determinant > 0.01 * power**2 / 4, gain, 0.0).max(axis=0)[: 1 - SHORTEST_SHAPE]
 
 
-def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape, int]:
+def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _Shape, int]:
     """The best shape near one, as the noise lets it be seen in one channel."""
     from scipy.optimize import minimize
 
@@ -251,7 +251,7 @@ def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _S
         visible = shape.rings(n) or not shape.frequency
         return stretch.fitted(shape, channel)[0] if visible else 0.0
 
-    for _ in range(ROUNDS):
+    for _ in range(POLISH_ROUNDS):
         if np.isfinite(shape.decay):
             start, ringing = shape.start, bool(shape.frequency)
 
@@ -265,12 +265,12 @@ def _polished(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float, _S
             shape = max(shape, at(done.x), key=gain)
         period = 1 / shape.frequency if shape.frequency else 4.0
         reach = int(np.clip(period / 2, 3, 25))
-        near = range(max(shape.start - reach, 0), min(shape.start + reach, n - SHORTEST) + 1)
+        near = range(max(shape.start - reach, 0), min(shape.start + reach, n - SHORTEST_SHAPE) + 1)
         shape = max((shape._replace(start=k) for k in near), key=gain)
     return gain(shape), shape, channel
 
 
-def _described(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
+def _describe_shape(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
     """A shape as a person reads it."""
     event, step = stretch.event, stretch.event.record.step
     ringing = bool(shape.frequency)
@@ -278,7 +278,7 @@ def _described(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray
     tau = shape.decay * step if shape.decay < STAYS * rest else None
     kind = "ringing" if ringing else "step" if tau is None else "pulse" if shape.decay < PULSE else "decay"
     size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
-    level = max(event.levels[channel], SMALLEST)
+    level = max(event.levels[channel], SMALLEST_DEVIATION)
     start = float(event.record.t[shape.start])
     ended = start > event.t_end - 1.5 * step
     frequency = shape.frequency / step if ringing else None

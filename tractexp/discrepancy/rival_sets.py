@@ -8,12 +8,12 @@ parameters in each event, would still explain: that is tested at the best sets t
 from dataclasses import replace
 
 from tractexp.discrepancy.decide import MOST_TESTED
-from tractexp.discrepancy.disagreement import examined
+from tractexp.discrepancy.disagreement import examine_fit
 from tractexp.discrepancy.evidence import Evidence, SetEvidence
 from tractexp.discrepancy.explanations import Explanations
 from tractexp.inference.fitting import refit
 
-SEED = 100  # added to the seed of the draws at rivals
+RIVAL_SEED_OFFSET = 100  # added to the seed of the draws at rivals
 
 
 def compare_rivals(explained: Explanations, seed: int) -> Evidence:
@@ -23,7 +23,7 @@ def compare_rivals(explained: Explanations, seed: int) -> Evidence:
     near = [k for k, row in enumerate(rows) if not base.context.criteria.rejects(row.behind)][:MOST_TESTED]
     for place, k in enumerate(near):
         fit = rows[k].fit
-        tests = last if k == 0 else examined(base.quiet, fit, last.noise, seed + SEED + place, plain=True)
+        tests = last if k == 0 else examine_fit(base.quiet, fit, last.noise, seed + RIVAL_SEED_OFFSET + place, plain=True)
         rows[k] = replace(rows[k], tests=tests, p_left=tests.p_left)
     bare = SetEvidence(first.fit, (), (), p_left=first.p_left, tests=first)
     return Evidence(bare, tuple(rows), faults=explained.faults, noise=last.noise, last=last)

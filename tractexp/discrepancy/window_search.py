@@ -10,7 +10,7 @@ measurement beside it, it is fitted behind each window, too: one that leaves no 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.discrepancy.disagreement import Disagreement, disagreement, examined
+from tractexp.discrepancy.disagreement import Disagreement, disagreement, examine_fit
 from tractexp.inference.base_fit import BaseFit, fitted_from
 from tractexp.inference.chance import BLURRED
 from tractexp.inference.context import Context
@@ -50,7 +50,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
         begun = rough_refit(behind, noise, [((), start) for start in local_minima])[0]
         fit = refit(behind, noise, [((), begun.unit)])[0]
         tried.append(WindowFit(behind, fit, first.fit.deviance - fit.deviance))
-    believed = _believed(tried, first) if tried else None
+    believed = _choose_window(tried, first) if tried else None
     if believed is None:
         return base, first
     assert believed.behind.records.window is not None
@@ -59,7 +59,7 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     return base, disagreement(base, seed)
 
 
-def _believed(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
+def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
     """The window that helps most, where it helps enough.
 
     None where an effect explains far more than any window does: what lacks something large takes a wrong window for a
@@ -80,13 +80,13 @@ def behind_window(base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: i
     context = base.context
     if not context.domain.windowed or context.drive.windows:
         return None
-    tests = examined(base.quiet, best, noise, seed, plain=True)
+    tests = examine_fit(base.quiet, best, noise, seed, plain=True)
     for window in windows_of(context.events) if tests.faults else ():
         behind = context.on(Records.of(context.records.recorded, window))
         fit = refit(behind, tests.noise, [(best.names, best.unit)])[0]
         if not fit.deviance < bare.deviance:
             break  # it costs more than the explanation gains
-        there = examined(QuietNoise.at(behind, fit.unit), fit, tests.noise, seed, plain=True)
+        there = examine_fit(QuietNoise.at(behind, fit.unit), fit, tests.noise, seed, plain=True)
         if there.adequate and not there.faults:
             context.effort.say(f"{window.describe()}: taken into account from here on")
             return fitted_from(behind, [bare.unit], base.local_minima)

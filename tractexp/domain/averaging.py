@@ -9,7 +9,7 @@ from tractexp.errors import MODEL, UserError, among
 from tractexp.model.model import WAVES, Model
 from tractexp.plugin import discover
 from tractexp.record import Event
-from tractexp.record.window import LONGEST, mean_weights
+from tractexp.record.window import LONGEST_WINDOW, mean_weights
 from tractexp.recording.estimator import Estimator, estimator_of
 
 RECORDED = "recorded"  # the window that each record says
@@ -31,9 +31,9 @@ def check_window(window: object, domain: str) -> None:
         return
     if isinstance(window, str):
         raise UserError(f"{MODEL.window}={window}: there is no such window{among(window, names)}; or give seconds")
-    if isinstance(window, bool) or not isinstance(window, Real) or not 0 < float(window) <= LONGEST:
+    if isinstance(window, bool) or not isinstance(window, Real) or not 0 < float(window) <= LONGEST_WINDOW:
         raise UserError(
-            f"{MODEL.window}={window} is no window: give its length, at most {LONGEST:g} s,"
+            f"{MODEL.window}={window} is no window: give its length, at most {LONGEST_WINDOW:g} s,"
             f" or one of {', '.join(names)}"
         )
 

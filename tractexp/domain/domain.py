@@ -178,7 +178,7 @@ class Domain(ABC):
         """
 
 
-def simulated(model: Model, values: np.ndarray, drive: Drive) -> np.ndarray:
+def simulate_compared(model: Model, values: np.ndarray, drive: Drive) -> np.ndarray:
     """What is compared (C, N), by as many Runge-Kutta steps as it takes.
 
     Raises `UserError` where there is no steady state.

@@ -6,7 +6,7 @@ from tractexp.domain.averaging import find_averaging
 from tractexp.model.drive import Excitation, WaveformDrive
 from tractexp.model.model import Model
 from tractexp.record import Event, WaveEvent
-from tractexp.record.window import sharpened
+from tractexp.record.window import sharpen_voltage
 
 WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
 
@@ -19,7 +19,7 @@ def phasors(event: Event, model: Model | None = None, weights: tuple[float, floa
     """
     averaging = find_averaging(event, model)
     if averaging is not None:
-        event = sharpened(event, *averaging)
+        event = sharpen_voltage(event, *averaging)
     record, nominal = event.record, 2 * np.pi * event.record.base.frequency
     return Excitation(
         step=record.step,

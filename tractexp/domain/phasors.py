@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.domain import excitation
-from tractexp.domain.domain import DipGrid, Domain, simulated
+from tractexp.domain.domain import DipGrid, Domain, simulate_compared
 from tractexp.domain.playback import Playback
 from tractexp.domain.port import Complex, Port, power_port
 from tractexp.model.drive import PHASORS, Drive, Excitation
@@ -14,9 +14,9 @@ from tractexp.model.model import Model
 from tractexp.noise import Noise
 from tractexp.noise.quiet import estimate
 from tractexp.noise.random_walk import RandomWalk
-from tractexp.noise.voltage import SmoothedEvent, smoothed
+from tractexp.noise.voltage import SmoothedEvent, smooth_voltage
 from tractexp.record import Base, Event, Record
-from tractexp.record.wave_event import COARSEST, smeared
+from tractexp.record.wave_event import COARSEST, describe_smearing
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
@@ -47,7 +47,7 @@ class PhasorDomain(Domain):
         return excitation.phasors(event, model, weights)
 
     def smoothed(self, event: Event) -> SmoothedEvent:
-        return smoothed(event)
+        return smooth_voltage(event)
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
         first = [int(drive.first[e]) for e in range(drive.events)]
@@ -84,7 +84,7 @@ class PhasorDomain(Domain):
         if waves is None or waves.rate < COARSEST * record.base.frequency:
             return ""
         U2 = 0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
-        why = smeared(event.duration, U2, record.base.frequency)
+        why = describe_smearing(event.duration, U2, record.base.frequency)
         return why and f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"
 
     def slowest(self, frequency: float) -> float:
@@ -134,5 +134,5 @@ class PhasorDomain(Domain):
             step=float((t[-1] - t[0]) / (len(t) - 1)), U=U, P=unknown, Q=unknown, U0=before["U0"], P0=before["P0"],
             Q0=before["Q0"], omega_s=omega_s, omega_s0=omega_s0, omega_n=2 * np.pi * before["frequency"],
         )  # fmt: skip
-        outputs = simulated(model, values, Drive.of([event]))
+        outputs = simulate_compared(model, values, Drive.of([event]))
         return outputs[0], outputs[1]

@@ -44,7 +44,7 @@ class Playback:
         """Calculated currents (3, N) [pu] beside the recorded ones, and the phasors of both by one estimator."""
         return replace(
             cls.of_power(*as_phasors(event, currents)), epsilon_i=current_error(event, currents), waves=event,
-            currents=currents, unsettled=unsettled(event, currents),
+            currents=currents, unsettled=measure_unsteadiness(event, currents),
         )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
     return rms((currents - recorded) * compared, window) / rms(recorded, before)
 
 
-def unsettled(event: WaveEvent, currents: np.ndarray) -> float:
+def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
     """By how much calculated currents (3, N) still change from cycle to cycle before the record, a share of them.
 
     The rms of the last cycle of the lead less the one before it, over the rms of the last one; nan where the lead is

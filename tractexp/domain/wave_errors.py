@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from tractexp.model.drive import Drive
-from tractexp.noise.color import SMALLEST
+from tractexp.noise.color import SMALLEST_DEVIATION
 from tractexp.record import Event, WaveEvent
 
 if TYPE_CHECKING:
     from tractexp.inference.problem import Problem
 
-DIVERGED = 10.0  # pu: a wrong sample of the voltage makes no such difference
+LARGEST_SAMPLE_DIFFERENCE = 10.0  # pu: a wrong sample of the voltage makes no such difference
 OFFSET = 0.005  # pu: what may be left of a channel's offset, which the mean before the dip took off
 MOST_BETWEEN = 12  # intervals between samples whose voltage is doubted
 ROUGH = 5.0  # standard deviations of its noise, from which a sample off its neighbors' cubic is no noise
@@ -34,7 +34,7 @@ def impulse_responses(problem: "Problem", values: np.ndarray) -> tuple[np.ndarra
     """
     event = problem.events[0]
     assert isinstance(event, WaveEvent)
-    noise = max(event.noise_U, SMALLEST)
+    noise = max(event.noise_U, SMALLEST_DEVIATION)
     shocks = [(noise, 0.0), (1j * noise, 0.0), (0.0, noise / np.sqrt(2))][: event.phases]  # the zero's is a third
     off = _differences(problem, values, 0, [_struck(event, *shock) for shock in shocks])[:, :, : event.start]
     if event.phases == 1:
@@ -56,7 +56,7 @@ def _of_voltage(problem: "Problem", values: np.ndarray, event: int) -> np.ndarra
     drive, part = problem.drive, problem.drive.part(event)
     plain = problem.events[event]
     assert isinstance(plain, WaveEvent)
-    off = _differences(problem, values, event, [*_shifted(plain), *_between(plain)])
+    off = _differences(problem, values, event, [*_shift_voltage_offsets(plain), *_between(plain)])
     shapes = np.zeros((len(off), *drive.measured.shape))
     shapes[:, :, part] = off * (drive.weights[:, part] > 0)
     return shapes
@@ -69,10 +69,10 @@ def _differences(problem: "Problem", values: np.ndarray, event: int, variants: S
     response = problem.model.simulate(drive, own, np.tile(problem.step.substeps[[event]], drive.events))
     outputs = response.outputs[:, 0].reshape(drive.channels, drive.events, -1).swapaxes(0, 1)
     off = outputs[1:] - outputs[0]
-    return np.where(np.abs(off) < DIVERGED, off, 0.0)
+    return np.where(np.abs(off) < LARGEST_SAMPLE_DIFFERENCE, off, 0.0)
 
 
-def _shifted(event: WaveEvent) -> list[WaveEvent]:
+def _shift_voltage_offsets(event: WaveEvent) -> list[WaveEvent]:
     """The event with the offset that noise may have left in each component of its voltage, from the record on."""
     size = LEFT * event.noise_U / np.sqrt(max(event.start - event.lead, 1))
     there = np.arange(len(event.v)) >= event.lead
@@ -87,7 +87,7 @@ def _between(event: WaveEvent) -> list[WaveEvent]:
     off = np.abs(off_neighbors(event.v * event.turn))
     off[: event.lead + 3] = 0.0
     seen = np.argsort(-off)[:MOST_BETWEEN]
-    seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST)])
+    seen = np.sort(seen[off[seen] > max(ROUGH * event.noise_U, SMALLEST_DEVIATION)])
     variants = []
     for k in seen.tolist():
         bump = np.zeros(len(event.v), dtype=complex)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from tractexp.domain import excitation, wave_errors
-from tractexp.domain.domain import DipGrid, Domain, simulated
+from tractexp.domain.domain import DipGrid, Domain, simulate_compared
 from tractexp.domain.playback import Playback
 from tractexp.domain.port import Complex, Port, current_ports, periodic_course
 from tractexp.model.drive import WAVES, Drive, WaveformDrive
@@ -21,7 +21,7 @@ from tractexp.noise.waves import of_waves
 from tractexp.record import Event, WaveEvent, in_waves
 from tractexp.record.synthetic import synthetic_event
 from tractexp.record.wave_event import COARSEST
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 if TYPE_CHECKING:
     from tractexp.identification.plan import DipShape
@@ -123,7 +123,7 @@ class WaveDomain(Domain):
             " better than two curves through them agree."
         )
         how = "each held by what is likely" if judged else "and not judged: these offsets and edges would pass for them"
-        return origin + f" Faults of the measurement ({joined(faults)}) are free in every fit, {how}." * bool(faults)
+        return origin + f" Faults of the measurement ({join_words(faults)}) are free in every fit, {how}." * bool(faults)
 
     def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
@@ -163,6 +163,6 @@ class WaveDomain(Domain):
             v *= np.exp(1j * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)])))
         means = before["U0"], before["P0"], before["Q0"]
         event = synthetic_event("played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
-        i = simulated(model, values, Drive.of([self.excitation(event)]))
+        i = simulate_compared(model, values, Drive.of([self.excitation(event)]))
         power = (v * np.conj((i[0] + 1j * i[1]) / event.turn))[::every]
         return power.real, power.imag

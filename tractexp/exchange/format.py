@@ -15,8 +15,8 @@ from tractexp.model.drive import Drive, Excitation
 from tractexp.model.model import Model, compose
 from tractexp.plugin import Plugin, discover
 from tractexp.record.identity import label
-from tractexp.record.own_base import scaled
-from tractexp.wording import joined
+from tractexp.record.own_base import scale_parameter
+from tractexp.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Identified:
         """The parameters on the base of the export."""
         exponents = {p.name: p.power_exponent for p in self.model.parameters}
         parameters = self.result.parameters
-        return {name: scaled(value, exponents.get(name, 0), self.ratio) for name, value in parameters.items()}
+        return {name: scale_parameter(value, exponents.get(name, 0), self.ratio) for name, value in parameters.items()}
 
     @property
     def name(self) -> str:
@@ -174,6 +174,6 @@ class Format(Plugin):
         the part itself can be."""
         why = f": {self.lacks[name]}" if name in self.lacks else ""
         formats: Mapping[str, Any] = discover()[self.group] if kind != "effect" else {}  # which refuse some yet
-        others = joined([other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or")
+        others = join_words([other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or")
         by = f"; {TASK.format}={others} can represent '{name}'" if others else ""
         return f"{why}; it can represent {', '.join(sorted(self._represented(kind) or ['none']))}{by}"

@@ -13,8 +13,8 @@ from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 from tractexp.identification.verdict import BOUND
 
-MOST = 1.2  # of the load's active power: what a motor may draw before its model is doubted
-FACTOR = 0.8  # power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent power
+LARGEST_MOTOR_SHARE = 1.2  # of the load's active power: what a motor may draw before its model is doubted
+MOTOR_POWER_FACTOR = 0.8  # power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent power
 
 
 @dataclass(frozen=True)
@@ -85,9 +85,9 @@ class OperatingPoint:
         of_load = f"of a load of {self.P:.4g} {p} and {self.Q:.4g} {q}"
         if self.P > 0 > self.share:
             return f"the motor generates {motor} and the static part draws {static} {of_load}"
-        if self.P > 0 and self.share > MOST:
+        if self.P > 0 and self.share > LARGEST_MOTOR_SHARE:
             return f"the motor draws {motor} {of_load}, and the static part generates {static}"
-        if self.P > 0 and S_motor > MOST / FACTOR * S:
+        if self.P > 0 and S_motor > LARGEST_MOTOR_SHARE / MOTOR_POWER_FACTOR * S:
             return f"the motor draws {reactive} {of_load}, and the static part supplies {supplied}"
         return ""
 

@@ -16,7 +16,7 @@ from tractexp.model.drive import Drive, Excitation
 STEP, LENGTH = 1e-3, 1.2  # s
 DEPTH = 0.4  # of the voltage before
 FALL, RISE, EDGE = 0.2, 0.4, 0.05  # s: where the voltage falls and comes back, and how long either takes
-FACTOR = 8  # Runge-Kutta steps a sample of another simulator's
+STEPS_A_SAMPLE = 8  # Runge-Kutta steps a sample of another simulator's
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def dip(step: float = STEP) -> np.ndarray:
     return 1 - DEPTH * (fallen - back)
 
 
-def played(form: Format, text: str, load: Identified) -> tuple[Agreement | None, list[str]]:
+def play_back_export(form: Format, text: str, load: Identified) -> tuple[Agreement | None, list[str]]:
     """How well an export's text agrees with the fit, None where it cannot be played; and why, or why not elsewhere."""
     notes = []
     for play in (_elsewhere, _here):
@@ -63,7 +63,7 @@ def played(form: Format, text: str, load: Identified) -> tuple[Agreement | None,
 def _elsewhere(form: Format, text: str, load: Identified) -> Agreement | None:
     """In the simulator of the format; None where that is not at hand."""
     there = form.simulated(text, load)
-    return there and _compared(there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q))
+    return there and _measure_agreement(there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q))
 
 
 def _here(form: Format, text: str, load: Identified) -> Agreement:
@@ -74,7 +74,7 @@ def _here(form: Format, text: str, load: Identified) -> Agreement:
     U, before = load.result.before["U0"] * dip(), load.result.before
     along = Simulated("our own simulator, from the file's numbers,", STEP, U, np.zeros_like(U), U, U)
     fit = response(load, along, load.ratio * before["P0"], load.ratio * before["Q0"])
-    return _compared(along.by, fit, _restored(restored, load, along))
+    return _measure_agreement(along.by, fit, _simulate_restored_load(restored, load, along))
 
 
 def response(load: Identified, along: Simulated, P0: float, Q0: float) -> tuple[np.ndarray, np.ndarray]:
@@ -84,11 +84,11 @@ def response(load: Identified, along: Simulated, P0: float, Q0: float) -> tuple[
     drive, values = Drive.of([one]), np.array([load.values[name] for name in load.model.names])
     if refusal := load.model.refusal(values, drive):
         raise UserError(f"not played back: {refusal}")
-    answer = load.model.simulate(drive, values, FACTOR)
+    answer = load.model.simulate(drive, values, STEPS_A_SAMPLE)
     return answer.P[0], answer.Q[0]
 
 
-def _restored(restored: Restored, load: Identified, along: Simulated) -> tuple[np.ndarray, np.ndarray]:
+def _simulate_restored_load(restored: Restored, load: Identified, along: Simulated) -> tuple[np.ndarray, np.ndarray]:
     """P and Q (N,) of what a file describes: its motor draws what it does, its static part what the file says."""
     result = replace(load.result, model=dict(restored.model), parameters=dict(restored.parameters))
     of_file = Identified(replace(result, own_base={}), load.bus, load.power, load.voltage)
@@ -99,7 +99,7 @@ def _restored(restored: Restored, load: Identified, along: Simulated) -> tuple[n
     return response(of_file, along, P0, Q0)
 
 
-def _compared(by: str, fit: tuple[np.ndarray, np.ndarray], there: tuple[np.ndarray, np.ndarray]) -> Agreement:
+def _measure_agreement(by: str, fit: tuple[np.ndarray, np.ndarray], there: tuple[np.ndarray, np.ndarray]) -> Agreement:
     off = [float(np.abs(a - b).max()) for a, b in zip(fit, there, strict=True)]
     moved = [float(np.ptp(a)) for a in fit]
     return Agreement(by, (off[0], off[1]), (moved[0], moved[1]))

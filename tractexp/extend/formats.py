@@ -4,6 +4,6 @@ from tractexp import quoting
 from tractexp.exchange.circuit import TCircuit
 from tractexp.exchange.format import Format, Restored, Simulated
 from tractexp.exchange.playback import dip
-from tractexp.files import held
+from tractexp.files import lock_file
 
-__all__ = ["Format", "Restored", "Simulated", "TCircuit", "dip", "held", "quoting"]
+__all__ = ["Format", "Restored", "Simulated", "TCircuit", "dip", "lock_file", "quoting"]

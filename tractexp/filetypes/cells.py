@@ -57,7 +57,7 @@ def is_grouped(cell: Any) -> bool:
     return any(group_mark(cell, decimal) for decimal in GROUPED)
 
 
-def grouping(rows: Sequence[Sequence[Any]], decimal: str) -> str:
+def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
     """The mark between groups of digits in the cells of a table; "" where there is none.
 
     A comma that could be a decimal mark is one of groups where points are, and every comma stands before three digits.
@@ -84,15 +84,15 @@ def numbers(cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group:
             values[row] = _number(cell, decimal)
         except ValueError:
             if not is_gap(cell):
-                raise BadCell(row, f"{quoted(cell)} is not a number{_comma(str(cell), decimal)}") from None
+                raise BadCell(row, f"{quote_cell(cell)} is not a number{_comma(str(cell), decimal)}") from None
             if not gaps:
-                what = f"{quoted(cell)} stands for no value" if cell and str(cell).strip() else "the cell is empty"
+                what = f"{quote_cell(cell)} stands for no value" if cell and str(cell).strip() else "the cell is empty"
                 raise BadCell(row, f"{what}; only P and Q may have gaps") from None
             values[row] = np.nan
     return values
 
 
-def quoted(cell: Any) -> str:
+def quote_cell(cell: Any) -> str:
     """A cell in a message: of a list, of bytes or of a long text its beginning."""
     return f"'{cell!s:.40}'"
 

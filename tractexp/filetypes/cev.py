@@ -17,7 +17,7 @@ import numpy as np
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes import timeline
-from tractexp.filetypes.comtrade_fields import number, quoted
+from tractexp.filetypes.comtrade_fields import number, quote_field
 from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
@@ -27,8 +27,8 @@ from tractexp.recording.recording import Channel, Recording, StatusChannel, unit
 ROOT = float(np.sqrt(2))
 LARGEST = 32 * 2**20  # bytes: event reports last seconds
 HEAD = 2000  # lines: the names of the columns stand among them
-CLOSE = 0.1  # of a current: so well the summary's agrees with the columns
-SLOW = 10  # samples a cycle: fewer are a filtered report, which holds phasors
+LARGEST_SUMMARY_DIFFERENCE = 0.1  # of a current: so well the summary's agrees with the columns
+FEWEST_WAVE_RATE = 10  # samples a cycle: fewer are a filtered report, which holds phasors
 BEGINNING = 1 << 16  # bytes in which a report names the samples in a cycle
 LEAST, MOST = 10.0, 100.0  # Hz
 # what the settings say of the load and of its transformers: full-load and locked-rotor current, service factor, ratios
@@ -54,15 +54,15 @@ def recognizes(path: Path | str) -> bool:
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
     """Whether it is a raw report; a filtered one, of a few samples a cycle, holds phasors."""
-    opened = _opened(path, encoding)
-    return opened.per_cycle >= SLOW
+    opened = _open_report(path, encoding)
+    return opened.per_cycle >= FEWEST_WAVE_RATE
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
     """Read a raw report; raises `UserError` naming line, column and value of what is wrong."""
-    opened = _opened(path, encoding)
+    opened = _open_report(path, encoding)
     report, remarks, t = opened.report, opened.remarks, opened.t
-    if opened.per_cycle < SLOW:
+    if opened.per_cycle < FEWEST_WAVE_RATE:
         remarks.add(
             f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay with the command "
             "CEV R, or its COMTRADE file; its phasors are read by data=csv"
@@ -72,8 +72,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     return Recording(
         source=str(path),
         channels=[
-            _channel(report, k, timeline.evened(opened.values[:, k], runs, None), opened.gain, remarks)
-            for k in range(opened.values.shape[1]) if _named(report, k)
+            _channel(report, k, timeline.resample_evenly(opened.values[:, k], runs, None), opened.gain, remarks)
+            for k in range(opened.values.shape[1]) if _is_named(report, k)
         ],
         segments=timeline.laid_out(runs),
         frequency=opened.nominal,
@@ -95,9 +95,9 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     relay samples by the frequency that it tracks, so that this holds off the nominal one. Raises `UserError` as `load`,
     and for a raw report.
     """
-    opened = _opened(path, encoding)
+    opened = _open_report(path, encoding)
     report, remarks, quarter = opened.report, opened.remarks, round(opened.per_cycle / 4)
-    if opened.per_cycle >= SLOW or 4 * quarter != opened.per_cycle or len(opened.t) <= quarter:
+    if opened.per_cycle >= FEWEST_WAVE_RATE or 4 * quarter != opened.per_cycle or len(opened.t) <= quarter:
         raise UserError(
             f"{path}: {len(opened.t)} samples, {opened.per_cycle:g} a cycle: phasors are read from filtered reports of "
             f"4 or 8; waveforms by data=sel data.path={path}"
@@ -110,7 +110,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     back = np.exp(-2j * np.pi * opened.nominal * t)
     columns = [("t", "s", t), ("f", "Hz", opened.frequency[quarter:])]
     for k in range(opened.values.shape[1]):
-        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks) if _named(report, k) else None
+        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks) if _is_named(report, k) else None
         if channel is not None and channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
             x = channel.ratio * channel.recorded()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
@@ -135,7 +135,7 @@ class _Opened:
     encoding: str
 
 
-def _opened(path: Path, encoding: str | None) -> _Opened:
+def _open_report(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
     files.check_there(path)
     if path.stat().st_size > LARGEST:
@@ -150,13 +150,13 @@ def _opened(path: Path, encoding: str | None) -> _Opened:
         remarks.add("no row is marked as the trigger's ('>'); the report's time is taken as that of the first sample")
     if rated := ", ".join(f"{name} = {value}" for name, value in RATING.findall(report.settings)):
         remarks.add(f"the relay's settings: {rated}")
-    gain, tracked = _gain(report, values, marks, per_cycle, remarks), _tracked(report, values, frequency, remarks)
+    gain, tracked = _gain(report, values, marks, per_cycle, remarks), _read_tracked_frequency(report, values, frequency, remarks)
     t = np.concatenate([[0.0], np.cumsum(2 / (tracked[1:] + tracked[:-1]))]) / per_cycle
     nominal = 50.0 if abs(frequency - 50) < abs(frequency - 60) else 60.0
     return _Opened(report, values, words, t, tracked, per_cycle, nominal, marked, gain, remarks, encoding)
 
 
-def _tracked(report: EventReport, values: np.ndarray, frequency: float, remarks: Remarks) -> np.ndarray:
+def _read_tracked_frequency(report: EventReport, values: np.ndarray, frequency: float, remarks: Remarks) -> np.ndarray:
     """The frequency (N,) [Hz] that the relay sampled by: its column's, where that is one, else the summary's."""
     names = [column.upper() for column in report.columns[: values.shape[1]]]
     k = next((names.index(name) for name in ("FREQ", "FREQ(HZ)") if name in names), None)
@@ -184,7 +184,7 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     report = EventReport(settings=rest.partition("\n")[2].strip())
     names: list[str] | None = None
     sums: list[bool] = []  # whether each row has its checksum
-    for line, row in _joined(body):
+    for line, row in _join_quoted_rows(body):
         if line > HEAD and not report.columns:
             break
         try:
@@ -222,7 +222,7 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
     return report
 
 
-def _joined(body: str) -> list[tuple[int, str]]:
+def _join_quoted_rows(body: str) -> list[tuple[int, str]]:
     """Rows with the number of their first line; one with an open quotation goes on in the next line."""
     rows: list[tuple[int, str]] = []
     held, start = "", 0
@@ -262,7 +262,7 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
         return float("nan")  # so the relay writes a missing value
     if value is None or abs(value) > HUGE:
         raise UserError(
-            f"{path}: line {line}: {name or 'column'} {quoted(cell)} is not a number, up to 1e38; correct it"
+            f"{path}: line {line}: {name or 'column'} {quote_field(cell)} is not a number, up to 1e38; correct it"
         )
     return value
 
@@ -273,18 +273,18 @@ def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     per_cycle, frequency = numbers["SAM/CYC_A"], numbers["FREQ"]
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
         raise UserError(
-            f"{path}: SAM/CYC_A, the samples in a cycle, is {quoted(report.about.get('SAM/CYC_A', ''))}, not a number "
+            f"{path}: SAM/CYC_A, the samples in a cycle, is {quote_field(report.about.get('SAM/CYC_A', ''))}, not a number "
             "from 1 to 10000; correct it in the summary row"
         )
     if frequency is None or not LEAST <= frequency <= MOST:
         raise UserError(
-            f"{path}: FREQ, the frequency of the summary row, is {quoted(report.about.get('FREQ', ''))}, not a number "
+            f"{path}: FREQ, the frequency of the summary row, is {quote_field(report.about.get('FREQ', ''))}, not a number "
             "from 10 to 100 Hz; correct it there"
         )
     return per_cycle, frequency
 
 
-def _named(report: EventReport, k: int) -> bool:
+def _is_named(report: EventReport, k: int) -> bool:
     return report.columns[k] not in ("", "*")
 
 
@@ -335,10 +335,10 @@ def _gain(report: EventReport, values: np.ndarray, marks: list[str], per_cycle: 
     if not ratios:
         return ROOT
     ratio = max(ratios)[1]  # of the greatest current
-    if abs(ratio / ROOT - 1) < CLOSE:
+    if abs(ratio / ROOT - 1) < LARGEST_SUMMARY_DIFFERENCE:
         remarks.add("but their greatest current, by the summary, says that they are not divided; taken as they are")
         return 1.0
-    if abs(ratio - 1) > CLOSE:
+    if abs(ratio - 1) > LARGEST_SUMMARY_DIFFERENCE:
         remarks.add(f"the summary's greatest current is {1 / ratio:.2f} times that of the columns: check the scale")
     return ROOT
 
@@ -353,7 +353,7 @@ def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | N
         return moment - timedelta(seconds=before)
     except (ValueError, OverflowError):
         said = ", ".join(f"{key} {report.about.get(key, '')}" for key in keys)
-        remarks.add(f"{quoted(said)} is not a date and time; not used")
+        remarks.add(f"{quote_field(said)} is not a date and time; not used")
         return None
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp.filetypes.cells import BadCell, quoted
+from tractexp.filetypes.cells import BadCell, quote_cell
 
 DAYS = (
     "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
@@ -89,7 +89,7 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     for row, one in enumerate(moments):
         if (one.day is not None) != dated:
             lack = "has" if one.day is not None else "lacks"
-            raise BadCell(row, f"{quoted(cells[row])} {lack} a date, unlike the first row")
+            raise BadCell(row, f"{quote_cell(cells[row])} {lack} a date, unlike the first row")
     seconds, start, remarks = np.array([one.second for one in moments]), None, []
     if dated:
         days, remarks = _dates([one.day for one in moments], any(one.half for one in moments))
@@ -142,15 +142,15 @@ def _moment(cell: Any, row: int) -> _Moment:
         return _Moment(cell, 0.0)  # a sheet's midnight
     match = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
     if match is None:
-        raise BadCell(row, f"{quoted(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
+        raise BadCell(row, f"{quote_cell(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
     hours, minutes, second = int(match["h"] or 0), int(match["m"]), float(match["s"].replace(",", "."))
     if hours > 24 or minutes > 59 or second >= 61:
-        raise BadCell(row, f"{quoted(cell)} is no time of a day")
+        raise BadCell(row, f"{quote_cell(cell)} is no time of a day")
     if match["half"]:
         hours = hours % 12 + 12 * (match["half"] in "Pp")
     day = match["day"].strip() if match["day"] else None
     if day and not is_date(day):
-        raise BadCell(row, f"{quoted(day)} is no date; write it as 2024-03-31")
+        raise BadCell(row, f"{quote_cell(day)} is no date; write it as 2024-03-31")
     total = hours * 3600 + minutes * 60 + second - _offset(match["zone"])
     return _Moment(day, total, bool(match["half"]), bool(match["zone"]), second >= 60)
 
@@ -182,7 +182,7 @@ def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], lis
             ways.append((form, read))
     if not ways:
         odd = next((t for t in order if not is_date(t)), order[-1])
-        raise BadCell(rows[odd], f"{quoted(odd)} is no date, or not written as those before; write it as 2024-03-31")
+        raise BadCell(rows[odd], f"{quote_cell(odd)} is no date, or not written as those before; write it as 2024-03-31")
     spans = [sum(abs((b - a).days) for a, b in itertools.pairwise(way)) for _, way in ways]
     likely = [ways[k] for k in range(len(ways)) if spans[k] == min(spans)]
     first_month = [each for each in likely if each[0].startswith("%m")]

@@ -179,7 +179,7 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     words = _words(name) if spelled == plain(name) else _words(spelled)
     said = _quantity(words)
     if said is None or (electrical and said[0] not in BY_UNIT.values()):
-        said = _marked(words, kind, ground) or said
+        said = _match_mark(words, kind, ground) or said
     if said is None:
         return None
     key, phase = said
@@ -200,10 +200,10 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
 
 def _quantity(words: Sequence[str]) -> tuple[str, str] | None:
     """(quantity, phase) that words say."""
-    return next((pair for pair in (_compound(words), _worded(words)) if pair), None) if words else None
+    return next((pair for pair in (_compound(words), _match_words(words)) if pair), None) if words else None
 
 
-def _marked(words: Sequence[str], kind: str, ground: bool) -> tuple[str, str] | None:
+def _match_mark(words: Sequence[str], kind: str, ground: bool) -> tuple[str, str] | None:
     """(quantity, phase) of a name that is little more than a mark: its unit, or two phases or ground, say it."""
     phase = next((PHASES[word] for word in words if PHASES.get(word, "0")[0] in "abc"), "")
     more = [word for word in words if word not in PHASES and word not in ANGLE and word not in ("mag", "rms")]
@@ -232,7 +232,7 @@ def _compound(words: Sequence[str]) -> tuple[str, str] | None:
     return None
 
 
-def _worded(words: Sequence[str]) -> tuple[str, str] | None:
+def _match_words(words: Sequence[str]) -> tuple[str, str] | None:
     """Quantity and phase of words such as "active power", "phase A voltage", "正序电压"."""
     first = ("dfdt", "rocof", "reactive", *words)
     quantity = next((WORDS[word] for word in first if word in words and word in WORDS), "")

@@ -41,7 +41,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     if path.is_dir():
         raise UserError(f"{path} is a folder; task=survey data.path={path} makes a table of all records in it")
     try:
-        return _combined(_existing(path), encoding) if path.suffix.lower() == ".cff" else _paired(path, encoding)
+        return _read_combined(_find_existing_path(path), encoding) if path.suffix.lower() == ".cff" else _read_pair(path, encoding)
     except OSError as error:
         raise UserError(f"{error.filename or path} cannot be read: {error.strerror or error}") from error
 
@@ -50,7 +50,7 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
     """What the configuration of a record announces, without its samples; raises `UserError` as `load` does."""
     path = Path(path)
     if path.suffix.lower() == ".cff":
-        parts = _sections(_existing(path))
+        parts = _sections(_find_existing_path(path))
         if "CFG" not in parts:
             raise UserError(f"{path}: no section CFG")
         place, first = parts["CFG"], parts["CFG"].line
@@ -64,7 +64,7 @@ def _whole(path: Path) -> ByteRange:
     return ByteRange(path, 0, path.stat().st_size)
 
 
-def _paired(path: Path, encoding: str | None) -> Recording:
+def _read_pair(path: Path, encoding: str | None) -> Recording:
     cfg, dat, note = _pair(path)
     remarks = Remarks(str(cfg))
     if note:
@@ -73,7 +73,7 @@ def _paired(path: Path, encoding: str | None) -> Recording:
     return _recording(cfg, text, _whole(dat), remarks, {"encoding": encoding})
 
 
-def _combined(path: Path, encoding: str | None) -> Recording:
+def _read_combined(path: Path, encoding: str | None) -> Recording:
     """A .cff: its sections, the data last and by its length where it is binary."""
     parts = _sections(path)
     if "CFG" not in parts or "DAT" not in parts:
@@ -140,9 +140,9 @@ def _recording(
 
 def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch]) -> Channel:
     analog, raw = header.analogs[k], samples.analogs[k]
-    raw, missing = _missing(header.kind, analog, raw)
+    raw, missing = _find_missing_values(header.kind, analog, raw)
     return Channel(
-        analog.name, timeline.evened(raw, stretches, missing), analog.unit, quantity_of(analog.unit),
+        analog.name, timeline.resample_evenly(raw, stretches, missing), analog.unit, quantity_of(analog.unit),
         analog.phase, analog.circuit, analog.gain, analog.offset, analog.ratio, analog.skew * 1e-6, analog.limits,
         missing, _side(header, analog),
     )  # fmt: skip
@@ -155,7 +155,7 @@ def _side(header: Header, analog: Analog) -> str:
     return "?" if not analog.side and header.revision < FIRST_WITH_RATIO else ""
 
 
-def _missing(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
+def _find_missing_values(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
     """The raw values, and which of them stands for none: a value that the file declares possible does not."""
     least, greatest = analog.limits or (-np.inf, np.inf)
     if kind == "BINARY" and least >= 0 and greatest > 32767:  # declared without sign
@@ -175,7 +175,7 @@ def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remar
     fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
     unit = header.timemult * (1e-9 if fine else 1e-6)
     if header.rates[0][0] > 0:
-        result = timeline.from_rates(header.rates, _stamped(header, samples.stamps, unit, remarks))
+        result = timeline.from_rates(header.rates, _read_stamped_times(header, samples.stamps, unit, remarks))
         if any(s.t is not None for s in result):
             remarks.add(
                 "sampling rates within 2 % of their neighbours are taken as one waveform", header.lines["rates"]
@@ -197,7 +197,7 @@ def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remar
     return result
 
 
-def _stamped(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) -> np.ndarray | None:
+def _read_stamped_times(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) -> np.ndarray | None:
     """Times (N,) [s] by the time stamps; None where there are none or they contradict the rates, which is said."""
     if stamps[-1] in (NONE, 0) or stamps[0] == stamps[-1] or not np.isfinite(stamps).all():
         return None
@@ -241,7 +241,7 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
     return extra
 
 
-def _existing(path: Path) -> Path:
+def _find_existing_path(path: Path) -> Path:
     if not files.there(path):
         names = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
         raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
@@ -255,21 +255,21 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
         raise UserError(
             f"{DATA.path}={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside it, or a .cff"
         )
-    _existing(path)
+    _find_existing_path(path)
     if ending == ".dat":
-        cfg = _beside(path, ".cfg")
+        cfg = _find_companion(path, ".cfg")
         if cfg is None:
             raise UserError(
                 f"{path}: the configuration {path.stem}.cfg is not beside it, and the data mean nothing without"
             )
         return cfg, path, f"it lies beside {path.name}"
-    dat = _beside(path, ".dat")
+    dat = _find_companion(path, ".dat")
     if dat is None:
         raise UserError(f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside {path.name}")
     return path, dat, ""
 
 
-def _beside(path: Path, ending: str) -> Path | None:
+def _find_companion(path: Path, ending: str) -> Path | None:
     for one in (ending, ending.upper(), ending.capitalize()):
         if files.there(path.with_suffix(one)):
             return path.with_suffix(one)

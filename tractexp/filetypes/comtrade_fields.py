@@ -20,7 +20,7 @@ def number(text: str) -> float | None:
     return value if isfinite(value) else None
 
 
-def quoted(text: str) -> str:
+def quote_field(text: str) -> str:
     """A value of the file for a message: not longer than a line bears."""
     return f"'{text[:40]}…'" if len(text) > 40 else f"'{text}'"
 
@@ -32,7 +32,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
     """
     match = _DATE.fullmatch(text.strip())
     if match is None:
-        return None, f"{quoted(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
+        return None, f"{quote_field(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
     a, b, c, hour, minute, second = map(int, match.groups()[:6])
     micro = int((match[7] or "0")[:6].ljust(6, "0"))
     orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
@@ -44,5 +44,5 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
             moment = datetime(year, month, day, hour, minute, second, micro)
         except ValueError:
             continue
-        return moment, f"date {quoted(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
-    return None, f"{quoted(text)} is not a day of the calendar; not used"
+        return moment, f"date {quote_field(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
+    return None, f"{quote_field(text)} is not a day of the calendar; not used"

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 
 from tractexp.errors import UserError
-from tractexp.filetypes.comtrade_fields import date, number, quoted
+from tractexp.filetypes.comtrade_fields import date, number, quote_field
 from tractexp.filetypes.remarks import Remarks
 from tractexp.recording.recording import unit_of
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
@@ -134,7 +134,7 @@ def _station(rows: _Lines, header: Header) -> None:
     if len(fields) > 1 and re.fullmatch(r"(19|20)\d\d", fields[-1], re.ASCII):
         header.revision = int(fields.pop())
     elif len(fields) > 2:
-        rows.remarks.add(f"the standard's year {quoted(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
+        rows.remarks.add(f"the standard's year {quote_field(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
         header.revision = 1999
     header.station, header.device = fields[0], ",".join(fields[1:])
 
@@ -143,7 +143,7 @@ def _counts(rows: _Lines) -> tuple[int, int]:
     line, text = rows.take("the numbers of channels")
     match = _COUNTS.fullmatch(text)
     if match is None or match[3].upper() == match[5].upper():
-        raise rows.refuse(line, f"{quoted(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
+        raise rows.refuse(line, f"{quote_field(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
     counts = {match[3].upper(): int(match[2]), match[5].upper(): int(match[4])}
     analogs, digitals = counts["A"], counts["D"]
     if int(match[1]) != analogs + digitals:
@@ -166,11 +166,11 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     if len(fields) > 13 and not any(fields[13:]):
         fields = fields[:13]
     name = fields[1] if len(fields) > 1 else ""
-    channel = f"analog channel {k + 1} of {count} {quoted(name)}"
+    channel = f"analog channel {k + 1} of {count} {quote_field(name)}"
     short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
     if len(fields) not in (10, 13) and not short:
         raise rows.refuse(
-            line, f"{channel} has {counted(len(fields), 'field')}, but an analog channel has 13, or 10 by the standard "
+            line, f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10 by the standard "
             "of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
 
@@ -181,7 +181,7 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
         parsed = number(fields[i])
         if parsed is None or abs(parsed) > GREATEST:
             raise rows.refuse(
-                line, f"{channel}: {what} {quoted(fields[i])} is not a number between -1e12 and 1e12; correct it"
+                line, f"{channel}: {what} {quote_field(fields[i])} is not a number between -1e12 and 1e12; correct it"
             )
         return parsed
 
@@ -189,7 +189,7 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     side = fields[12].upper()
     declared = side in ("P", "S")
     if side and not declared:
-        rows.remarks.add(f"{quoted(fields[12])} is neither P nor S, primary values taken", line)
+        rows.remarks.add(f"{quote_field(fields[12])} is neither P nor S, primary values taken", line)
     elif not declared and any(fields[10:12]):
         rows.remarks.add("neither P nor S stands there, primary values taken", line)
     low, high = number(fields[8]), number(fields[9])
@@ -224,9 +224,9 @@ def _digital(rows: _Lines, k: int, count: int) -> Digital:
     while len(fields) > 5 and not fields[-1]:
         fields.pop()
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
-        name = quoted(fields[1]) if len(fields) > 1 else quoted(fields[0])
+        name = quote_field(fields[1]) if len(fields) > 1 else quote_field(fields[0])
         raise rows.refuse(
-            line, f"status channel {k + 1} of {count} {name} has {counted(len(fields), 'field')}, but a status channel "
+            line, f"status channel {k + 1} of {count} {name} has {count_noun(len(fields), 'field')}, but a status channel "
             "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
         )  # fmt: skip
     if len(fields) == 5:
@@ -247,7 +247,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     if "," in text.strip(", "):
         raise rows.refuse(
             line,
-            f"{quoted(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
+            f"{quote_field(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
             "announces, or the frequency is missing",
         )
     if parsed == 0 or not text.strip(", "):
@@ -258,7 +258,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     if parsed is None or not FREQUENCY[0] <= parsed <= FREQUENCY[1]:
         low, high = FREQUENCY
         raise rows.refuse(
-            line, f"nominal frequency {quoted(text)} is not a number between {low:g} and {high:g} Hz; write that of "
+            line, f"nominal frequency {quote_field(text)} is not a number between {low:g} and {high:g} Hz; write that of "
             "the network there, 50 or 60",
         )  # fmt: skip
     header.frequency = parsed
@@ -268,7 +268,7 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     line, text = rows.take("the number of sampling rates")
     parsed = number(text.strip(", "))
     if parsed is None or parsed < 0 or parsed != int(parsed) or parsed > 1e6:
-        raise rows.refuse(line, f"the number of sampling rates {quoted(text)} is not a whole number from 0 on")
+        raise rows.refuse(line, f"the number of sampling rates {quote_field(text)} is not a whole number from 0 on")
     return int(parsed)
 
 
@@ -282,10 +282,10 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
         fields = [number(part) for part in text.strip(", ").split(",")]
         rate, end = (*fields, None, None)[:2]
         if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
-            raise rows.refuse(line, f"{quoted(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
+            raise rows.refuse(line, f"{quote_field(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
         last = header.rates[-1][1] if header.rates else 0
         if rate < 0 or rate > 1e9:
-            raise rows.refuse(line, f"sampling rate {quoted(text.split(',')[0])} is not between 0 and 1e9 Hz")
+            raise rows.refuse(line, f"sampling rate {quote_field(text.split(',')[0])} is not between 0 and 1e9 Hz")
         if end == last and last:
             rows.remarks.add("a sampling rate without samples of its own is passed over", line)
             continue
@@ -339,7 +339,7 @@ def _kind(rows: _Lines, header: Header) -> None:
     line, text = rows.take("the type of the data file")
     header.kind, header.lines["kind"] = text.strip(", ").upper(), line
     if header.kind not in VALUE:
-        raise rows.refuse(line, f"data file type {quoted(text)} is not one of {', '.join(VALUE)}")
+        raise rows.refuse(line, f"data file type {quote_field(text)} is not one of {', '.join(VALUE)}")
 
 
 def _trailer(rows: _Lines, header: Header) -> None:
@@ -348,7 +348,7 @@ def _trailer(rows: _Lines, header: Header) -> None:
         line, text = rows.take("the time multiplier")
         parsed = number(text.strip(", "))
         if parsed is None or not 0 < parsed <= GREATEST:
-            rows.remarks.add(f"time multiplier {quoted(text)} is not a number above zero, 1 taken", line)
+            rows.remarks.add(f"time multiplier {quote_field(text)} is not a number above zero, 1 taken", line)
             parsed = 1.0
         header.timemult = parsed
     elif header.revision >= 1999:

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.filetypes.comtrade_fields import number, quoted
+from tractexp.filetypes.comtrade_fields import number, quote_field
 from tractexp.filetypes.comtrade_header import VALUE, Header
 from tractexp.filetypes.remarks import Remarks
 
@@ -38,7 +38,7 @@ class ByteRange:
         return self.stop - self.first
 
     def content(self, length: int | None = None) -> bytes:
-        with files.opened(self.path) as file:
+        with files.open_ordinary_file(self.path) as file:
             file.seek(self.first)
             return file.read(self.size if length is None else min(length, self.size))
 
@@ -93,7 +93,7 @@ def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
         table = np.memmap(place.path, one, "r", place.first, (count,))
     else:
         table = np.fromfile(place.path, one, count, offset=place.first)
-    _counted(place, header, table["n"])
+    _check_sample_numbers(place, header, table["n"])
     return Samples(table["n"], table["t"], [table["a"][:, k] for k in range(len(header.analogs))], table["d"])
 
 
@@ -117,7 +117,7 @@ def _enough(
     header.rates = [*rates, (header.rates[len(rates)][0], present)]
 
 
-def _counted(place: ByteRange, header: Header, numbers: np.ndarray) -> None:
+def _check_sample_numbers(place: ByteRange, header: Header, numbers: np.ndarray) -> None:
     """Sample numbers that do not count up show that the rows are not where the header puts them."""
     steps = np.diff(numbers).view(np.int32)  # a counter that runs over goes on by one, too
     if not len(steps):
@@ -164,7 +164,7 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
 def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
     """Cells (M, width) of one block of lines after the other; nan where a cell is empty."""
     line, carried, remaining = place.line, b"", place.size
-    with files.opened(place.path) as file:
+    with files.open_ordinary_file(place.path) as file:
         file.seek(place.first)
         while remaining > 0:
             block = file.read(min(BLOCK, remaining))
@@ -220,7 +220,7 @@ def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
     if value is None or abs(value) > HUGE:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
-            f"{place.path}: line {line}: {what} {quoted(text)} is not a number, up to 1e38; correct it, or leave "
+            f"{place.path}: line {line}: {what} {quote_field(text)} is not a number, up to 1e38; correct it, or leave "
             "the cell empty for a missing value"
         )
     return value

@@ -34,7 +34,7 @@ def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int 
     data = _ascii(recording, stamps) if kind == "ASCII" else _binary(recording, kind, stamps)
     text = "\r\n".join(_lines(recording, kind, revision, rates, timemult)) + "\r\n"
     if path.suffix.lower() == ".cff":
-        return [files.write(path, _combined(recording, text, kind, data))]
+        return [files.write(path, _combine_sections(recording, text, kind, data))]
     dat = path.with_suffix(".DAT" if path.suffix.isupper() else ".dat")
     files.write(dat, data)  # first: whoever finds the description finds the samples
     return [files.write(path, text), dat]
@@ -49,16 +49,16 @@ def _kind(recording: Recording, first_kind: str, revision: int) -> str:
 
 
 def _fits(channel: Channel, kind: str) -> bool:
-    raw, lacking = np.asarray(channel.raw), _lacking(channel)
+    raw, lacking = np.asarray(channel.raw), _find_lacking_samples(channel)
     present = raw[~lacking]
     if kind == "ASCII":
         return True
     if kind == "FLOAT32":
         with np.errstate(over="ignore"):
             return bool((present.astype(np.float32) == present).all())
-    least, greatest = (0, 65534) if _unsigned(channel, kind) else FULL[kind]
+    least, greatest = (0, 65534) if _is_unsigned(channel, kind) else FULL[kind]
     if not lacking.any():  # then the value that stands for none is free
-        least, greatest = (0, 65535) if _unsigned(channel, kind) else (least - 1, greatest)
+        least, greatest = (0, 65535) if _is_unsigned(channel, kind) else (least - 1, greatest)
     elif channel.limits is not None and (channel.limits[0] < least or greatest < channel.limits[1] == 65535):
         return False  # the file would declare that value possible
     if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
@@ -66,11 +66,11 @@ def _fits(channel: Channel, kind: str) -> bool:
     return not len(present) or bool(least <= present.min() and present.max() <= greatest)
 
 
-def _unsigned(channel: Channel, kind: str) -> bool:
+def _is_unsigned(channel: Channel, kind: str) -> bool:
     return kind == "BINARY" and channel.limits is not None and channel.limits[0] >= 0 and channel.limits[1] > 32767
 
 
-def _lacking(channel: Channel) -> np.ndarray:
+def _find_lacking_samples(channel: Channel) -> np.ndarray:
     raw = np.asarray(channel.raw)
     lacking = np.isnan(raw) if raw.dtype.kind == "f" else np.zeros(len(raw), bool)
     return lacking if channel.missing is None else lacking | (raw == channel.missing)
@@ -78,7 +78,7 @@ def _lacking(channel: Channel) -> np.ndarray:
 
 def _limits(channel: Channel, kind: str) -> tuple[float, float]:
     """Those of the channel, or of the kind; wider where a value would else be taken for a missing one."""
-    raw = np.asarray(channel.raw)[~_lacking(channel)]
+    raw = np.asarray(channel.raw)[~_find_lacking_samples(channel)]
     if not len(raw):
         return channel.limits or FULL[kind]
     least, greatest = float(raw.min()), float(raw.max())
@@ -87,7 +87,7 @@ def _limits(channel: Channel, kind: str) -> tuple[float, float]:
         return (low, high) if greatest < 99999 else (low, max(high, greatest, 999999.0))
     if kind != "FLOAT32" and least < FULL[kind][0]:
         low = min(low, least)
-    if _unsigned(channel, kind) and greatest > 65534:
+    if _is_unsigned(channel, kind) and greatest > 65534:
         high = max(high, 65535)
     return low, high
 
@@ -174,10 +174,10 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     good = (stamps >= 0) & (stamps < NONE)
     table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
     for k, channel in enumerate(recording.channels):
-        none = np.nan if kind == "FLOAT32" else 65535 if _unsigned(channel, kind) else FULL[kind][0] - 1
+        none = np.nan if kind == "FLOAT32" else 65535 if _is_unsigned(channel, kind) else FULL[kind][0] - 1
         with np.errstate(over="ignore", invalid="ignore"):
-            values = np.asarray(channel.raw).astype("<u2" if _unsigned(channel, kind) else VALUE[kind])
-        values[_lacking(channel)] = none
+            values = np.asarray(channel.raw).astype("<u2" if _is_unsigned(channel, kind) else VALUE[kind])
+        values[_find_lacking_samples(channel)] = none
         table["a"][:, k] = values.view(VALUE[kind])
     for k, status in enumerate(recording.status):
         table["d"][:, k // 16] |= status.values().astype(np.uint16) << (k % 16)
@@ -194,7 +194,7 @@ def _ascii(recording: Recording, stamps: np.ndarray) -> bytes:
     columns = [_cells(_numbers(recording)), _cells(stamps)]
     for channel in recording.channels:
         cells = _cells(np.asarray(channel.raw))
-        for i in np.flatnonzero(_lacking(channel)):
+        for i in np.flatnonzero(_find_lacking_samples(channel)):
             cells[i] = ""
         columns.append(cells)
     columns += [status.values().astype(str).tolist() for status in recording.status]
@@ -210,7 +210,7 @@ def _cells(values: np.ndarray) -> list[str]:
     return ["" if value != value else _number(value) for value in values.tolist()]
 
 
-def _combined(recording: Recording, text: str, kind: str, data: bytes) -> bytes:
+def _combine_sections(recording: Recording, text: str, kind: str, data: bytes) -> bytes:
     parts = [b"--- file type: CFG ---\r\n", text.encode()]
     for name, key in (("INF", "information"), ("HDR", "header")):
         said = recording.extra.get(key, "")

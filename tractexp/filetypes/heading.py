@@ -9,7 +9,7 @@ from tractexp.filetypes.cells import is_gap, is_grouped, is_number
 from tractexp.filetypes.clock import is_date, is_time
 from tractexp.filetypes.columns import is_unit, split_unit
 
-ALIKE = 3  # rows of numbers of one length make sure that a table has begun
+FEWEST_ALIKE_ROWS = 3  # rows of numbers of one length make sure that a table has begun
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
         raise UserError(f"{source}: there are no rows below the header line" if names_only else
                         f"{source}: there are no rows of numbers{above}; a table has a line that names its columns, "
                         "such as t,U,P,Q, and rows of numbers below it")  # fmt: skip
-    named = header if header is not None else _named(rows, first)
+    named = header if header is not None else _find_name_row(rows, first)
     if named is None:
         width = len(rows[first])
         return TableHeading(("",) * width, ("",) * width, first, None)
@@ -45,8 +45,8 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     unit_row = [] if beside is None else _bare(rows[beside])
     units = [unit_row[k] if k < len(unit_row) and unit_row[k] else unit for k, (_, unit) in enumerate(parted)]
     groups = named - 2 if beside == named - 1 else named - 1
-    names = _joined(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
-    return TableHeading(_padded(names, width), _padded(units, width), first, named)
+    names = _join_group_names(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
+    return TableHeading(_pad_texts(names, width), _pad_texts(units, width), first, named)
 
 
 def is_value(cell: Any) -> bool:
@@ -67,11 +67,11 @@ def _numeric(row: Sequence[Any]) -> bool:
 
 def _begins(rows: Sequence[Sequence[Any]], i: int) -> bool:
     """Whether values begin with row `i`: it and those after it are alike. One bad cell in a row is no heading."""
-    following = [row for row in rows[i : i + ALIKE] if row]
+    following = [row for row in rows[i : i + FEWEST_ALIKE_ROWS] if row]
     return _numeric(rows[i]) and all(_numeric(row) and len(row) >= len(rows[i]) - 1 for row in following)
 
 
-def _named(rows: Sequence[Sequence[Any]], first: int) -> int | None:
+def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
     """The row of names above the values: the nearest with a text for most columns that is no row of units."""
     for i in range(first - 1, -1, -1):
         texts = [_text(cell) for cell in rows[i]]
@@ -102,9 +102,9 @@ def _are_units(texts: Sequence[str]) -> bool:
     return len(filled) >= 1 and 2 * sum(map(is_unit, filled)) > len(filled) and not names_too
 
 
-def _joined(groups: Sequence[Any], names: list[str]) -> list[str]:
+def _join_group_names(groups: Sequence[Any], names: list[str]) -> list[str]:
     """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is one."""
-    above = _merged([_text(cell) for cell in groups], names)
+    above = _spread_merged_cells([_text(cell) for cell in groups], names)
     repeated = [upper for upper, name in zip(above, names, strict=False) if name and names.count(name) > 1]
     told = bool(repeated) and all(repeated) and len({*repeated}) > 1
     few = sum(map(bool, above)) < len(names) - 1
@@ -113,7 +113,7 @@ def _joined(groups: Sequence[Any], names: list[str]) -> list[str]:
     return [f"{upper} {name}".strip() for upper, name in zip(above, names, strict=True)]
 
 
-def _merged(above: list[str], names: Sequence[str]) -> list[str]:
+def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
     """A row of groups with the text of a merged cell, which stands over its first column, over all of its columns.
 
     Only where names repeat, so that they need the groups to be told apart.
@@ -129,5 +129,5 @@ def _merged(above: list[str], names: Sequence[str]) -> list[str]:
     return filled
 
 
-def _padded(texts: Sequence[str], width: int) -> tuple[str, ...]:
+def _pad_texts(texts: Sequence[str], width: int) -> tuple[str, ...]:
     return (*texts, *[""] * (width - len(texts)))

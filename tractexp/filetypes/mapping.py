@@ -52,7 +52,7 @@ class Mapped:
     day: dt.date | None = None  # of the first row, where dates stand in a column of their own
 
 
-def mapped(
+def map_columns(
     table: TableFile, columns: Mapping[str, Any], units: Mapping[str, str], other_columns: Collection[str] = ()
 ) -> Mapped:
     """What the columns of a table are, by the user's `columns` {key: name, number from 0, or None to leave it
@@ -151,9 +151,9 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
         if not 0 <= int(choice) < len(names):
             raise UserError(f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted from 0")
         return int(choice)
-    wanted = _squeezed(str(choice))
-    matches = [k for k, name in enumerate(names) if _squeezed(name) == wanted]
-    matches = matches or [k for k, name in enumerate(names) if _squeezed(name + units[k]) == wanted]
+    wanted = _squeeze_name(str(choice))
+    matches = [k for k, name in enumerate(names) if _squeeze_name(name) == wanted]
+    matches = matches or [k for k, name in enumerate(names) if _squeeze_name(name + units[k]) == wanted]
     if not matches:
         roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
         fitting = [n for n, r in zip(names, roles, strict=True) if r is None or r.quantity == Role(key).quantity]
@@ -169,7 +169,7 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     return matches[0]
 
 
-def _squeezed(name: str) -> str:
+def _squeeze_name(name: str) -> str:
     """A name without blanks and brackets, so that "U(kV)" and "U kV" match "U [kV]"."""
     return "".join(c for c in name if c.isalnum())
 
@@ -177,7 +177,7 @@ def _squeezed(name: str) -> str:
 def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[MappedColumn]]:
     """{key: the columns that could be it}; the user's choice, and a name that is the key itself, excludes others."""
     heading, options = table.heading, {}
-    names = _spelled(heading.names)
+    names = _spell_out_names(heading.names)
     order = order_of(names, heading.units)
     for key, number in numbers.items():
         label = role(heading.names[number], heading.units[number], order)
@@ -189,7 +189,7 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
     exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
     if "U" not in exact and "U" not in numbers:
         exact.discard("U2")  # of U1, U2, U3
-    renamed = _numbered(roles)
+    renamed = _resolve_numbered_roles(roles)
     for k, one in roles.items():
         name = heading.names[k]
         key = name if name in exact else renamed.get(one.key, one.key)
@@ -197,10 +197,10 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
             continue
         line = None if key == "U" and (name == "U" or one.key == "Ua") else one.line
         options.setdefault(key, []).append(MappedColumn(k, name, replace(one, key=key, line=line)))
-    return _timed(table, options)
+    return _find_time_columns(table, options)
 
 
-def _spelled(names: Sequence[str]) -> Sequence[str]:
+def _spell_out_names(names: Sequence[str]) -> Sequence[str]:
     """The names with those of a micro-PMU, L1MAG and C1ANG, as they are meant: voltage and current of a phase."""
     parts = [re.fullmatch(r"([LC])([123])_?(MAG|ANG)", name.strip(), re.IGNORECASE) for name in names]
     if {match[1].upper() for match in parts if match} != {"L", "C"}:
@@ -211,7 +211,7 @@ def _spelled(names: Sequence[str]) -> Sequence[str]:
     ]
 
 
-def _numbered(roles: Mapping[int, Role]) -> dict[str, str]:
+def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
     """What U1, U2, U3 are: the phases where there are three; P1 alone is P."""
     keys, phases = {one.key for one in roles.values()}, {}
     for letter in "UIPQ":
@@ -232,7 +232,7 @@ def _of_one_load(keys: Collection[str]) -> dict[str, str]:
     return {"Pa": "P", "Qa": "Q", **voltage}
 
 
-def _timed(table: TableFile, options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
+def _find_time_columns(table: TableFile, options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
     """Time from a column of dates with times, or of whole seconds beside fractions, where there is no other.
 
     Of a date and a time, the time; fractions alone are none of a known second.
@@ -282,7 +282,7 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
                     "there are none of P and Q: the load's power does not follow from them; add P and Q, or the angles"
                 )
             return kind, ["t", *(key for key in ("frac",) if key in keys), *kinds[kind]]
-    raise UserError(_lacking(table, options, kinds))
+    raise UserError(_describe_missing_columns(table, options, kinds))
 
 
 def _has(keys: Iterable[str], letter: str) -> bool:
@@ -359,7 +359,7 @@ def _oscillates(table: TableFile, options: Mapping[str, list[MappedColumn]], key
     return False
 
 
-def _lacking(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]) -> str:
+def _describe_missing_columns(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]) -> str:
     """The sentence on what is missing."""
     names = [table.label(k) for k in range(len(table.heading.names)) if table.heading.names[k]]
     if not names:

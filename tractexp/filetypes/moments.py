@@ -22,7 +22,7 @@ SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}  # {unit of times: how many times
 ZERO_DAY = dt.datetime(1899, 12, 30)  # of spreadsheets
 SERIAL_DAYS = (20_000.0, 80_000.0)  # days of a spreadsheet: 1954 to 2119
 FASTEST = {"powers": 2e3, "phasors": 2e3, "waves": 1e6}  # Hz: what is sampled faster by its times has them in days
-DAY = 86400.0  # s
+SECONDS_A_DAY = 86400.0  # s
 COUNTED = 1 << 24  # a fraction of a second is counted in 24 bits, above which stands the quality of the clock
 
 
@@ -45,7 +45,7 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
     time = cells[one.number]
     result = TableTimes(time.values, None, ())
     if time.start is None and not time.clock and len(time.values):
-        result = _counted(table, time.values, one.role.unit, FASTEST[mapping.kind])
+        result = _read_numeric_times(table, time.values, one.role.unit, FASTEST[mapping.kind])
     elif time.clock:
         start = time.start
         if start is None and mapping.day is not None:
@@ -64,7 +64,7 @@ def _midnight(day: dt.date) -> dt.datetime:
     return dt.datetime.combine(day, dt.time())
 
 
-def _counted(table: TableFile, values: np.ndarray, unit: str, fastest: float) -> TableTimes:
+def _read_numeric_times(table: TableFile, values: np.ndarray, unit: str, fastest: float) -> TableTimes:
     """Times that are numbers."""
     first, steps = float(values[0]), len(values) - 1
     span = float(values[-1]) - first
@@ -91,7 +91,7 @@ def _since_1970(seconds: float) -> dt.datetime | None:
 
 def _of_days(table: TableFile, values: np.ndarray) -> TableTimes:
     """Times in days, as spreadsheets count them."""
-    t = (values - values[0]) * DAY
+    t = (values - values[0]) * SECONDS_A_DAY
     steps = np.diff(t)
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1

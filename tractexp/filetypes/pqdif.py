@@ -17,7 +17,7 @@ from tractexp.filetypes.pqdif_channels import (
     ChannelDefinition,
     Observed,
     SeriesDefinition,
-    observed,
+    read_observations,
     seconds,
 )  # fmt: skip
 from tractexp.filetypes.pqdif_records import SIGNATURE, tag
@@ -39,9 +39,9 @@ PLAIN = (b"", *(tag(f"a6b31a{n}-b451-11d1-ae17-0060083a2628") for n in ("df", "e
          tag("07ef68af-9ff5-11d2-b30b-006008b37183"))  # fmt: skip
 SEQUENCES = {tag("a6b31aea-b451-11d1-ae17-0060083a2628"): 10, tag("d71a4b91-3c92-11d4-9f2c-002078e0b723"): 11}
 FUNDAMENTAL = (tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"), tag("672d0310-7810-11d4-a4b3-444553540000"))
-FEWEST = 4  # samples of a waveform
-CLOSE = 1e-6  # s: times that are the same to the resolution of a moment
-GAP = 1.5  # usual steps: after a longer one a log is another one
+FEWEST_WAVE_SAMPLES = 4  # samples of a waveform
+LARGEST_TIME_DIFFERENCE = 1e-6  # s: times that are the same to the resolution of a moment
+LOG_GAP_STEPS = 1.5  # usual steps: after a longer one a log is another one
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +59,7 @@ def recognizes(path: Path | str) -> bool:
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
     """Whether waveforms are in the file; raises `UserError` for what is no such file."""
-    return bool(observed(path, encoding, [WAVEFORM], Remarks(str(path)), most=1).observations)
+    return bool(read_observations(path, encoding, [WAVEFORM], Remarks(str(path)), most=1).observations)
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
@@ -68,7 +68,7 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     Raises `UserError` naming file and record of what is wrong, and for a file without waveforms.
     """
     remarks = Remarks(str(path))
-    content = observed(path, encoding, [WAVEFORM], remarks)
+    content = read_observations(path, encoding, [WAVEFORM], remarks)
     channels: dict[int, tuple[ChannelDefinition, str]] = {}
     stretches = _fullest(_waves(content, channels, remarks), remarks)
     if not stretches:
@@ -104,13 +104,13 @@ def _waves(content: Observed, channels: dict[int, tuple[ChannelDefinition, str]]
         for one in each.instances:
             sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
             definition, values = next(sampled, (None, None))
-            if definition is None or values is None or len(one.t) < FEWEST:
+            if definition is None or values is None or len(one.t) < FEWEST_WAVE_SAMPLES:
                 continue
             if not (np.isfinite(one.t).all() and (np.diff(one.t) > 0).all()):
                 raise UserError(f"{remarks.where}: {one.channel.name}: its times do not increase: the file is damaged")
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
             own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[one.channel.number] = values
-        for stretch in _together([*own.values()], remarks):
+        for stretch in _merge_rates([*own.values()], remarks):
             stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
@@ -120,14 +120,14 @@ def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
     return round(begin + float(t[0]), 6), len(t), round(float(t[-1] - t[0]), 6)
 
 
-def _together(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretch]:
+def _merge_rates(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretch]:
     """One stretch of channels that one observation samples at several rates: all at the times of the slowest."""
     first, last = (f(each.t[k] for each in stretches) if stretches else 0.0 for f, k in ((max, 0), (min, -1)))
     slowest = min(stretches, key=lambda each: (len(each.t) - 1) / (each.t[-1] - each.t[0]), default=None)
     if slowest is None or len(stretches) == 1:
         return stretches
-    t = slowest.t[(slowest.t >= first - CLOSE) & (slowest.t <= last + CLOSE)]
-    if len(t) < FEWEST:
+    t = slowest.t[(slowest.t >= first - LARGEST_TIME_DIFFERENCE) & (slowest.t <= last + LARGEST_TIME_DIFFERENCE)]
+    if len(t) < FEWEST_WAVE_SAMPLES:
         return stretches
     from scipy.interpolate import CubicSpline
 
@@ -161,7 +161,7 @@ def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.S
             timeline.Segment(first + s.first, first + s.stop, s.rate, s.start) for s in timeline.laid_out(runs)
         ]
         for k, values in each.columns.items():
-            parts[k].append(timeline.evened(values, runs, None))
+            parts[k].append(timeline.resample_evenly(values, runs, None))
         first += len(next(iter(parts.values()))[-1])
     return segments, {k: each[0] if len(each) == 1 else np.concatenate(each) for k, each in parts.items()}
 
@@ -181,7 +181,7 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     for a file without logs.
     """
     remarks = Remarks(str(path))
-    content = observed(path, encoding, [LOG, PHASOR], remarks)
+    content = read_observations(path, encoding, [LOG, PHASOR], remarks)
     names: dict[int, tuple[str, str]] = {}
     stretches = _logs(content, names)
     if not stretches:
@@ -236,7 +236,7 @@ def _longest(stretches: Sequence[Stretch], remarks: Remarks) -> tuple[np.ndarray
     runs: list[list[Stretch]] = []
     for each in stretches:
         before = runs[-1][-1].t if runs else each.t
-        joined = runs and 0 < each.t[0] - before[-1] <= GAP * float(np.median(np.diff(before)))
+        joined = runs and 0 < each.t[0] - before[-1] <= LOG_GAP_STEPS * float(np.median(np.diff(before)))
         if joined:
             runs[-1].append(each)
         else:

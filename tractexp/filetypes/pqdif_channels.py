@@ -48,9 +48,9 @@ WAVEFORM, PHASOR, LOG = (tag(f"67f6af8{n}-f753-11cf-9d89-0080c72e70a3") for n in
 TIME = tag("c690e862-f755-11cf-9d89-0080c72e70a3")
 SCALED, STEPPED = 2, 4  # bits of how a series is stored
 MOMENTS, SECONDS, CYCLES = 1, 2, 3  # units of times
-DAY = 86400.0  # s
-USUAL = 60.0  # Hz, where the file does not say it: most who write PQDIF are in North America
-MOST = 30_000_000  # values that are unpacked: a few bytes may stand for many
+DAY_SECONDS = 86400.0  # s
+USUAL_FREQUENCY = 60.0  # Hz, where the file does not say it: most who write PQDIF are in North America
+MOST_UNPACKED_VALUES = 30_000_000  # values that are unpacked: a few bytes may stand for many
 MOST_STEPPED = 1_000_000  # of which one series of equal steps has, where no other one is as long
 
 
@@ -97,10 +97,10 @@ class Observation:
 
 def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
     """From one moment to another [s]."""
-    return DAY * (moment[0] - since[0]) + moment[1] - since[1]
+    return DAY_SECONDS * (moment[0] - since[0]) + moment[1] - since[1]
 
 
-def observed(
+def read_observations(
     path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: Remarks, most: float = math.inf
 ) -> "Observed":
     """The channels of some kinds, as far as they have times, of the first `most` observations that have any.
@@ -132,7 +132,7 @@ class Observed:
         self.definitions: list[ChannelDefinition] = []
         self.ratios: dict[int, float] = {}
         self.observations: list[Observation] = []
-        self.station, self.frequency, self.count, self.room = "", 0.0, 0, MOST
+        self.station, self.frequency, self.count, self.room = "", 0.0, 0, MOST_UNPACKED_VALUES
 
     def source(self, body: Collection) -> None:
         name, channels = body.text(SOURCE_NAME), body.collection(CHANNELS)
@@ -214,13 +214,13 @@ class Observed:
         if raw is not None and raw.dtype.names:
             self._take(one, len(raw))
             with np.errstate(all="ignore"):
-                return DAY * (raw["day"].astype(float) - start[0]) + raw["second"] - start[1]
+                return DAY_SECONDS * (raw["day"].astype(float) - start[0]) + raw["second"] - start[1]
         values = self._values(definition, one, longest)
         if values is None or definition.unit not in (SECONDS, CYCLES):
             return None
         if definition.unit == SECONDS:
             return values
-        nominal = self.frequency or USUAL
+        nominal = self.frequency or USUAL_FREQUENCY
         self.remarks.add(f"times are in cycles, taken of {nominal:g} Hz")
         return values / nominal
 
@@ -257,7 +257,7 @@ class Observed:
         self.room -= count
         if self.room < 0:
             raise UserError(
-                f"{one.own.body.where}: the file's series stand for more than {MOST:,} values; give a part of it, or "
+                f"{one.own.body.where}: the file's series stand for more than {MOST_UNPACKED_VALUES:,} values; give a part of it, or "
                 "the event that is meant, exported by the recorder's software"
             )
 

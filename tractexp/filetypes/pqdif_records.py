@@ -20,7 +20,7 @@ from tractexp import files
 from tractexp.errors import UserError
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.text import decode
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 SIGNATURE = uuid.UUID("4a111440-e49f-11cf-9900-505144494600").bytes_le
 HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")
@@ -28,7 +28,7 @@ HEADER_BYTES = 64
 LARGEST = 256 * 2**20  # bytes of all bodies together, decompressed
 MOST_RECORDS = 100_000
 MOST_ELEMENTS = 200_000  # of one record: compressed zeros may announce millions, each of which takes memory
-LONGEST = 400  # letters of a text that are read
+LONGEST_TEXT = 400  # letters of a text that are read
 BYTE, COUNT = np.dtype("u1"), np.dtype("<i4")
 COLLECTION, SCALAR, VECTOR = 1, 2, 3  # kinds of elements
 MOMENT = np.dtype([("day", "<u4"), ("second", "<f8")])  # since 30 December 1899
@@ -101,7 +101,7 @@ class Collection:
 
     def texts(self, name: bytes) -> list[str]:
         """The texts of one tag, without what follows their end."""
-        texts = [v[:LONGEST].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
+        texts = [v[:LONGEST_TEXT].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
         return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in texts]
 
     def text(self, name: bytes) -> str:
@@ -162,7 +162,7 @@ def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tupl
             remarks.add(f"the file ends within record {count}: it is not whole; what comes before is read")
             return
         reached[at] = at + header + size
-        body = _decompressed(content, room, where) if compressed else content
+        body = _decompress_body(content, room, where) if compressed else content
         room -= len(body)
         if checksum and checksum not in _checksums(content, body):
             remarks.add(f"record {count}: the checksum does not fit: it was altered, or damaged on its way")
@@ -198,7 +198,7 @@ def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -
     for first, stop in [*sorted(reached.items()), (len(data), len(data))]:
         if first > end and (between := data[end:first]).strip(b"\0"):
             found = between.count(SIGNATURE)
-            what = counted(found, "record") if found else f"{len(between)} bytes"
+            what = count_noun(found, "record") if found else f"{len(between)} bytes"
             remarks.add(
                 f"no link leads to {what} from byte {end} on: they are not read; where the recorder did not delete "
                 "them, a link is damaged: get the file again"
@@ -219,7 +219,7 @@ def _compression(container: Collection, where: str) -> bool:
     return True
 
 
-def _decompressed(content: bytes, room: int, where: str) -> bytes:
+def _decompress_body(content: bytes, room: int, where: str) -> bytes:
     inflate = zlib.decompressobj()
     try:
         body = inflate.decompress(content, room + 1)

@@ -7,7 +7,7 @@ from typing import Any
 
 from tractexp import files
 from tractexp.errors import UserError
-from tractexp.files import located
+from tractexp.files import locate_file
 from tractexp.record.record import DECLARATION, LOAD, SIZES, Base
 from tractexp.record.window import Window
 
@@ -27,9 +27,9 @@ class Sidecar:
     recording: Mapping[str, Any] | None = None  # of a recording that task=convert wrote
 
 
-def beside(path: str) -> Sidecar:
+def read_sidecar(path: str) -> Sidecar:
     """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
-    own = located(path)
+    own = locate_file(path)
     if own.suffix.lower() == ".json" or not files.there(own):
         return Sidecar()
     file = own.with_name(f"{own.stem}.json")
@@ -39,21 +39,21 @@ def beside(path: str) -> Sidecar:
     if not isinstance(content, dict):
         return Sidecar()
     notes = [content["note"]] if isinstance(content.get("note"), str) else []
-    notes += [note for note in _of(list, content, "notes") if isinstance(note, str)]
+    notes += [note for note in _take_kind(list, content, "notes") if isinstance(note, str)]
     return Sidecar(
         str(content["name"]) if "name" in content else None,
         tuple(notes),
         _base(file, content.get("base")),
-        _of(dict, content, "columns"),
-        {key: str(unit) for key, unit in _of(dict, content, "units").items()},
+        _take_kind(dict, content, "columns"),
+        {key: str(unit) for key, unit in _take_kind(dict, content, "units").items()},
         content.get("uniform") is True,
         _window(file, content.get("window")),
-        tuple(str(name) for name in _of(list, content, "more")),
-        _of(dict, content, "recording") or None,
+        tuple(str(name) for name in _take_kind(list, content, "more")),
+        _take_kind(dict, content, "recording") or None,
     )
 
 
-def _of(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
+def _take_kind(kind: type[Any], content: Mapping[str, Any], key: str) -> Any:
     """What stands under a key where it is of that kind, else an empty one."""
     return content[key] if isinstance(content.get(key), kind) else kind()
 

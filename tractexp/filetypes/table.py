@@ -12,8 +12,8 @@ import numpy as np
 
 from tractexp import files
 from tractexp.errors import DATA, UserError, among, check_choice, nearest
-from tractexp.files import located
-from tractexp.filetypes.cells import BadCell, grouping, is_number, numbers
+from tractexp.files import locate_file
+from tractexp.filetypes.cells import BadCell, find_group_mark, is_number, numbers
 from tractexp.filetypes.clock import is_time, times
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
@@ -22,7 +22,7 @@ from tractexp.filetypes.workbook import BadWorkbook, Workbook
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
 ENDINGS = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
-MOST = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
+MOST_TABLE_VALUES = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
 FOREIGN = {  # how files begin that are no table, whatever they are called
     b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
     b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV",
@@ -119,7 +119,7 @@ class Rows(TableFile):
         columns = {}
         for number, kind in wanted.items():
             try:
-                columns[number] = column(self.columns(number), kind, ".", grouping(self.sample, "."))
+                columns[number] = column(self.columns(number), kind, ".", find_group_mark(self.sample, "."))
             except BadCell as bad:
                 raise self.refuse(bad.row, number, bad.why) from None
         return columns
@@ -153,10 +153,10 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     from tractexp.filetypes import pscad
     from tractexp.filetypes.table_text import HEAD, open_text
 
-    if instrument := instrument_of(located(path)):
-        return instrument.table(located(path), form.encoding)
+    if instrument := instrument_of(locate_file(path)):
+        return instrument.table(locate_file(path), form.encoding)
     if Path(path).suffix.lower() == pscad.ENDING:
-        return pscad.table(located(path), form)
+        return pscad.table(locate_file(path), form)
     data = content(path, None if whole else HEAD)
     if not whole and data.startswith((PARQUET, *SPREADSHEETS)):
         data = content(path)
@@ -172,7 +172,7 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
 
 def content(path: str, limit: int | None = None) -> bytes:
     """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
-    file = located(path)
+    file = locate_file(path)
     folder = file.parent
     if not files.there(file):
         if file.is_dir():
@@ -190,8 +190,8 @@ def _parquet(path: str, data: bytes) -> TableFile:
 
     try:
         file = parquet.ParquetFile(pyarrow.BufferReader(data))
-        if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST:
-            raise UserError(f"{path}: {values:,} values are more than the {MOST:,} that can be read; give a part of it")
+        if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST_TABLE_VALUES:
+            raise UserError(f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be read; give a part of it")
         parsed = file.read()
         names = [str(name) for name in parsed.column_names]
         columns = [_arrow(parsed.column(k)) for k in range(len(names))]
@@ -267,7 +267,7 @@ def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
     if not filled:
         raise UserError(f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q")
     header = None if form.header is None else int(np.searchsorted(filled, form.header - 1))
-    head = heading([_trimmed(rows[i]) for i in filled[:200]], source, header)
+    head = heading([_trim_row(rows[i]) for i in filled[:200]], source, header)
     body = filled[head.first :]
     last = body[-1] + 1
     return Rows(
@@ -276,7 +276,7 @@ def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
     )  # fmt: skip
 
 
-def _trimmed(row: Sequence[Any]) -> list[Any]:
+def _trim_row(row: Sequence[Any]) -> list[Any]:
     """A row without the empty cells at its end."""
     filled = [k for k, cell in enumerate(row) if cell not in ("", None)]
     return list(row[: filled[-1] + 1])

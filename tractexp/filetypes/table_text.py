@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.filetypes.cells import BadCell, group_mark, grouping, is_grouped, is_number
+from tractexp.filetypes.cells import BadCell, find_group_mark, group_mark, is_grouped, is_number
 from tractexp.filetypes.clock import is_time
 from tractexp.filetypes.columns import split_unit
 from tractexp.filetypes.heading import TableHeading, heading
 from tractexp.filetypes.table import TableColumn, TableFile, TableForm, column
 from tractexp.filetypes.text import MARKS, decode
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 HEAD = 1 << 18  # bytes in which the heading is looked for
 SAMPLE = 400  # lines of them, at most
@@ -48,7 +48,7 @@ class TextTable(TableFile):
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
         self.decimal = form.decimal or _decimal(self.sample)
-        self.group = grouping(self.sample, self.decimal)
+        self.group = find_group_mark(self.sample, self.decimal)
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
@@ -179,7 +179,7 @@ class TextTable(TableFile):
     def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
         """The rows of cells with their lines; a last row that is cut short is skipped, with a note."""
         short: tuple[int, int] | None = None
-        for line, row in _parsed(self._body(), self.delimiter, self.source, self.line):
+        for line, row in _parse_rows(self._body(), self.delimiter, self.source, self.line):
             if short is not None:
                 raise self._ragged(*short)
             if len(row) <= last:
@@ -193,14 +193,14 @@ class TextTable(TableFile):
 
     def _ragged(self, line: int, cells: int) -> UserError:
         return UserError(
-            f"{self.source}: line {line} has {counted(cells, 'cell')} where the others have {self.width}; a "
+            f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have {self.width}; a "
             "gap in P or Q is written nan"
         )
 
 
 def open_text(path: str, data: bytes, form: TableForm) -> TextTable:
     """A text file as a table; raises `UserError` for one that is not text, or holds no table."""
-    text, codec = decode(data, path, form.encoding or _unmarked(data))
+    text, codec = decode(data, path, form.encoding or _detect_unmarked_utf16(data))
     plain = codec.startswith("utf-8")
     data = (data if plain else text.encode()).removeprefix(b"\xef\xbb\xbf")
     del text
@@ -215,7 +215,7 @@ def open_text(path: str, data: bytes, form: TableForm) -> TextTable:
     return TextTable(path, data, form, [] if plain else [f"read as {codec} text"])
 
 
-def _unmarked(data: bytes) -> str | None:
+def _detect_unmarked_utf16(data: bytes) -> str | None:
     """The UTF-16 of a text without a byte order mark: every other byte is zero."""
     for first, codec in ((1, "utf-16-le"), (0, "utf-16-be")):
         half = data[first:400:2]
@@ -276,7 +276,7 @@ def _cells(line: str, delimiter: str) -> list[str]:
         return [cell.strip().strip('"') for cell in line.split(delimiter)]
 
 
-def _parsed(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tuple[int, list[str]]]:
+def _parse_rows(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tuple[int, list[str]]]:
     """The rows of values with their lines, without blank lines and remarks."""
     text = io.TextIOWrapper(io.BytesIO(body), "utf-8")
     lines: Any = (REMARK.sub("", line) if "#" in line else line for line in text)

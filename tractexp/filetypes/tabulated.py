@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from tractexp.errors import DATA, UserError
-from tractexp.files import located
+from tractexp.files import locate_file
 from tractexp.filetypes.columns import PER_UNIT, factor
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, mapped
+from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, map_columns
 from tractexp.filetypes.moments import times_of
-from tractexp.filetypes.sidecar import Sidecar, beside
+from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
@@ -21,7 +21,7 @@ from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
-ALIVE = 0.5  # of the median voltage: at less the frequency is noise
+LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
 SLOWEST = 10.0  # Hz: no network's frequency is lower
 AGREES = 0.05  # of the apparent power, within which it is the product of voltage and current
 
@@ -50,16 +50,16 @@ class Tabular:
         """A table and what its columns are; raises `UserError` for what is no table, or ambiguous."""
         table = open_table(path, self._form)
         columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
-        return table, mapped(table, columns, units, sidecar.more)
+        return table, map_columns(table, columns, units, sidecar.more)
 
 
 def kind_of(path: str) -> str:
     """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is ambiguous."""
     try:
-        sidecar, instrument = beside(path), instrument_of(located(path))
-        if sidecar.recording is not None or (instrument and instrument.holds_waveforms(located(path))):
+        sidecar, instrument = read_sidecar(path), instrument_of(locate_file(path))
+        if sidecar.recording is not None or (instrument and instrument.holds_waveforms(locate_file(path))):
             return "waves"
-        return mapped(open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units).kind
+        return map_columns(open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units).kind
     except UserError:
         return "powers"  # whose reader says what is wrong
 
@@ -92,16 +92,16 @@ def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kil
         )
     if reverse:
         result.columns["P"], result.columns["Q"] = -result.columns["P"], -result.columns["Q"]
-    return _tuned(result, nominal, mapping.columns.get("f"))
+    return _tune_nominal_frequency(result, nominal, mapping.columns.get("f"))
 
 
-def _tuned(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
+def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
     """The same with the nominal frequency that f shows, and without an f that is none; both with a note."""
     if "f" not in result.columns or source is None:
         return replace(result, frequency=declared)
     columns, U = {**result.columns}, result.columns["U"]
     f = columns["f"] if source.role.unit.strip().lower() not in PER_UNIT else columns["f"] * declared
-    alive = ALIVE * np.nanmedian(U) < U
+    alive = LEAST_LIVE_VOLTAGE * np.nanmedian(U) < U
     level = float(np.median(f[alive])) if alive.any() else declared
     if level < SLOWEST:
         del columns["f"]

@@ -12,11 +12,11 @@ from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
-from tractexp.record.record import JITTER
+from tractexp.record.record import LARGEST_JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
 from tractexp.recording.unit import in_units
 
-GAP = 1.5  # usual steps: a longer one parts two segments
+SEGMENT_GAP_STEPS = 1.5  # usual steps: a longer one parts two segments
 
 
 def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
@@ -93,7 +93,7 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
             if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
         )  # fmt: skip
     usual = float(np.median(steps))
-    breaks = [0, *(np.flatnonzero(steps > GAP * usual) + 1).tolist(), len(t)]
+    breaks = [0, *(np.flatnonzero(steps > SEGMENT_GAP_STEPS * usual) + 1).tolist(), len(t)]
     segments, widest = [], 0.0
     for first, stop in itertools.pairwise(breaks):
         if stop - first < 3:
@@ -109,7 +109,7 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
             )
         widest = max(widest, float(off.max()))
         segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
-    notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > JITTER else []
+    notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > LARGEST_JITTER else []
     if len(segments) > 1:
         notes.append(
             f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"

@@ -47,7 +47,7 @@ def write_recording(recording: Recording, path: Path) -> list[Path]:
     for segment in recording.segments:
         t[segment.first : segment.stop] = segment.t
     named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
-    values = [t, *map(_recorded, recording.channels), *(s.values() for s in recording.status)]
+    values = [t, *map(_read_raw_values, recording.channels), *(s.values() for s in recording.status)]
     table = _written(dict(zip(named, values, strict=True)), path)
     content = {"source": recording.source, "recording": _content(recording)}
     return [table, files.write_json(path.with_suffix(".json"), content)]
@@ -65,7 +65,7 @@ def unique(names: Sequence[str]) -> list[str]:
     return result
 
 
-def restored(path: str, content: Mapping[str, Any]) -> Recording:
+def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
     """The recording of a table that `write_recording` wrote, from its sidecar; raises `UserError` where they differ."""
     table = open_table(path, TableForm())
     try:
@@ -134,7 +134,7 @@ def recording_of(record: Record) -> Recording:
     return Recording(record.where, channels, [segment], base.frequency, notes=list(record.notes))
 
 
-def _recorded(channel: Channel) -> np.ndarray:
+def _read_raw_values(channel: Channel) -> np.ndarray:
     """The values (N,) of a channel as recorded: those of its converter, gain and offset applied; nan for none."""
     if channel.gain == 1 and channel.offset == 0 and channel.missing is None:
         return np.asarray(channel.raw)

@@ -9,10 +9,10 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.recording.recording import Segment
 
-ALIKE = 0.02  # rates closer than this belong to one waveform whose sampling follows the network's frequency
-EVEN = 0.002  # of a step: the departure from even steps that is not worth an interpolation
-SAME = 1.5  # a step longer or shorter than its neighbour by this factor starts another segment
-MOST = 1000  # segments: more are no segments but stamps without order
+LARGEST_RATE_DIFFERENCE = 0.02  # rates closer than this belong to one waveform whose sampling follows the network's frequency
+LARGEST_UNEVENNESS = 0.002  # of a step: the departure from even steps that is not worth an interpolation
+LARGEST_STEP_RATIO = 1.5  # a step longer or shorter than its neighbour by this factor starts another segment
+MOST_SEGMENTS = 1000  # segments: more are no segments but stamps without order
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,8 @@ def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) 
     groups: list[list[tuple[float, int, int]]] = []
     first = 0
     for rate, stop in rates:
-        joined = t is None or first == 0 or t[first] - t[first - 1] < SAME / rate
-        if groups and joined and abs(rate / groups[-1][0][0] - 1) <= ALIKE:
+        joined = t is None or first == 0 or t[first] - t[first - 1] < LARGEST_STEP_RATIO / rate
+        if groups and joined and abs(rate / groups[-1][0][0] - 1) <= LARGEST_RATE_DIFFERENCE:
             groups[-1].append((rate, first, stop))
         else:
             groups.append([(rate, first, stop)])
@@ -43,20 +43,20 @@ def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) 
     start = 0.0
     for group in groups:
         start += 1 / group[0][0] if stretches else 0.0
-        stretches.append(_declared(group, start if t is None else float(t[group[0][1]])))
+        stretches.append(_build_declared_stretch(group, start if t is None else float(t[group[0][1]])))
         last = stretches[-1].segment
         start = last.start + (last.stop - last.first - 1) / last.rate
     return stretches
 
 
-def _declared(group: list[tuple[float, int, int]], start: float) -> Stretch:
+def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -> Stretch:
     first, stop = group[0][1], group[-1][2]
     if len({rate for rate, _, _ in group}) == 1:
         return Stretch(Segment(first, stop, group[0][0], start), first, stop)
     steps = np.concatenate([np.full(b - a, 1 / rate) for rate, a, b in group])[1:]
     t = start + np.concatenate([[0.0], np.cumsum(steps)])
     rate = (stop - first - 1) / float(t[-1] - t[0])
-    return Stretch(Segment(first, stop, rate, start), first, stop, None if _evenness(t, rate) <= EVEN else t)
+    return Stretch(Segment(first, stop, rate, start), first, stop, None if _evenness(t, rate) <= LARGEST_UNEVENNESS else t)
 
 
 def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
@@ -70,7 +70,7 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
             f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the sample before, and "
             "the sampling rate is declared as 0, so that the time stamps must be valid; write the rate into the .cfg"
         )
-    stretches = [_stamped(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1]
+    stretches = [_build_stamped_stretch(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1]
     if not stretches:
         raise UserError(f"{where}: time stamps without order: no two steps between samples are alike")
     return stretches
@@ -79,8 +79,8 @@ def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
 def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     """(first, stop) of the samples between which the steps are alike; a gap belongs to none."""
     longer, shorter = np.maximum(steps[1:], steps[:-1]), np.minimum(steps[1:], steps[:-1])
-    breaks = np.flatnonzero(longer > SAME * shorter + 2 * unit) + 1
-    if len(breaks) > 2 * MOST:
+    breaks = np.flatnonzero(longer > LARGEST_STEP_RATIO * shorter + 2 * unit) + 1
+    if len(breaks) > 2 * MOST_SEGMENTS:
         i = int(breaks[0])
         raise UserError(
             f"{where}: sample {i + 1}: time stamps without order: a step of {steps[i]:g} s follows one of "
@@ -104,14 +104,14 @@ def _gap(edges: list[int], k: int) -> bool:
     return max(before, after) > 1
 
 
-def _stamped(t: np.ndarray, unit: float, first: int, stop: int) -> Stretch:
+def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) -> Stretch:
     own = t[first:stop]
     length = float(own[-1] - own[0])
     rate = (len(own) - 1) / length
     if abs(round(rate) - rate) <= rate * unit / length:  # a whole number, to the resolution of the stamps
         rate = float(round(rate))
     worst = _evenness(own, rate)
-    uneven = worst > EVEN + 1.01 * unit * rate
+    uneven = worst > LARGEST_UNEVENNESS + 1.01 * unit * rate
     return Stretch(Segment(first, stop, rate, float(own[0])), first, stop, own if uneven else None)
 
 
@@ -132,11 +132,11 @@ def laid_out(stretches: Sequence[Stretch]) -> list[Segment]:
     return segments
 
 
-def evened(raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None) -> np.ndarray:
+def resample_evenly(raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None) -> np.ndarray:
     """Values (N,) at even times, by cubic splines; those of even stretches as they are."""
     if all(s.t is None for s in stretches):
         return raw
-    return np.concatenate([_interpolated(raw[s.first : s.stop], s, missing) for s in stretches])
+    return np.concatenate([_interpolate_stretch(raw[s.first : s.stop], s, missing) for s in stretches])
 
 
 def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
@@ -159,7 +159,7 @@ def _closest(t: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     return np.where(wanted - t[right - 1] <= t[right] - wanted, right - 1, right)
 
 
-def _interpolated(raw: np.ndarray, s: Stretch, missing: float | None) -> np.ndarray:
+def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> np.ndarray:
     from scipy.interpolate import CubicSpline
 
     values = raw.astype(np.float64)

@@ -25,11 +25,11 @@ from tractexp.inference.problem import Problem
 from tractexp.inference.sandwich import off_walls
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
-DRAWS = 199
+FIT_DRAWS = 199
 # p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
 # where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
 ADEQUATE_P = 0.001
-SEED = 20201  # of the draws: the judgement of one record is always the same
+JUDGEMENT_SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
 WRONG = 0.2  # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
 APART = "least squares apart from the likelihood"
@@ -89,8 +89,8 @@ def surprise(
     inside = off_walls(unit)
     steady = _linear(likelihood)[inside[: likelihood.free]]
     J = J.only(inside)
-    rng = np.random.default_rng(SEED)
-    drawn = likelihood.noise.draw(rng, DRAWS, np.diff(observed.drive.first).tolist())
+    rng = np.random.default_rng(JUDGEMENT_SEED)
+    drawn = likelihood.noise.draw(rng, FIT_DRAWS, np.diff(observed.drive.first).tolist())
     drawn *= likelihood.valid
     drawn /= _level(likelihood, observed, rng)[:, None, None]
     basis, split = J.basis(), of_each_event(J, steady)
@@ -103,7 +103,7 @@ def surprise(
     own = basis.without(rows[None])
     parts = [left(own) | ({APART: excess.of_records} if excess else {})]
     together = max(1, MOST_NUMBERS // len(rows))
-    for some in np.split(drawn, range(together, DRAWS, together)):
+    for some in np.split(drawn, range(together, FIT_DRAWS, together)):
         white = likelihood.whiten(some)
         parts.append(left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {}))
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -117,7 +117,7 @@ def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
     """What `steady` shared coordinates (k,) of their own for each event could change beside the event's own."""
     shared = J.without_own.T
     columns = np.concatenate([shared[~steady], shared[steady]])
-    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(goodness_of_fit.DISTINCT, 1e-9)
+    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(goodness_of_fit.LEAST_DISTINCT_SHARE, 1e-9)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +165,7 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
 def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:
     """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet samples."""
     worth = max(likelihood.noise.worth(sum(p.stop - p.start for p in observed.problem.quiet)), 4.0)
-    return np.sqrt(rng.chisquare(2 * worth, DRAWS) / (2 * worth))
+    return np.sqrt(rng.chisquare(2 * worth, FIT_DRAWS) / (2 * worth))
 
 
 def _linear(likelihood: Likelihood) -> np.ndarray:

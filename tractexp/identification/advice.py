@@ -8,10 +8,19 @@ from tractexp.errors import UserError
 from tractexp.identification.adequacy import Adequacy, Grade
 from tractexp.identification.plan import DipShape, Forecast, over_depth
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import BOUND, EDGE, HELD, UNIDENTIFIED, WEAK, WITHIN, shown, size
+from tractexp.identification.verdict import (
+    BOUND,
+    BOUND_DISTANCE,
+    HELD,
+    IDENTIFIED_SHARE,
+    UNIDENTIFIED,
+    WEAK,
+    format_half_width,
+    size,
+)
 from tractexp.inference.information import SHARE
 from tractexp.inference.problem import Problem
-from tractexp.provenance import again
+from tractexp.provenance import build_again_command
 from tractexp.record.change import runs
 
 
@@ -21,9 +30,9 @@ def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
-    better = [f"{why}: {again('domain=waves')}" for why in better_domain(uncertainty.likelihood.problem)]
+    better = [f"{why}: {build_again_command('domain=waves')}" for why in better_domain(uncertainty.likelihood.problem)]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
-    search = again("task=discrepancy", *[f"data={data}"] * bool(data))
+    search = build_again_command("task=discrepancy", *[f"data={data}"] * bool(data))
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*better, missing, *sentences]
@@ -92,7 +101,7 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
     name, low, high = uncertainty.names[j], uncertainty.lower[j], uncertainty.upper[j]
     goal, bounds = _goal(uncertainty, j)
     half = np.array([f.half[j] for f in forecasts])
-    width = lambda x: shown(uncertainty.values[j], x, low, high)  # noqa: E731
+    width = lambda x: format_half_width(uncertainty.values[j], x, low, high)  # noqa: E731
     reached = f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, " if bounds else ""
     if (half <= goal).any():
         enough = half <= goal
@@ -115,8 +124,8 @@ def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     already, it is the profile that does not, and half of what curvature says is asked for.
     """
     low, high = uncertainty.lower[j], uncertainty.upper[j]
-    (a, b), enough = uncertainty.intervals[j], WITHIN * size(uncertainty.values[j], low, high)
-    bounds = [bound for end, bound in ((a, low), (b, high)) if abs(end - bound) < EDGE * (high - low)]
+    (a, b), enough = uncertainty.intervals[j], IDENTIFIED_SHARE * size(uncertainty.values[j], low, high)
+    bounds = [bound for end, bound in ((a, low), (b, high)) if abs(end - bound) < BOUND_DISTANCE * (high - low)]
     asked = [
         enough,
         *([(b - a) / 4] if bounds else []),

@@ -48,7 +48,7 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
         with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
             ratio = errors(triangle) / together
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
-    odd, notes = disagreeing(uncertainty)
+    odd, notes = find_disagreeing_events(uncertainty)
     return EventAgreement(gains, odd, notes)
 
 
@@ -61,7 +61,7 @@ def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarr
     return [joined(a, b) for a, b in zip(before[:-1], after[1:], strict=True)], before[-1]
 
 
-def disagreeing(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
+def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
     """Events that separate parameters fit much better than shared ones do, the worst first, one at a time.
 
     Compares the deviance of all events fitted together with that of the rest plus that of the event alone; the

@@ -24,19 +24,19 @@ from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, concl
 from tractexp.inference.blocks import blocks_of, exceeds
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.multistart import along_least_certain, distinct, explored, screened
+from tractexp.inference.multistart import along_least_certain, distinct, explore_minima, screen_points
 from tractexp.inference.observed import Observed
 from tractexp.inference.prior import held_in_words
 from tractexp.inference.problem import Problem
-from tractexp.noise.color import FEWEST, SMALLEST, fit_autoregression, stretches, white_noise
+from tractexp.noise.color import FEWEST_NOISE_SAMPLES, SMALLEST_DEVIATION, fit_autoregression, stretches, white_noise
 from tractexp.noise.model import Noise, Pair
 
-ROUNDS = 2  # of noise and fit in turn
-HOPELESS = 1.3  # times the least sum of squares: valleys beyond it are given up
+ESTIMATE_ROUNDS = 2  # of noise and fit in turn
+LARGEST_MINIMUM_RATIO = 1.3  # times the least sum of squares: valleys beyond it are given up
 BEHIND = 25.0  # of the deviance under the noise found: valleys farther behind are
-BETTER = 0.5  # of the deviance, by which a search's valley must be better than those of the box
+LEAST_MINIMUM_GAIN = 0.5  # of the deviance, by which a search's valley must be better than those of the box
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
-SAME = 1e-3  # of a range: ends closer than this are one valley
+SAME_MINIMUM_DISTANCE = 1e-3  # of a range: ends closer than this are one valley
 REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
 
@@ -90,7 +90,7 @@ class DescentEnds:
     @property
     def near(self) -> np.ndarray:
         """Coordinates (at most 4, d) of distinct valleys that are not hopeless, the best first."""
-        near = self.descent.deviance <= HOPELESS * self.lowest
+        near = self.descent.deviance <= LARGEST_MINIMUM_RATIO * self.lowest
         return distinct(Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free)
 
     def joined(self, more: Descent, origin: str) -> "DescentEnds":
@@ -123,7 +123,7 @@ class DescentEnds:
 _remembered: OrderedDict[str, tuple[DescentEnds, EstimationResult]] = OrderedDict()
 
 
-def polished(problem: Problem) -> EstimationResult:
+def estimate_without_search(problem: Problem) -> EstimationResult:
     """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be simulated."""
     _, best = _of_box(problem)
     if best is None:
@@ -145,8 +145,8 @@ def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     ends, best = _of_box(problem)
     own = ends.likelihood.descent(ends.likelihood.to_unit(values))
     whole = ends.joined(own, "search")
-    if best is None or own.deviance[0] < ends.lowest - BETTER:
-        return _finished(whole.looked_beside())
+    if best is None or own.deviance[0] < ends.lowest - LEAST_MINIMUM_GAIN:
+        return _choose_estimate(whole.looked_beside())
     return replace(best, starts=whole.starts)
 
 
@@ -154,14 +154,14 @@ def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate of a robust loss, from where the search ended."""
     observed = Observed.of(problem)
     squares = Likelihood.of_squares(observed.problem, _level(observed.problem, values))
-    squares = cleaned(squares, squares.to_unit(values))
+    squares = drop_outliers(squares, squares.to_unit(values))
     ends = DescentEnds(observed, squares, squares.descent(squares.to_unit(values)), ("search",))
-    return _finished(ends.looked_beside(), robust=True)
+    return _choose_estimate(ends.looked_beside(), robust=True)
 
 
 def _level(problem: Problem, values: np.ndarray) -> float:
     """The root of the mean square [pu] that free values (d,) leave: a sum of squares over it counts samples."""
-    return max(float(np.sqrt(problem.objective(values[None])[0])), SMALLEST)
+    return max(float(np.sqrt(problem.objective(values[None])[0])), SMALLEST_DEVIATION)
 
 
 def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
@@ -170,18 +170,18 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
     key = f"{problem.digest()} {events}"
     if key not in _remembered:
         observed = Observed.of(problem)
-        points, least = screened(observed.problem)
-        likelihood = Likelihood.of_squares(observed.problem, max(float(np.sqrt(least)), SMALLEST))
-        result = explored(likelihood, points)
+        points, least = screen_points(observed.problem)
+        likelihood = Likelihood.of_squares(observed.problem, max(float(np.sqrt(least)), SMALLEST_DEVIATION))
+        result = explore_minima(likelihood, points)
         ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
             return ends, None
         ends = _in_own_units(ends)
-        for _ in range(ROUNDS):
+        for _ in range(ESTIMATE_ROUNDS):
             ends = _without_offsets(ends)
         refined = ends.likelihood.descent(distinct(ends.descent, likelihood.free))
         ends = ends.joined(refined, "box").looked_beside()
-        _remembered[key] = ends, _finished(ends)
+        _remembered[key] = ends, _choose_estimate(ends)
         if len(_remembered) > REMEMBERED:
             _remembered.popitem(last=False)
     return _remembered[key]
@@ -208,7 +208,7 @@ def _without_offsets(ends: DescentEnds) -> DescentEnds:
     return replace(ends, likelihood=likelihood, descent=likelihood.descent(ends.descent.unit))
 
 
-def _finished(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
+def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
     """Least squares where more than noise is left, and the maximum of the likelihood of the noise elsewhere."""
     observed = ends.observed
     likelihood, units = _under_noise(ends, robust=robust)
@@ -231,7 +231,7 @@ def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> Estimat
     near = ends.near
     if ends.likelihood.problem.priors:
         held = held_to_usual(ends.likelihood)
-        near = _held(held, near)
+        near = _find_prior_minima(held, near)
         uncertainty = conclude(held, near[0], noise, [held_in_words(held.problem, held.values(near[0]))])
     return EstimationResult(with_local_minima(uncertainty, near), seen, ends.starts)
 
@@ -244,11 +244,11 @@ def held_to_usual(squares: Likelihood) -> Likelihood:
     )
 
 
-def _held(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
+def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
     """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it and the usual."""
     space, defaults = likelihood.problem.space, likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
-    return distinct(likelihood.descent(np.concatenate([starts, explored(likelihood).unit])), likelihood.free)
+    return distinct(likelihood.descent(np.concatenate([starts, explore_minima(likelihood).unit])), likelihood.free)
 
 
 def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
@@ -256,9 +256,9 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
     units = likelihood.placed(ends.near)
     input_modes = observed.input_errors(likelihood.values(units[0]))
-    for _ in range(ROUNDS):
+    for _ in range(ESTIMATE_ROUNDS):
         if robust:
-            likelihood = cleaned(likelihood, units[:1])
+            likelihood = drop_outliers(likelihood, units[:1])
         likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], input_modes))
         result = likelihood.descent(units)
         order = np.argsort(result.deviance, kind="stable")
@@ -290,13 +290,13 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
         part, pair = drive.part(e), []
         for c in range(drive.channels):
             pieces = stretches(residuals[c, part], likelihood.valid[c, part])
-            enough = sum(map(len, pieces)) >= FEWEST
+            enough = sum(map(len, pieces)) >= FEWEST_NOISE_SAMPLES
             pair.append(fit_autoregression(pieces).scaled(back) if enough else white_noise(1.0))
         pairs.append(tuple(pair))
     return Noise(tuple(pairs))
 
 
-def cleaned(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
+def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
     """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at `unit` (1, D)."""
     drive = likelihood.problem.drive
     valid = drive.weights > 0
@@ -317,7 +317,7 @@ def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertaint
     """
     rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - uncertainty.deviance
-    apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME
+    apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME_MINIMUM_DISTANCE
     local_minima = [LocalMinimum(unit, uncertainty.likelihood.values(unit), float(a))
                for unit, a in zip(units[apart], above[apart], strict=True) if a < threshold()]  # fmt: skip
     verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals

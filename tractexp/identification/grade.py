@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
-from tractexp.identification.estimate import EstimationResult, estimate, polished
+from tractexp.identification.estimate import EstimationResult, estimate, estimate_without_search
 from tractexp.identification.result import (
     Fit,
     active_bounds,
@@ -79,7 +79,7 @@ def grade_model(
     `searched` (d,) are free values that a search ended at, `shown` effects that the model has because its records show
     them. Raises `UserError` where nothing of the box can be simulated.
     """
-    estimation = polished(problem) if searched is None else estimate(problem, searched)
+    estimation = estimate_without_search(problem) if searched is None else estimate(problem, searched)
     return grade_estimate(problem, estimation, validate, shown)
 
 
@@ -87,7 +87,7 @@ def grade_playable(
     problem: Problem, validate: Sequence[Event] = (), searched: np.ndarray | None = None, shown: Collection[str] = ()
 ) -> GradedModel:
     """As `grade_model`, where a held-out event without a steady state makes a wrong model and no refusal."""
-    estimation = polished(problem) if searched is None else estimate(problem, searched)
+    estimation = estimate_without_search(problem) if searched is None else estimate(problem, searched)
     shared = problem.full(estimation.uncertainty.values)[0]
     refusals = {event.record.name: explain_refusal(problem.model, shared, event) for event in validate}
     playable = [event for event in validate if not refusals[event.record.name]]

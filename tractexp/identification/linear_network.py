@@ -19,10 +19,10 @@ from tractexp.errors import UserError
 from tractexp.identification.projection import Projection, basis
 from tractexp.record import Event
 
-MOST = 4  # poles of the vectors
+MOST_VECTOR_POLES = 4  # poles of the vectors
 OF_ZERO = 1  # of the zero sequence
 SAMPLES = 5  # for each unknown
-STILL = 1e-6  # pu: a voltage that moves by less tells nothing
+LEAST_VOLTAGE_MOVE = 1e-6  # pu: a voltage that moves by less tells nothing
 HELD_OUT, CRITERION = "the held-out dips", "the Bayesian information criterion"
 
 
@@ -73,7 +73,7 @@ class BlackBox:
         return self.domain.comparison(event, self.domain.outputs(event, responses))
 
 
-def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST) -> list[BlackBox]:
+def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_POLES) -> list[BlackBox]:
     """The best ones for events of a domain together, of no pole, one, and so on.
 
     Raises `UserError` where the voltage does not move, or the samples are too few for a network without poles.
@@ -139,5 +139,5 @@ def _refuse(ports: Sequence[Port], names: str) -> None:
             f"{names}: {samples // 2} samples from the dip on are too few for a linear network, which needs"
             f" {-(-needed // 2)}; take a record that goes on longer, or of more samples in a second"
         )
-    if max(float(np.abs(port.u[port.start :]).max()) for port in ports) < STILL:
+    if max(float(np.abs(port.u[port.start :]).max()) for port in ports) < LEAST_VOLTAGE_MOVE:
         raise UserError(f"the voltage of {names} does not change, and a network is known by what a change does")

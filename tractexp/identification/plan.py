@@ -19,7 +19,7 @@ from tractexp.noise import Autoregression, Noise
 from tractexp.record import Event
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
-DIVERGED = 1e100  # whitened sensitivities beyond which a calculation has left all numbers that mean anything
+LARGEST_SENSITIVITY = 1e100  # whitened sensitivities beyond which a calculation has left all numbers that mean anything
 DEPTHS = np.arange(0.05, 0.951, 0.025)
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
@@ -130,7 +130,7 @@ def forecast(
         )
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or shape.noise)
-    total = combined([*([earlier] if earlier else []), *informations])
+    total = add_information([*([earlier] if earlier else []), *informations])
     return Forecast(shape, total.names, total.values, interval_factor() * total.standard_errors)
 
 
@@ -144,12 +144,12 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
     likelihood = Likelihood.of(problem, noise)
     _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
     width = problem.upper - problem.lower
-    diverges = not np.abs(J.columns).max() < DIVERGED  # a dip in which the motor stalls tells nothing
+    diverges = not np.abs(J.columns).max() < LARGEST_SENSITIVITY  # a dip in which the motor stalls tells nothing
     rows = np.zeros_like(J.columns[: J.k].T) if diverges else J.without_own
     return [Information(problem.space.names, np.asarray(values), width, rows[own]) for own in J.rows]
 
 
-def combined(informations: Sequence[Information]) -> Information:
+def add_information(informations: Sequence[Information]) -> Information:
     """What several independent records say together."""
     return replace(informations[0], J=np.concatenate([i.J for i in informations]))
 
@@ -244,7 +244,7 @@ def best_of(
         if chosen and gain < least:
             break
         chosen.append(best)
-        half = interval_factor() * combined([informations[e] for e in chosen]).standard_errors
+        half = interval_factor() * add_information([informations[e] for e in chosen]).standard_errors
         choices.append(ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
     return choices
 

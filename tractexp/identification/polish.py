@@ -10,12 +10,12 @@ import numpy as np
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate
 from tractexp.parameter import best_distinct
 
-DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
-EDGE = 1e-9  # SciPy's interior method starts strictly inside the box
+UNIT_DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
+BOX_MARGIN = 1e-9  # SciPy's interior method starts strictly inside the box
 ELITE = 30  # starts of a polish: the valley sought may rank twentieth where the motor stalls
 # between starts, in the coordinate that differs most: a search that has settled in one valley must not fill the elite
 # with points of it
-APART = 0.3
+LEAST_START_DISTANCE = 0.3
 
 ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent that has yet to prove itself
 
@@ -32,7 +32,7 @@ class Elite:
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
             x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
-            chosen = best_distinct(self.box.to_unit(x), f, APART, ELITE)
+            chosen = best_distinct(self.box.to_unit(x), f, LEAST_START_DISTANCE, ELITE)
             self.x, self.f = x[chosen], f[chosen]
 
 
@@ -57,7 +57,7 @@ class _Residuals:
         One that cannot be simulated steps the other way, and is left at zero where that fails as well: the
         parameter then rests for one step.
         """
-        h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
+        h = np.where(unit > 0.5, -UNIT_DIFFERENCE, UNIT_DIFFERENCE)
         rows = self._rows(unit + np.diag(h))
         lost = np.isnan(rows).any(axis=1)
         if lost.any():
@@ -81,7 +81,7 @@ def least_squares_from(
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
     residuals = _Residuals(evaluate, box, 1 / np.sqrt(objective) if objective > 0 else 1.0)
-    unit = np.clip(box.to_unit(start), EDGE, 1 - EDGE)
+    unit = np.clip(box.to_unit(start), BOX_MARGIN, 1 - BOX_MARGIN)
     if not np.isfinite(residuals(unit)).all():
         return start, objective
     result = least_squares(

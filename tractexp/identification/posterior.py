@@ -7,8 +7,8 @@ import numpy as np
 
 from tractexp.errors import TASK, UserError, setting
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.inference.interval import LEVEL
-from tractexp.progress import Counting, uncounted
+from tractexp.inference.interval import INTERVAL_LEVEL
+from tractexp.progress import Counting, make_silent_counter
 
 BURN = 0.3  # of the steps are thrown away
 ENOUGH = 50.0  # autocorrelation times that a chain should last (emcee's own advice)
@@ -28,7 +28,7 @@ class PosteriorSample:
     @property
     def intervals(self) -> np.ndarray:
         """(d, 2) between the outer quantiles."""
-        tails = (1 - LEVEL) / 2
+        tails = (1 - INTERVAL_LEVEL) / 2
         return np.quantile(self.draws, [tails, 1 - tails], axis=0).T
 
     @property
@@ -37,7 +37,7 @@ class PosteriorSample:
 
 
 def sample(
-    uncertainty: Uncertainty, walkers: int, steps: int, seed: int, parts: Callable[[int], Counting] = uncounted
+    uncertainty: Uncertainty, walkers: int, steps: int, seed: int, parts: Callable[[int], Counting] = make_silent_counter
 ) -> PosteriorSample:
     """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
 

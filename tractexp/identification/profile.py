@@ -20,18 +20,18 @@ from tractexp.identification.uncertainty import Uncertainty, threshold
 from tractexp.identification.verdict import (
     BOUND,
     IDENTIFIED,
+    IDENTIFIED_SHARE,
     UNIDENTIFIED,
     WEAK,
-    WITHIN,
     ParameterVerdict,
     size,
 )
-from tractexp.progress import Counting, uncounted
+from tractexp.progress import Counting, make_silent_counter
 
 RESTARTS = 5
 DOUBTFUL = 0.05  # of the value: wider half intervals are checked by a profile
 GRID = np.linspace(0.02, 0.98, 13)  # of the range, at which the rest of it is looked at
-SEEN = 0.04  # of the range: places closer than this to an interval are part of it
+INTERVAL_NEIGHBORHOOD = 0.04  # of the range: places closer than this to an interval are part of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +67,12 @@ class Profiles:
         bounds = dict(zip(uncertainty.names, zip(uncertainty.lower, uncertainty.upper, strict=True), strict=True))
         other = dict(zip(uncertainty.names, uncertainty.elsewhere, strict=True))
         return uncertainty.verdicts | {
-            p.name: revised(uncertainty.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
+            p.name: revise_verdict(uncertainty.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
             for p in self.profiles
         }
 
 
-def revised(
+def revise_verdict(
     verdict: ParameterVerdict, profile: LikelihoodProfile, low: float, high: float, elsewhere: bool = False
 ) -> ParameterVerdict:
     """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness.
@@ -88,7 +88,7 @@ def revised(
         word = UNIDENTIFIED
     elif verdict.word == BOUND:
         word = BOUND
-    elif any(opened) or profile.minima or elsewhere or (b - a) / 2 > WITHIN * size(value, low, high):
+    elif any(opened) or profile.minima or elsewhere or (b - a) / 2 > IDENTIFIED_SHARE * size(value, low, high):
         word = WEAK
     else:
         word = IDENTIFIED
@@ -96,7 +96,7 @@ def revised(
     return ParameterVerdict(word, detail)
 
 
-def checked(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:
+def check_by_profiles(uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
     That is for intervals wider than `DOUBTFUL` of the value, for parameters that have another value in another valley,
@@ -133,7 +133,7 @@ def profiles(
     uncertainty: Uncertainty,
     points: int = 24,
     names: Sequence[str] | None = None,
-    parts: Callable[[int], Counting] = uncounted,
+    parts: Callable[[int], Counting] = make_silent_counter,
 ) -> Profiles:
     """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points` points a side.
 
@@ -191,7 +191,7 @@ class _Drawing:
 
     def _join(self, lanes: Lanes, points: int) -> None:
         self._run(lanes, points)
-        self.curves = [_joined(p, [lanes.profile(int(k)) for k in np.flatnonzero(lanes.column[::2] == c)])
+        self.curves = [_join_profiles(p, [lanes.profile(int(k)) for k in np.flatnonzero(lanes.column[::2] == c)])
                        for p, c in zip(self.curves, self.column, strict=True)]  # fmt: skip
 
     def _run(self, lanes: Lanes, points: int, ended: Callable[[], None] = lambda: None) -> None:
@@ -214,7 +214,7 @@ def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Li
     for c, profile in zip(column, curves, strict=True):
         low, high = _in_range(uncertainty, c, profile.interval)
         values = np.concatenate([GRID, begin[1:, c]])
-        wanted += [(c, v) for v in values[(values < low - SEEN) | (values > high + SEEN)]]
+        wanted += [(c, v) for v in values[(values < low - INTERVAL_NEIGHBORHOOD) | (values > high + INTERVAL_NEIGHBORHOOD)]]
     if not wanted:
         return Lanes(uncertainty, np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0))
     columns = np.repeat([c for c, _ in wanted], len(begin))
@@ -228,7 +228,7 @@ def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Li
     return Lanes(uncertainty, columns[best], descent.unit[best], rise[best], descent.simulations)
 
 
-def _joined(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
+def _join_profiles(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
     """A profile with what further lanes found: the least of both at each value, and an interval over both.
 
     What fits best of a lane from beyond the interval is another minimum, unless it is in the interval.

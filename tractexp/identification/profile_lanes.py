@@ -15,10 +15,10 @@ from tractexp.inference.least_squares import Descent
 
 BEYOND = 1.6  # of the threshold: a lane ends when its deviance has risen so far
 OVERSHOOT = 3.0  # of the threshold: a step that rises so far at once is taken back
-STEP = 0.5  # standard errors between the first points of a lane
+LANE_STEP = 0.5  # standard errors between the first points of a lane
 SMALLEST_STEP, LARGEST_STEP = 1e-5, 0.08  # of the range
 AIM = 0.8  # rise of the root of the deviance that a step aims at
-BETTER = 0.05  # fall of the deviance that makes a point a better optimum
+LEAST_OPTIMUM_GAIN = 0.05  # fall of the deviance that makes a point a better optimum
 RISE = 0.5  # of the deviance between two minima, for them to count as two
 
 
@@ -89,7 +89,7 @@ class Lanes:
         self.scale = self.limit / uncertainty.limits[self.column]
         self.slope = np.zeros_like(self.unit)  # how the others move with the profiled one
         errors = uncertainty.information.standard_errors / (uncertainty.upper - uncertainty.lower)
-        self.step = np.clip(STEP * errors, SMALLEST_STEP, LARGEST_STEP)[self.column]
+        self.step = np.clip(LANE_STEP * errors, SMALLEST_STEP, LARGEST_STEP)[self.column]
         self.rise = np.repeat(rise, 2)
         self.open = np.ones(len(self.column), dtype=bool)
         self.path: list[list[tuple[float, float]]] = [[] for _ in self.column]
@@ -143,7 +143,7 @@ class Lanes:
                 self.path[lane].append((value, height))
         ended = (rise > BEYOND * self.limit) | (target <= 0) | (target >= 1) | ~np.isfinite(rise)
         self.open[lanes[ended]] = False
-        if rise.min(initial=0.0) < -BETTER:
+        if rise.min(initial=0.0) < -LEAST_OPTIMUM_GAIN:
             self.better = descent.unit[rise.argmin()]
         return True
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from tractexp.domain.port import Complex, Port
 
-DECAYS = 6  # of a pole that is tried, from the slowest to the fastest
+TRIED_DECAYS = 6  # of a pole that is tried, from the slowest to the fastest
 FREQUENCIES = (0.0, 2.0, 5.0, 12.0, 25.0, 50.0, 100.0)  # Hz against the frame, of a pole that is tried
 FASTEST, HIGHEST = 0.5, 0.25  # of the sampling rate: a decay [1/s], a frequency [Hz]
-STEPS = 40  # of the nonlinear least squares
+MOST_PROJECTION_STEPS = 40  # of the nonlinear least squares
 PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is theirs
 
 
@@ -51,7 +51,7 @@ class Projection:
 
     @property
     def grid(self) -> list[complex]:
-        decays = np.geomspace(self.slowest, FASTEST * self.rate, DECAYS + 2)[1:-1].tolist()
+        decays = np.geomspace(self.slowest, FASTEST * self.rate, TRIED_DECAYS + 2)[1:-1].tolist()
         turns = [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]
         return [complex(-a, 2 * np.pi * f) for a in decays for f in sorted({*turns, *(-f for f in turns)})]
 
@@ -78,7 +78,7 @@ class Projection:
         optimum = least_squares(
             lambda x: _parts(self.linear_part(_poles(x, n)).residual), np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
-            bounds=bounds, x_scale="jac", method="dogbox", max_nfev=STEPS,
+            bounds=bounds, x_scale="jac", method="dogbox", max_nfev=MOST_PROJECTION_STEPS,
         )  # fmt: skip
         return _poles(optimum.x, n)
 
@@ -104,18 +104,18 @@ def basis(port: Port, poles: Complex) -> Complex:
 
 def of_pole(port: Port, pole: complex) -> Complex:
     """The response (N,) of s / (s - p); of a path in series that of 1 / (s - p)."""
-    x = decaying(port.u, pole, port.step)
+    x = compute_pole_response(port.u, pole, port.step)
     return x if port.series else port.u + pole * x
 
 
 def with_pole(port: Port, pole: complex) -> Complex:
     """How that moves (N,) with the pole."""
-    x = decaying(port.u, pole, port.step)
-    moved = decaying(x, pole, port.step)
+    x = compute_pole_response(port.u, pole, port.step)
+    moved = compute_pole_response(x, pole, port.step)
     return moved if port.series else x + pole * moved
 
 
-def decaying(u: Complex, pole: complex, step: float) -> Complex:
+def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
     """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line between samples."""
     from scipy.linalg import get_blas_funcs  # as fast as scipy.signal's filter, which takes a second to import
 

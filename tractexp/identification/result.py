@@ -17,7 +17,7 @@ from tractexp.errors import MODEL, UserError
 from tractexp.identification import stored
 from tractexp.identification.adequacy import ACCEPTED
 from tractexp.identification.search import REFUSED, History, SearchResult
-from tractexp.identification.verdict import EDGE
+from tractexp.identification.verdict import BOUND_DISTANCE
 from tractexp.inference.model_error import in_percent, model_error
 from tractexp.inference.problem import Problem
 from tractexp.model.drive import PHASORS, Drive
@@ -25,7 +25,7 @@ from tractexp.model.model import CLASSICAL, Model, compose
 from tractexp.plugin import build
 from tractexp.record import Event, OwnBase, Record, find_dips
 from tractexp.record.identity import Identity
-from tractexp.record.own_base import scaled
+from tractexp.record.own_base import scale_parameter
 
 TRAIN, VALIDATE = "train", "validate"
 BEFORE = ("U0", "P0", "Q0", "frequency")  # of the first event, what its steady state stands on
@@ -167,7 +167,7 @@ class Result:
         ratio = self.base.over(record)
         motor, static, effects, *_ = parts(self.model)
         exponents = {p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters}
-        return {name: scaled(value, exponents[name], ratio) for name, value in self.parameters.items()}
+        return {name: scale_parameter(value, exponents[name], ratio) for name, value in self.parameters.items()}
 
     def on_given_base(self) -> str:
         """The parameters whose values are others on the file's base, in one line; "" where it is the record's own."""
@@ -292,7 +292,7 @@ def conclude(
         model=dict(settings),
         before={"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.record.base.frequency},
         optimizer=optimizer,
-        search=searched(problem, end),
+        search=describe_search(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
         records=[{"name": f.event.record.name, "role": f.role} | Identity.at(f.event.record).to_dict() for f in fits],
         own_base=asdict(own),
@@ -341,7 +341,7 @@ def relative_errors(fits: Sequence[Fit]) -> tuple[float, float]:
     return relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
 
 
-def searched(problem: Problem, end: SearchResult) -> dict[str, Any]:
+def describe_search(problem: Problem, end: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself end, and what that took: what optimizers are compared by."""
     epsilon_p, epsilon_q = relative_errors(play(problem, end.values))
     errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
@@ -365,7 +365,7 @@ def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
 def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
     """Names of the free parameters within a thousandth of their range of a bound."""
     unit = problem.space.to_unit(values)
-    return [n for n, z in zip(problem.space.names, unit, strict=True) if z < EDGE or z > 1 - EDGE]
+    return [n for n, z in zip(problem.space.names, unit, strict=True) if z < BOUND_DISTANCE or z > 1 - BOUND_DISTANCE]
 
 
 def active_bounds(problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()) -> list[str]:

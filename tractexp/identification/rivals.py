@@ -15,15 +15,15 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.identification.uncertainty import Uncertainty, threshold
-from tractexp.identification.verdict import IDENTIFIED, WITHIN, ParameterVerdict, size
+from tractexp.identification.verdict import IDENTIFIED, IDENTIFIED_SHARE, ParameterVerdict, size
 from tractexp.inference.problem import Problem
 from tractexp.model.model import Model, compose
 from tractexp.parameter import even
 from tractexp.plugin import discover, get
-from tractexp.progress import Counting, uncounted
+from tractexp.progress import Counting, make_silent_counter
 
 STARTS = 5  # of the parameters that the rival alone has
-ITERATIONS = 25
+RIVAL_ITERATIONS = 25
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,25 +39,25 @@ class RivalStructure:
         return {"name": self.name, "objective_ratio": self.squares, "parameters": self.values}
 
 
-def with_rivals(uncertainty: Uncertainty, parts: Callable[[int], Counting] = uncounted) -> Uncertainty:
+def with_rivals(uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter) -> Uncertainty:
     """The judgement with the rival structures that fit as well as the model, or better; `parts` counts them."""
     structures, candidates = list(_structures(uncertainty.likelihood.problem.model)), list[RivalStructure | None]()
     with parts(len(structures)) as ended:
         for name, model in structures:
-            candidates.append(_fitted(uncertainty, name, model))
+            candidates.append(_fit_rival(uncertainty, name, model))
             ended()
     beside = replace(uncertainty, rivals=tuple(rival for rival in candidates if rival is not None))
-    return replace(beside, verdicts=uncertainty.verdicts | dict(_moved(uncertainty, beside)))
+    return replace(beside, verdicts=uncertainty.verdicts | dict(_find_moved_parameters(uncertainty, beside)))
 
 
-def _moved(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
+def _find_moved_parameters(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
     """Verdicts of the parameters that a rival moves beyond their interval, or until that is wide."""
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
         value, verdict = float(own.values[j]), own.verdicts[name]
         there = [(rival.values[name], rival.name) for rival in beside.rivals if name in rival.values]
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
         half = max(abs(far - value), float(np.ptp(beside.intervals[j])) / 2)
-        wide = half > WITHIN * size(value, own.lower[j], own.upper[j])
+        wide = half > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
         if by and ((wide and verdict.word == IDENTIFIED) or not low <= far <= high):
             yield name, verdict.weakened(f"with {by} it is {far:.4g}", enough=wide)
 
@@ -86,7 +86,7 @@ def _composes(model: Model) -> bool:
     return compose(model.motor, model.static, others, domain=model.domain).acceptance(last).refusal is None
 
 
-def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure | None:
+def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure | None:
     """A rival fitted from where the model's own fit ended; None where it cannot be, or fits worse."""
     problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name in model.names}
@@ -101,7 +101,7 @@ def _fitted(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure
     start = likelihood.placed(_starts(uncertainty, other))
     if uncertainty.exact:
         start[:, likelihood.free :] = uncertainty.unit[uncertainty.likelihood.free :]
-    ended = likelihood.descent(start, iterations=ITERATIONS, tolerance=0.01)
+    ended = likelihood.descent(start, iterations=RIVAL_ITERATIONS, tolerance=0.01)
     best = int(ended.deviance.argmin())
     if not ended.deviance[best] < uncertainty.deviance + threshold():
         return None

@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.errors import UserError, among
 from tractexp.kinds import check_kind
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 
 def check_fields(cls: type[Any], content: Any, where: str) -> None:
@@ -26,7 +26,7 @@ def check_fields(cls: type[Any], content: Any, where: str) -> None:
             raise UserError(f"{unlike}: it lacks '{name}'")
     kinds = get_type_hints(cls)
     for name, value in content.items():
-        check_kind(f"{where}: {name}", _numbered(value), kinds[name])
+        check_kind(f"{where}: {name}", _restore_numbers(value), kinds[name])
 
 
 def without_nulls(cls: type[Any], content: Mapping[str, Any]) -> dict[str, Any]:
@@ -35,11 +35,11 @@ def without_nulls(cls: type[Any], content: Mapping[str, Any]) -> dict[str, Any]:
     return {key: math.nan if value is None and kinds[key] is float else value for key, value in content.items()}
 
 
-def _numbered(value: Any) -> Any:
+def _restore_numbers(value: Any) -> Any:
     """A value with a number in the place of each that did not exist when it was saved, which JSON knows as null."""
     if isinstance(value, Mapping):
-        return {key: _numbered(inner) for key, inner in value.items()}
-    return [_numbered(inner) for inner in value] if isinstance(value, list) else math.nan if value is None else value
+        return {key: _restore_numbers(inner) for key, inner in value.items()}
+    return [_restore_numbers(inner) for inner in value] if isinstance(value, list) else math.nan if value is None else value
 
 
 def check_numbers(where: str, numbers: Any) -> None:
@@ -92,7 +92,7 @@ def signals(given: Mapping[str, Any]) -> dict[str, np.ndarray]:
         if values.shape != t.shape:
             raise UserError(f"{name} has {len(values)} samples where t has {len(t)}; give as many")
     if len(t) < 2:
-        raise UserError(f"t has {counted(len(t), 'sample')}; a prediction needs at least two")
+        raise UserError(f"t has {count_noun(len(t), 'sample')}; a prediction needs at least two")
     steps = np.diff(t)
     usual = float(np.median(steps))
     if not (usual > 0 and (np.abs(steps - usual) < usual / 2).all()):

@@ -15,12 +15,12 @@ from tractexp import files
 from tractexp.identification.verdict import ParameterVerdict, judge
 from tractexp.inference.differences import CENTRAL
 from tractexp.inference.information import Information
-from tractexp.inference.interval import LEVEL, interval_factor
+from tractexp.inference.interval import INTERVAL_LEVEL, interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.residual_tests import jarque_bera, ljung_box
 from tractexp.inference.sandwich import scatter
 from tractexp.inference.separable import Sensitivities
-from tractexp.noise.color import FEWEST
+from tractexp.noise.color import FEWEST_NOISE_SAMPLES
 
 if TYPE_CHECKING:
     from tractexp.identification.rivals import RivalStructure
@@ -98,7 +98,7 @@ class Uncertainty:
             part = problem.drive.part(e)
             for c, channel in enumerate(problem.drive.names):
                 seen = white[c, part][valid[c, part]]
-                if len(seen) < FEWEST:
+                if len(seen) < FEWEST_NOISE_SAMPLES:
                     continue
                 tests = ljung_box(seen, self.of_noise.noise.pair(e)[c].order), jarque_bera(seen)
                 results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
@@ -170,7 +170,7 @@ class Uncertainty:
             "intervals": dict(pairs),
             "verdicts": {name: str(verdict) for name, verdict in self.verdicts.items()},
             "uncertainty": {
-                "level": LEVEL,
+                "level": INTERVAL_LEVEL,
                 "names": list(self.names),
                 "correlation": self.information.correlation.tolist(),
                 **self.samples,
@@ -186,7 +186,7 @@ def threshold() -> float:
     """What the deviance may rise by: the chi-squared quantile of one degree of freedom."""
     from scipy.special import chdtri
 
-    return float(chdtri(1, 1 - LEVEL))
+    return float(chdtri(1, 1 - INTERVAL_LEVEL))
 
 
 def conclude(
@@ -200,7 +200,7 @@ def conclude(
     likelihood, deviance, information, factors, limits = (
         _curvature(likelihood, unit) if likelihood.initial_power else _scatter(likelihood, unit)
     )
-    information = replace(information, held=_held(likelihood, unit, information.blind))
+    information = replace(information, held=_find_immovable_parameters(likelihood, unit, information.blind))
     verdicts = judge(information, problem.lower, problem.upper, factors * information.standard_errors, factors)
     return Uncertainty(
         likelihood, unit, deviance, information, problem.lower, problem.upper, factors, limits, verdicts,
@@ -208,7 +208,7 @@ def conclude(
     )  # fmt: skip
 
 
-def _held(likelihood: Likelihood, unit: np.ndarray, names: Sequence[str]) -> tuple[str, ...]:
+def _find_immovable_parameters(likelihood: Likelihood, unit: np.ndarray, names: Sequence[str]) -> tuple[str, ...]:
     """Those of the parameters that no step from coordinates (D,) to either side leaves a steady state."""
     all_names = likelihood.problem.space.names
 

@@ -14,12 +14,12 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "at its bound",
 )
 HELD = "a requirement of the model holds it there: beside it there is no steady state"
-WITHIN = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
+IDENTIFIED_SHARE = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
 NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
 PARTNERS = 2  # named at most
-STEEPEST = 4.0  # power of a combination that is told
-EDGE = 1e-3  # of the range: closer than this is at the bound
+STEEPEST_COMBINATION = 4.0  # power of a combination that is told
+BOUND_DISTANCE = 1e-3  # of the range: closer than this is at the bound
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ def size(value: float, low: float, high: float) -> float:
     return max(abs(value), NEAR_ZERO * (high - low)) if low <= 0 <= high else abs(value)
 
 
-def shown(value: float, half: float, low: float, high: float) -> str:
+def format_half_width(value: float, half: float, low: float, high: float) -> str:
     """A half-width in percent of the value, or as a number where the value is next to nothing."""
     if size(value, low, high) != abs(value):
         return f"± {half:.2g}"
@@ -65,13 +65,13 @@ def judge(
     for j, name in enumerate(information.names):
         value = information.values[j]
         low, high = value - half[j], value + half[j]
-        at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < EDGE * width[j]]
+        at = [f"{b:g}" for b in (lower[j], upper[j]) if abs(value - b) < BOUND_DISTANCE * width[j]]
         if not identifiable[j]:
             verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
             verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
-        elif half[j] > WITHIN * size(value, lower[j], upper[j]):
+        elif half[j] > IDENTIFIED_SHARE * size(value, lower[j], upper[j]):
             why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
             verdicts[name] = ParameterVerdict(WEAK, "; ".join([*why, *edge]))
@@ -98,7 +98,7 @@ def _trade(information: Information, j: int, factor: float) -> list[str]:
         exponents = np.zeros(len(values))
         exponents[j], exponents[k] = 1.0, -covariance[j, k] / covariance[k, k] * values[k] / values[j]
         error = factor * information.relative_error(exponents)
-        if error > WITHIN or abs(exponents[k]) > STEEPEST or abs(exponents[k]) < 1 / STEEPEST:
+        if error > IDENTIFIED_SHARE or abs(exponents[k]) > STEEPEST_COMBINATION or abs(exponents[k]) < 1 / STEEPEST_COMBINATION:
             return sentence  # a combination that is hardly known, or that nobody would think in
         sentence.append(f"{combination(information.names, exponents)} is known to ± {100 * error:.2g} %")
     return sentence

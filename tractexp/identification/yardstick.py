@@ -14,7 +14,7 @@ from tractexp.errors import UserError
 from tractexp.identification.linear_network import best
 from tractexp.identification.result import TRAIN, Fit, model_errors
 from tractexp.inference.model_error import in_percent
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 
 def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def poles_in_words(poles: Sequence[dict[str, float]]) -> str:
 
 def network_in_words(poles: int) -> str:
     """What the best network of so many poles is called."""
-    return f"the best linear network {'of ' + counted(poles, 'pole') if poles else 'without poles'}"
+    return f"the best linear network {'of ' + count_noun(poles, 'pole') if poles else 'without poles'}"
 
 
 def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:

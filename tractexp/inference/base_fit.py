@@ -12,7 +12,7 @@ from tractexp.inference.multistart import valleys
 from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.noise import Noise
 
-ROUNDS = 2  # of noise and fit in turn
+BASE_FIT_ROUNDS = 2  # of noise and fit in turn
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ def fitted_from(context: Context, starts: Sequence[np.ndarray], local_minima: Se
     noise = white(context)
     fit = refit(context, noise, [((), start) for start in starts])[0]
     quiet = QuietNoise.at(context, fit.unit)
-    for _ in range(ROUNDS):
+    for _ in range(BASE_FIT_ROUNDS):
         noise = quiet.of_fit(fit.unit)
         fit = refit(context, noise, [((), fit.unit)])[0]
     return BaseFit(context, fit, noise, quiet, tuple(local_minima))

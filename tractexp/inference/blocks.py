@@ -15,8 +15,8 @@ from tractexp.model.drive import Drive
 from tractexp.record import Event
 
 LENGTH = 0.1  # s, longer than the memory of what third-order motors leave
-FEWEST = 3  # blocks for each parameter: of records with fewer, blocks are shorter
-ALIKE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
+FEWEST_BLOCKS = 3  # blocks for each parameter: of records with fewer, blocks are shorter
+LEAST_SQUARES_DIFFERENCE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
 
 
 def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False) -> list[slice]:
@@ -25,7 +25,7 @@ def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, fro
     starts = [part.start + event.start for part, event in zip(parts, events, strict=True)]
     first = starts if from_dip else [part.start for part in parts]
     seconds = sum((p.stop - a) * e.record.step for p, a, e in zip(parts, first, events, strict=True))
-    length = min(LENGTH, seconds / (FEWEST * max(parameters, 1)))
+    length = min(LENGTH, seconds / (FEWEST_BLOCKS * max(parameters, 1)))
     pieces = []
     for part, begin, start, event in zip(parts, first, starts, events, strict=True):
         n = max(1, round(length / event.record.step))
@@ -43,7 +43,7 @@ def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) ->
     difference = np.array([float(np.sum(squares[b] - others[b])) for b in blocks])
     count, total = len(difference), float(difference.sum())
     scatter = np.sqrt(count / max(count - 1, 1) * np.sum((difference - difference.mean()) ** 2))
-    return total > 2 * scatter and total > ALIKE * sum(float(others[b].sum()) for b in blocks)
+    return total > 2 * scatter and total > LEAST_SQUARES_DIFFERENCE * sum(float(others[b].sum()) for b in blocks)
 
 
 def reach(without: np.ndarray, whole: float) -> float:

@@ -20,19 +20,19 @@ from tractexp.inference.score_test import ScoreTest
 from tractexp.noise import Noise
 from tractexp.wording import in_words
 
-DRAWS = 199
+NULL_DRAWS = 199
 # Independent quiet samples below which every draw estimates its noise anew: the error of the estimate then is a tenth
 # of the noise, as large as what a level of 5 % allows.
 QUIET_WORTH = 150.0
 # Variance from noise of the voltage, over that of the power, from which faults of the measurement are not judged:
 # whatever smooths the calculated power would seem to be there.
 BLURRED = 0.5
-MORE = 10  # times as many are drawn for the scales alone
+SCALE_DRAW_FACTOR = 10  # times as many are drawn for the scales alone
 
 
 def by_draws(p: float) -> str:
     """A probability as a sentence tells it: no finer than the draws do, though its tail is extrapolated."""
-    return in_words(p) if p >= 1 / (DRAWS + 1) else f"less than {1 / (DRAWS + 1):g}"
+    return in_words(p) if p >= 1 / (NULL_DRAWS + 1) else f"less than {1 / (NULL_DRAWS + 1):g}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,13 +65,13 @@ def chance_at(
     plain = plain or is_noise_exact(context, noise)
 
     def draw() -> tuple[np.ndarray, ...]:
-        chance = _drawn(t, own, noise, quiet, seed, plain)
+        chance = _draw_null_distribution(t, own, noise, quiet, seed, plain)
         return chance.least_p, np.array([*chance.left]), *chance.left.values()
 
     if plain or not context.digest:
-        return _drawn(t, own, noise, quiet, seed, plain)
+        return _draw_null_distribution(t, own, noise, quiet, seed, plain)
     fit = {part.name: getattr(t, part.name) for part in fields(t) if part.name != "context"}
-    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, DRAWS)
+    key = store.key("chance", context.digest, fit, noise, quiet.input_modes, seed, NULL_DRAWS)
     least, names, *left = store.DRAWS.arrays(key, draw)
     return Chance(least, dict(zip(names.tolist(), left, strict=True)))
 
@@ -88,32 +88,32 @@ def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[st
         by_test = goodness_of_fit.statistics(drawn.channels(t.context.problem), t.context.problem)
         return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
 
-    parts = each_apart(part, range(1, MORE + 1), t.context.effort)
+    parts = each_apart(part, range(1, SCALE_DRAW_FACTOR + 1), t.context.effort)
     moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
     return {name: Scale(mean, np.sqrt(square - mean**2) + 1e-12) for name, (mean, square) in moments.items()}
 
 
-def _drawn(
+def _draw_null_distribution(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
 ) -> Chance:  # fmt: skip
     rng = np.random.default_rng(seed)
     if plain:
         return _chance(t, own.of(_white(t, noise, rng)), noise)
-    drawn = noise.draw(rng, DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
+    drawn = noise.draw(rng, NULL_DRAWS, np.diff(t.context.drive.first).tolist()) * t.context.valid
     rest = rich_residuals(t, drawn)
 
     def anew(b: int) -> Chance:
         seen = quiet.of(t.unit, rest[b])
         return _chance(t, t.whitened(seen).of(t.context.whiten(seen, drawn[b : b + 1])), noise)
 
-    each = each_apart(anew, range(DRAWS), t.context.effort)
+    each = each_apart(anew, range(NULL_DRAWS), t.context.effort)
     left = {name: np.concatenate([one.left[name] for one in each]) for name in each[0].left}
     return Chance(np.concatenate([one.least_p for one in each]), left)
 
 
 def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarray:
     """Whitened noise (b, C N) of the events."""
-    return noise.draw_white(rng, DRAWS, t.context.drive, t.context.valid)
+    return noise.draw_white(rng, NULL_DRAWS, t.context.drive, t.context.valid)
 
 
 def is_noise_exact(context: Context, noise: Noise) -> bool:

@@ -75,7 +75,7 @@ class Context:
         """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not known."""
         load, at = self.load, self.coordinates
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
-        if not all(map(store.installed, parts)):
+        if not all(map(store.is_installed, parts)):
             return ""
         content = (
             self.kernels.bare.digest(), self.kernels.substeps, self.criteria, at.box.lower, at.box.upper,

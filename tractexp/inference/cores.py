@@ -47,7 +47,7 @@ def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort
     processes = min(cores(), len(items))
     with effort.parts(len(items)) as ended:
         if processes < 2:
-            return [_counted(function(item), ended) for item in items]
+            return [_count_result(function(item), ended) for item in items]
 
         def call(k: int) -> tuple[Result, list[int]]:
             before = effort.counts
@@ -55,15 +55,15 @@ def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort
             return result, effort.spent_since(before)
 
         results = list[Result]()
-        with _forked(call, processes) as done:
+        with _fork_processes(call, processes) as done:
             for result, spent in done(range(len(items))):
                 effort.add(spent)
-                results.append(_counted(result, ended))
+                results.append(_count_result(result, ended))
         return results
 
 
 @contextlib.contextmanager
-def _forked(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
+def _fork_processes(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
     """Processes that know this call, ended at once where an error or Ctrl-C leaves it."""
     others = multiprocessing.active_children()
     try:
@@ -90,7 +90,7 @@ def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
         yield future.result()
 
 
-def _counted(result: Result, ended: Callable[[], None]) -> Result:
+def _count_result(result: Result, ended: Callable[[], None]) -> Result:
     ended()
     return result
 

@@ -9,9 +9,9 @@ from tractexp.inference.separable import NOT_SEPARABLE, SeparableColumns
 # (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot be simulated
 Rows = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
-DIFFERENCE = 1e-6  # of a parameter's range
+RANGE_DIFFERENCE = 1e-6  # of a parameter's range
 CENTRAL = 1e-5  # of it, where both sides are taken: truncation and rounding both stay below 1e-7 of a column
-STEP = 1e-4  # of a coordinate's range, for the residuals at a fit
+COORDINATE_STEP = 1e-4  # of a coordinate's range, for the residuals at a fit
 
 
 def forward_differences(
@@ -24,7 +24,7 @@ def forward_differences(
     """
     n, d = unit.shape
     shared, steps = apart.shared(d), apart.moves(d)
-    h = np.where(unit > 0.5, -DIFFERENCE, DIFFERENCE)
+    h = np.where(unit > 0.5, -RANGE_DIFFERENCE, RANGE_DIFFERENCE)
     moved = unit[:, None, :] + steps * h[:, None, :]
     J = rows(moved.reshape(-1, d), np.repeat(lanes, len(steps))).reshape(n, len(steps), -1)
     J -= base[:, None, :]
@@ -78,8 +78,8 @@ def finite(changes: np.ndarray) -> np.ndarray:
 def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (2 k, D) a small step above in each of the columns, then below, and how far they are apart (k,)."""
     points, at = np.tile(unit, (2, len(columns), 1)), (np.arange(len(columns)), np.asarray(columns, dtype=int))
-    points[0][at] = np.minimum(unit[at[1]] + STEP, 1.0)
-    points[1][at] = np.maximum(unit[at[1]] - STEP, 0.0)
+    points[0][at] = np.minimum(unit[at[1]] + COORDINATE_STEP, 1.0)
+    points[1][at] = np.maximum(unit[at[1]] - COORDINATE_STEP, 0.0)
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
 
 

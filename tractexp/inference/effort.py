@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from threading import Event, Thread
 
-from tractexp.progress import remaining
+from tractexp.progress import describe_remaining_time
 
 SILENCE = 4.0  # s after which a line says that a step goes on
 
@@ -21,7 +21,7 @@ class Parts:
         self.ended += 1
 
     def __str__(self) -> str:
-        rest = remaining(time.perf_counter() - self._begun, self.ended / self.total)
+        rest = describe_remaining_time(time.perf_counter() - self._begun, self.ended / self.total)
         return f"{self.ended} of {self.total}{rest}"
 
 

@@ -12,7 +12,7 @@ import numpy as np
 ROUGH_DESCENT = (12, 0.3)
 EXACT_DESCENT = (40, 0.02)
 # Descents that take their steps in the same calls: few enough for several cores to have some each.
-TOGETHER = 4
+FITS_AT_ONCE = 4
 # Iterations after which the worse half of a set's starts is given up.
 FIRST_ITERATIONS = 4
 

@@ -11,7 +11,7 @@ from tractexp.inference import fit_effort
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.inference.least_squares import descend
-from tractexp.inference.promising import promising
+from tractexp.inference.promising import select_promising_starts
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct
 
@@ -47,12 +47,12 @@ def refit(context: Context, noise: Noise, wanted: Sequence[Start], faults: Seque
 
     Of several starts of one set the best is returned; the result is in order of cost.
     """
-    return best_of(_descended(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
+    return best_of(_run_descents(context, noise, wanted, faults, fit_effort.EXACT_DESCENT))
 
 
 def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
     """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
-    begun = _descended(context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]))
+    begun = _run_descents(context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]))
     best = best_of(begun)
     far = _far([r.cost for r in best])
     promising = [r.names for r in best if r.cost <= best[0].cost + far]
@@ -63,7 +63,7 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
     return best_of(
         [
             *best,
-            *_descended(
+            *_run_descents(
                 context,
                 noise,
                 again,
@@ -96,7 +96,7 @@ def _around(
 ) -> list[Refit]:  # fmt: skip
     """Fits of one set searched further around the best of them as long as that gains, and the nearest then exactly."""
     for _ in range(again if context.coordinates.settings(fits[0].names) else 0):
-        others = _in_turns(context, noise, scattered(context, fits[0]), faults)
+        others = _in_turns(context, noise, scatter_starts(context, fits[0]), faults)
         if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
             break
         fits = others
@@ -111,7 +111,7 @@ def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: S
     ended: list[Refit] = []
     for _ in range(fit_effort.MOST_TURNS):
         moved = [(f.names, moved_across(context, noise, f, faults)) for f in turning]
-        after = _descended(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
+        after = _run_descents(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
         better = [min(pair, key=lambda f: f.deviance) for pair in zip(turning, after, strict=True)]
         best = min(f.deviance for f in (*ended, *better))
         gains = [before.deviance - now.deviance for before, now in zip(turning, better, strict=True)]
@@ -125,7 +125,7 @@ def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: S
     return sorted([*ended, *turning], key=lambda f: f.cost)
 
 
-def scattered(context: Context, fit: Refit) -> list[Start]:
+def scatter_starts(context: Context, fit: Refit) -> list[Start]:
     """Starts around a fit, with all that an effect has beside its sizes moved at once, by little and by much.
 
     Two relays may each be at its best beside the other and still have each other's times: one parameter at a time
@@ -166,9 +166,9 @@ def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequ
     """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
     names = wanted[0][0]
     nuisances = [*context.coordinates.base, *context.coordinates.before, *_with_prior(context, [names], faults)[0]]
-    units = promising(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, fit_effort.MOST_STARTS)
+    units = select_promising_starts(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, fit_effort.MOST_STARTS)
     effort = fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]
-    begun = _descended(context, noise, [(names, u) for u in units], faults, effort)
+    begun = _run_descents(context, noise, [(names, u) for u in units], faults, effort)
     at = np.array([f.unit for f in begun])
     chosen = best_distinct(at, np.array([f.cost for f in begun]), fit_effort.DISTINCT, fit_effort.STARTS_IN_TURNS)
     return [begun[k] for k in chosen]
@@ -209,7 +209,7 @@ def no_worse_than_subsets(
     return [min(f, redone.get(f.names, f), key=lambda r: r.deviance) for f in fits]
 
 
-def _descended(
+def _run_descents(
     context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
 ) -> list[Refit]:
     """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was.
@@ -236,7 +236,7 @@ def _descended(
         return done.unit, done.deviance
 
     def all_descended() -> tuple[np.ndarray, ...]:
-        groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.TOGETHER))
+        groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.FITS_AT_ONCE))
         units, deviances = zip(*each_apart(descended, groups, context.effort), strict=True)
         return np.concatenate(units), np.concatenate(deviances), np.array(context.effort.total - spent)
 
@@ -269,7 +269,7 @@ def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> l
     return [moved] if len(resting) else []
 
 
-def settled(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
+def fit_initial_power(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
     """Coordinates (D,) with P0 and Q0 of each event fitted where they are free, and nothing else."""
     before = context.coordinates.before
     if not len(before):

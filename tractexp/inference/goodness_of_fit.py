@@ -18,12 +18,12 @@ from tractexp.inference.problem import Problem
 SMALLEST_P = 1e-300
 HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
 LOUDEST, PER_EVENT = "the loudest window", "parameters of each event"
-DISTINCT = 1e-3  # of the largest: weaker directions are rounding
+LEAST_DISTINCT_SHARE = 1e-3  # of the largest: weaker directions are rounding
 STRIDE = 4  # samples between the instants at which a step is looked for
-BINS = 1024  # of the transform in which an oscillation is looked for
+SPECTRUM_BINS = 1024  # of the transform in which an oscillation is looked for
 PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
 BURSTS = (0.1, 0.3)  # s, lengths of the stretches after the dips in which an oscillation may come and go
-FEWEST = 8  # samples of a stretch with an oscillation
+FEWEST_OSCILLATION_SAMPLES = 8  # samples of a stretch with an oscillation
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
 
@@ -85,7 +85,7 @@ class ResidualWindow:
 
 def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
     """Statistics of whitened, projected residuals (b, 2, N) by what each looks for, of which the largest counts."""
-    after = aligned(channels, problem)
+    after = align_residuals(channels, problem)
     return {
         LOUDEST: energies(channels, problem),
         "a step or a pulse": np.concatenate([steps(channels, problem), pulses(after, problem)], axis=1),
@@ -104,10 +104,10 @@ def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> fl
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
         return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
     scale, largest = extremes(draws) if scale is None else (scale, scale.largest(draws))
-    return max(_exceeded(largest, float(scale.largest(np.atleast_2d(value))[0])), SMALLEST_P)
+    return max(_compute_exceedance(largest, float(scale.largest(np.atleast_2d(value))[0])), SMALLEST_P)
 
 
-def _exceeded(largest: np.ndarray, value: float) -> float:
+def _compute_exceedance(largest: np.ndarray, value: float) -> float:
     """How often the largest of many exceeds a value, given draws (b,) of it.
 
     By the moments of a Gumbel distribution; by the L-moments of a generalised extreme value distribution where those
@@ -167,7 +167,7 @@ def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
     return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1)
 
 
-def aligned(channels: np.ndarray, problem: Problem) -> np.ndarray:
+def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
 
     Timers and controls answer every dip alike, however little each event shows of it.
@@ -200,12 +200,12 @@ def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
 
 def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
     """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
-    power = np.zeros((len(channels), 3, BINS // 2 + 1))
+    power = np.zeros((len(channels), 3, SPECTRUM_BINS // 2 + 1))
     for e, event in enumerate(problem.events):
         own = channels[:, :, problem.drive.part(e)]
         for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
             stretch = own[:, :, part]
-            if stretch.shape[2] >= FEWEST:
+            if stretch.shape[2] >= FEWEST_OSCILLATION_SAMPLES:
                 power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
     return power.reshape(len(channels), -1)
 
@@ -215,7 +215,7 @@ def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
     columns = [np.empty((len(after), 0))]
     for length in BURSTS:
         n = round(length / problem.events[0].record.step)
-        if FEWEST <= n <= after.shape[2]:
+        if FEWEST_OSCILLATION_SAMPLES <= n <= after.shape[2]:
             stretches = np.lib.stride_tricks.sliding_window_view(after, n, axis=2)[:, :, :: n // 2]
             power = np.abs(np.fft.rfft(stretches, 2 * n, axis=3)) ** 2 / n
             columns.append(power.sum(axis=1).reshape(len(after), -1))
@@ -224,5 +224,5 @@ def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
 
 def _power(stretch: np.ndarray) -> np.ndarray:
     """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's length."""
-    padded = -(-stretch.shape[-1] // BINS) * BINS
-    return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // BINS]) ** 2
+    padded = -(-stretch.shape[-1] // SPECTRUM_BINS) * SPECTRUM_BINS
+    return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // SPECTRUM_BINS]) ** 2

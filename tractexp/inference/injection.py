@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 PUSHES = "injection"
 SOURCE = "a unit push, for the tangent space only"
-EDGE = 0.002  # s: how sharp a window starts and ends
+EDGE_SECONDS = 0.002  # s: how sharp a window starts and ends
 
 
 class Injection(Effect):
@@ -47,7 +47,7 @@ class Injection(Effect):
     ):
         from tractexp.model.equations import OWN, I, sympy
 
-        ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE))  # noqa: E731
+        ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE_SECONDS))  # noqa: E731
         gate = ramp(window_on) - ramp(window_off)
         pushes = {"flux": push_flux_d + I * push_flux_q, "speed": push_speed}
         for state in eq.states.values():  # of the motor itself: a twin that an effect adds follows it

@@ -9,7 +9,7 @@ from tractexp import files
 from tractexp.parameter import Parameter
 from tractexp.wording import with_error
 
-LEVEL = 0.95
+INTERVAL_LEVEL = 0.95
 
 
 def interval_factor(freedom: float = np.inf) -> float:
@@ -20,7 +20,7 @@ def interval_factor(freedom: float = np.inf) -> float:
     """
     from scipy.special import stdtrit
 
-    return float(stdtrit(max(freedom, 1), (1 + LEVEL) / 2))
+    return float(stdtrit(max(freedom, 1), (1 + INTERVAL_LEVEL) / 2))
 
 
 @dataclass(frozen=True, eq=False)

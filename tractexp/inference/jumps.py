@@ -13,10 +13,10 @@ import numpy as np
 from tractexp.domain.wave_errors import off_neighbors
 from tractexp.inference.context import Context
 
-MOST = 4  # samples of one channel and event that are the least smooth
+MOST_JUMPS = 4  # samples of one channel and event that are the least smooth
 AROUND = 3  # samples on either side that a filter may spread a jump over
 SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong with it and with those around it
-ABRUPT = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
+LEAST_JUMP = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
 
 
 def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
@@ -49,9 +49,9 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
 
 def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
     """The samples around the jumps of one channel (N,), each with what may be wrong with it [pu]."""
-    off, least = np.abs(off_neighbors(added)), ABRUPT * np.abs(added).max(initial=0.0)
+    off, least = np.abs(off_neighbors(added)), LEAST_JUMP * np.abs(added).max(initial=0.0)
     doubt: dict[int, float] = {}
-    for k in np.argsort(-off)[:MOST].tolist():
+    for k in np.argsort(-off)[:MOST_JUMPS].tolist():
         if off[k] > least:
             for near in range(max(k - AROUND, 0), min(k + AROUND + 1, len(off))):
                 doubt[near] = max(doubt.get(near, 0.0), SPREAD * float(off[k]))

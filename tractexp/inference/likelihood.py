@@ -17,7 +17,7 @@ from tractexp.inference.least_squares import Descent, descend
 from tractexp.inference.prior import departures
 from tractexp.inference.problem import Problem
 from tractexp.inference.separable import Sensitivities
-from tractexp.noise.color import SMALLEST, fit_autoregression, stretches
+from tractexp.noise.color import SMALLEST_DEVIATION, fit_autoregression, stretches
 from tractexp.noise.model import Noise, Pair
 from tractexp.record import Event
 
@@ -27,7 +27,7 @@ def before_the_event(event: Event) -> Pair:
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
         color = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
-        pair.append(color.scaled(max(level, SMALLEST) / color.deviation[0]))
+        pair.append(color.scaled(max(level, SMALLEST_DEVIATION) / color.deviation[0]))
     return tuple(pair)
 
 

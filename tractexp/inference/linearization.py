@@ -13,10 +13,10 @@ from tractexp.inference.fitting import Refit
 from tractexp.inference.injection import PUSHES, perturbations
 from tractexp.inference.score_test import CandidateColumn, ScoreTest
 from tractexp.noise import Noise
-from tractexp.noise.span import spanned
+from tractexp.noise.span import compute_basis
 
-REACH = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
-HELD = 1e-6  # of it: how far a parameter that rests on a wall may move
+CANDIDATE_STEP = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
+LARGEST_MOVE_AT_BOUND = 1e-6  # of it: how far a parameter that rests on a wall may move
 LEAST_VARIANCE = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
 
 
@@ -84,12 +84,12 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))
-    held = set(np.flatnonzero(resting(context, fit.unit, nuisances, white[:k] @ white[k])).tolist())
+    held = set(np.flatnonzero(find_active_bounds(context, fit.unit, nuisances, white[:k] @ white[k])).tolist())
     rows = sorted({*held, *(i for i, c in enumerate(nuisances) if c in at.prior_deviation)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
     for row, i in enumerate(rows):
-        prior[row, i] = 1 / (HELD if i in held else at.prior_deviation[nuisances[i]])
+        prior[row, i] = 1 / (LARGEST_MOVE_AT_BOUND if i in held else at.prior_deviation[nuisances[i]])
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
     fitted = {*at.base, *at.sizes(fit.names)}  # a relay's instants hang on the voltage's noise, which no draw has
     split = _by_event(context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
@@ -99,7 +99,7 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     )
 
 
-def resting(
+def find_active_bounds(
     context: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
     """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
@@ -130,7 +130,7 @@ def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndar
         for setting in candidate.settings:
             first = len(points)
             for p in candidate.sizes:
-                step = REACH * candidate.relevant(p) * (candidate.sign(p) or 1)
+                step = CANDIDATE_STEP * candidate.relevant(p) * (candidate.sign(p) or 1)
                 points.append(at.placed(fit.unit, setting | {p.name: p.absent + step}))
                 spans.append(step)
             labels.append((candidate, setting, first, len(points)))
@@ -142,7 +142,7 @@ def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
 
     Each is divided by what is left of its variance then, so that the noise does not come out too small.
     """
-    right = spanned(t.explaining.reshape(-1, residuals[0].size), 1e-6)
+    right = compute_basis(t.explaining.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)
     rest = np.maximum(1 - np.einsum("kn,kn->n", right, right), LEAST_VARIANCE)
     return ((flat - (flat @ right.T) @ right) / np.sqrt(rest)).reshape(residuals.shape)

@@ -16,12 +16,12 @@ import numpy as np
 
 from tractexp.domain import Playback
 from tractexp.inference.blocks import LENGTH, reach
-from tractexp.noise.random_walk import SLOW, without_drift, without_slow
+from tractexp.noise.random_walk import WANDERING_COSINES, without_drift, without_slow
 from tractexp.record import Event
 
 BLOCKS = 10  # of short records: two or three would tell nothing of chance
-CYCLE = 0.02  # s: what is left within a phasor's window hangs together
-MOST = 10_000  # percent: more tells no more
+COHERENT_SECONDS = 0.02  # s: what is left within a phasor's window hangs together
+LARGEST_TOLD_PERCENT = 10_000  # percent: more tells no more
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,8 @@ class ModelError:
 def in_percent(share: float) -> str:
     """A share to two digits: '0.57 %', '12 %'; 'over 10000 %' where a model diverges."""
     percent = 100 * share
-    if percent > MOST:
-        return f"over {MOST} %"
+    if percent > LARGEST_TOLD_PERCENT:
+        return f"over {LARGEST_TOLD_PERCENT} %"
     return f"{percent:.2g} %" if percent < 99.5 else f"{percent:.0f} %"
 
 
@@ -79,9 +79,9 @@ def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndar
     while True:
         sums = [_block_sums(one, length) for one in played]
         response = np.concatenate([each[:, 1] for each in sums])
-        if length <= CYCLE or response.sum() ** 2 >= sharing * np.sum(response**2):
+        if length <= COHERENT_SECONDS or response.sum() ** 2 >= sharing * np.sum(response**2):
             return sums
-        length = max(length / 2, CYCLE)
+        length = max(length / 2, COHERENT_SECONDS)
 
 
 def _block_sums(played: Playback, length: float) -> np.ndarray:
@@ -100,7 +100,7 @@ def noise_variance(event: Event) -> float:
     total = 0.0
     for row in event.calm:
         quiet = row[np.isfinite(row)]
-        if len(quiet) > 4 * SLOW:
+        if len(quiet) > 4 * WANDERING_COSINES:
             fast = without_slow(without_drift([quiet - quiet.mean()])[0])
-            total += float(np.sum(fast**2) / (len(quiet) - SLOW - 2))
+            total += float(np.sum(fast**2) / (len(quiet) - WANDERING_COSINES - 2))
     return total

@@ -18,16 +18,16 @@ MOST, DISTINCT = 4, 0.2  # of their ends, and how far apart in the unit cube: se
 ALONG = (0.3, 0.6, 0.9)  # of the way to the wall: where other valleys are looked for
 
 
-def screened(problem: Problem) -> tuple[np.ndarray, float]:
+def screen_points(problem: Problem) -> tuple[np.ndarray, float]:
     """The most promising points (at most 24, d) of the box by Eq. (8), far apart, and the least objective [pu²]."""
     points = even(SCREENED, problem.space.dimension)
     objective = problem.objective(problem.space.from_unit(points))
     return points[best_distinct(points, objective, APART, STARTS, norm=2)], float(objective.min())
 
 
-def explored(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
+def explore_minima(likelihood: Likelihood, points: np.ndarray | None = None) -> Descent:
     """Where descents from promising `points` (n, d) of the box, by default those screened, end: at most 10."""
-    points = screened(likelihood.problem)[0] if points is None else points
+    points = screen_points(likelihood.problem)[0] if points is None else points
     begun = likelihood.descent(likelihood.placed(points), None, FEW, TOLERANCE)
     free = slice(points.shape[1])
     promising = begun.unit[best_distinct(begun.unit[:, free], begun.deviance, SAME, PROMISING, norm=2)]
@@ -41,7 +41,7 @@ def distinct(ends: Descent, free: int) -> np.ndarray:
 
 def valleys(likelihood: Likelihood) -> np.ndarray:
     """Coordinates (at most 4, D) of distinct best fits from all over the box and beside the best, the best first."""
-    ends = explored(likelihood)
+    ends = explore_minima(likelihood)
     beside = likelihood.descent(along_least_certain(likelihood, ends.best))
     return distinct(ends.joined(beside), likelihood.free)
 

@@ -23,7 +23,7 @@ from tractexp.record import Event
 LEAST_REST = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
 # Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
 # there costs it little, and an estimate a third of its precision.
-SEEN = 5.0
+LEAST_WANDERING = 5.0
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
 
@@ -62,7 +62,7 @@ class Observed:
         try:
             return estimate_noise(
                 self.problem, residuals / np.sqrt(rest), valid, where, (self.problem, values), input_errors,
-                residuals, columns, seen=SEEN,
+                residuals, columns, seen=LEAST_WANDERING,
             )  # fmt: skip
         except UserError:
             return None

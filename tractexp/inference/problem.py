@@ -18,12 +18,12 @@ from tractexp.noise.quiet import quiet_stretches
 from tractexp.noise.random_walk import Load
 from tractexp.parameter import Box, Parameter, even
 from tractexp.record import Event
-from tractexp.record.own_base import SMALLEST
+from tractexp.record.own_base import SMALLEST_BASE
 
 PROBES = 64  # candidates across the box on which the Runge-Kutta step is judged
 
 
-def narrowed(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]) -> tuple[Parameter, ...]:
+def narrow_bounds(parameters: Sequence[Parameter], bounds: Mapping[str, Sequence[float]]) -> tuple[Parameter, ...]:
     """Parameters with some bounds replaced. Raises `UserError` for an unknown name or reversed bounds."""
     by_name = {p.name: p for p in parameters}
     for name, pair in bounds.items():
@@ -62,7 +62,7 @@ def _check_power(events: Sequence[Event]) -> None:
     """Raise `UserError` for an event in which nothing draws power: every model fits it, and none is told."""
     for event in events:
         drawn = float(np.nanmax(np.hypot(event.record.P, event.record.Q)))
-        if not drawn > SMALLEST:
+        if not drawn > SMALLEST_BASE:
             raise UserError(
                 f"{event.record.where}: P and Q reach {drawn:.3g} pu at most: there is no load in this record; "
                 "give one of a feeder that draws power"
@@ -125,7 +125,7 @@ class Problem:
         self.events = self.domain.events(events)
         _check_channels(model, self.events)
         _check_power(events)
-        self.parameters = narrowed(model.parameters, bounds or {})
+        self.parameters = narrow_bounds(model.parameters, bounds or {})
         self.fixed = {name: float(value) for name, value in (fixed or {}).items()}
         for name in self.fixed:
             _check_name(name, {p.name: p for p in self.parameters}, "model.fixed")

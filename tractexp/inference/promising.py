@@ -13,10 +13,10 @@ from tractexp.inference.context import Context
 from tractexp.inference.differences import finite
 from tractexp.noise import Noise
 
-LEAST = 1e-9  # of the deviance: a change below that is none
+LEAST_DEVIANCE_SHARE = 1e-9  # of the deviance: a change below that is none
 
 
-def promising(
+def select_promising_starts(
     context: Context, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
 ) -> np.ndarray:
     """The starts (n, D) of one set of effects that promise most, at most so many, in their order.
@@ -29,11 +29,11 @@ def promising(
     expected = np.empty(len(units))
     for ground in np.unique(grounds, axis=0):
         mine = (grounds == ground).all(axis=1)
-        expected[mine] = _expected(context, noise, names, ground, units[mine], nuisances)
+        expected[mine] = _expect_deviance(context, noise, names, ground, units[mine], nuisances)
     return units[np.sort(np.argsort(expected, kind="stable")[:most])]
 
 
-def _expected(
+def _expect_deviance(
     context: Context,
     noise: Noise,
     names: Sequence[str],
@@ -49,4 +49,4 @@ def _expected(
     changes = np.concatenate([white, np.zeros((len(white), len(r) - white.shape[1]))], axis=1)
     changes -= (changes @ Q) @ Q.T
     power = np.einsum("nr,nr->n", changes, changes)
-    return r @ r - (changes @ r) ** 2 / np.maximum(power, LEAST * (r @ r) + 1e-300)
+    return r @ r - (changes @ r) ** 2 / np.maximum(power, LEAST_DEVIANCE_SHARE * (r @ r) + 1e-300)

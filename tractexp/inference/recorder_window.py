@@ -9,7 +9,7 @@ from tractexp.domain.averaging import RECORDED
 from tractexp.model.drive import Drive
 from tractexp.model.parts import Measurement
 from tractexp.record import Event, Window
-from tractexp.record.window import averaged_power, mean_weights, sharpened
+from tractexp.record.window import averaged_power, mean_weights, sharpen_voltage
 from tractexp.recording.estimator import estimators
 
 CYCLES = (1, 2, 3, 4, 5, 6)
@@ -61,7 +61,7 @@ class RecorderWindow(Measurement):
 
     def sharpened(self, event: Event) -> Event:
         """The event with the voltage that the load saw."""
-        return sharpened(event, self.weights(event.record.step), self.window)
+        return sharpen_voltage(event, self.weights(event.record.step), self.window)
 
 
 def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:

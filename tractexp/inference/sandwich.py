@@ -25,7 +25,7 @@ from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
 
-ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
+SINGULAR_ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
 WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out, and takes nothing from a residual
 
 
@@ -71,7 +71,7 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
         root[len(own) + np.flatnonzero(seen), held[seen]] = 1 / errors[seen]
     information = Information(
-        problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, ROUNDING
+        problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, SINGULAR_ROUNDING
     )
     return Scatter(information, interval_factor(len(blocks) - 1), ratio, spread)
 

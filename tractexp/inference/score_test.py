@@ -14,9 +14,9 @@ from scipy.special import chdtrc
 
 from tractexp.inference import goodness_of_fit
 from tractexp.inference.catalogue import Candidate
-from tractexp.inference.goodness_of_fit import DISTINCT, PER_EVENT, SMALLEST_P
+from tractexp.inference.goodness_of_fit import LEAST_DISTINCT_SHARE, PER_EVENT, SMALLEST_P
 from tractexp.inference.problem import Problem
-from tractexp.noise.span import spanned
+from tractexp.noise.span import compute_basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +133,7 @@ class ScoreTest:
             **goodness_of_fit.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
-            by_test[PER_EVENT] = ((self.r @ spanned(self.split, DISTINCT, 1e-12).T) ** 2).sum(axis=1)
+            by_test[PER_EVENT] = ((self.r @ compute_basis(self.split, LEAST_DISTINCT_SHARE, 1e-12).T) ** 2).sum(axis=1)
         return by_test
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from tractexp.model.drive import Drive
-from tractexp.noise.span import spanned
+from tractexp.noise.span import compute_basis
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,10 +109,10 @@ class Sensitivities:
     def basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
         """Of the rows that they can reach; see `spanned` for what is left out of each event's own."""
         alone = self._own_basis(distinct, least)
-        return replace(alone, shared=spanned(alone.without_own(self.columns[: self.k]), distinct, least))
+        return replace(alone, shared=compute_basis(alone.without_own(self.columns[: self.k]), distinct, least))
 
     def _own_basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
-        own = tuple(spanned(self.own(e).T, distinct, least) for e in range(len(self.rows)))
+        own = tuple(compute_basis(self.own(e).T, distinct, least) for e in range(len(self.rows)))
         return SeparableBasis(np.empty((0, self.columns.shape[1])), own, self.rows)
 
 

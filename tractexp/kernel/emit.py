@@ -18,7 +18,7 @@ from tractexp.kernel.expressions import Expressions
 from tractexp.kernel.function import Function
 from tractexp.kernel.graph import Symbol
 from tractexp.kernel.kernel import PREFIX, Room
-from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, WIDTH
+from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, VECTOR_LANES
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers
 
@@ -32,7 +32,7 @@ Values = Mapping[Symbol, str]
 Samples = Callable[[str], str]  # an input by its name as a vector of the samples from one on
 
 
-def text(lowered: Lowered, title: str, integration: str, width: int = WIDTH) -> str:
+def text(lowered: Lowered, title: str, integration: str, width: int = VECTOR_LANES) -> str:
     """The kernel's IR, for vectors of `width` doubles. The same equations give the same text.
 
     Its second line tells the room that a call needs.
@@ -250,7 +250,7 @@ class _Emitter:
     def _missed(self, slacks: Sequence[str]) -> str:
         """By how much the requirements are missed in all; 0 where a steady state exists."""
         n = self.lanes
-        zero, most = n.constant(0.0), n.constant(steady.MOST)
+        zero, most = n.constant(0.0), n.constant(steady.LARGEST_MISS)
         miss = zero
         for slack in slacks:
             short = n.larger(zero, n.negative(slack))
@@ -272,7 +272,7 @@ class _Emitter:
             f" i64 {states})"
         )
         solution = [n.load(f.at(x, k * self.width)) for k in range(states)]
-        return [*solution, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.MOST))
+        return [*solution, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.LARGEST_MISS))
 
     # A sample and its steps
 

@@ -8,5 +8,5 @@ INPUTS = (
 )  # fmt: skip
 SMOOTH = {name: f"{name}_rate" for name in ("U", "v_d", "v_q", "v_zero")}  # what is a cubic between samples: its slope
 EVENT = ("U0", "omega_s0", "U20", "omega_n", "step")  # one number each per event
-WIDTH = 8  # lanes of a vector: wider than many a processor's, whose instructions then need not wait for each other
+VECTOR_LANES = 8  # lanes of a vector: wider than many a processor's, whose instructions then need not wait for each other
 LANES = 56  # candidates advanced together at most: enough to fill the waits of one step, and few enough for the cache

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
 
     from tractexp.kernel.lowered import Lowered, Phase
 
-LONG = 500  # nodes of an expression: no one reads more
+MOST_PRINTED_NODES = 500  # nodes of an expression: no one reads more
 
 
 def equations(lowered: "Lowered") -> Iterator[str]:
@@ -26,14 +26,14 @@ def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
     if not phase.expressions:
         return
     yield f"{when}:"
-    yield from (f"  {s} = {_printed(e)}" for s, e in (*phase.signals, *phase.steps))
+    yield from (f"  {s} = {_print_expression(e)}" for s, e in (*phase.signals, *phase.steps))
     slacks = (f"slack {k}" for k in range(1, len(phase.expressions) - len(names) + 1))
-    yield from (f"  {name} = {_printed(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
+    yield from (f"  {name} = {_print_expression(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
 
 
-def _printed(expression: "sympy.Expr") -> str:
+def _print_expression(expression: "sympy.Expr") -> str:
     nodes, waiting = 0, [expression]
-    while waiting and nodes <= LONG:  # a small graph may be a tree of millions
+    while waiting and nodes <= MOST_PRINTED_NODES:  # a small graph may be a tree of millions
         nodes += 1
         waiting += waiting.pop().args  # type: ignore[arg-type]
-    return str(expression) if nodes <= LONG else f"({nodes} terms and more)"
+    return str(expression) if nodes <= MOST_PRINTED_NODES else f"({nodes} terms and more)"

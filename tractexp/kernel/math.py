@@ -9,8 +9,8 @@ from typing import Any
 
 from tractexp.kernel.numbers import ORDERED
 
-ROUNDS = 6755399441055744.0  # 1.5 * 2**52: added, it rounds, and leaves the integer in the lowest bits
-WHOLE = 0x4338000000000000  # its bits
+ROUNDING_ADDEND = 6755399441055744.0  # 1.5 * 2**52: added, it rounds, and leaves the integer in the lowest bits
+ROUNDING_ADDEND_BITS = 0x4338000000000000  # its bits
 EXP = (  # 1 + x and eight terms more, of the least relative error, 1.7e-14, between -ln(2)/2 and ln(2)/2
     2.749308719602412e-06, 2.4880795102015093e-05, 0.00019841538962672454, 0.0013888811173253205,
     0.008333333095244361, 0.0416666669620825, 0.1666666666726472, 0.49999999999664546, 1.0, 1.0,
@@ -28,8 +28,8 @@ def exp(n: Any, x: Any) -> Any:
     """e^x, error below 2e-13 for |x| < 700, whose value it keeps beyond; 1 at 0; nan stays nan."""
     c = n.constant
     x = n.smaller(c(700.0), n.larger(c(-700.0), x))
-    whole = n.fused(x, c(1 / math.log(2)), c(ROUNDS), ORDERED)
-    half = n.multiply(n.subtract(whole, c(ROUNDS), ORDERED), c(math.log(2)), ORDERED)
+    whole = n.fused(x, c(1 / math.log(2)), c(ROUNDING_ADDEND), ORDERED)
+    half = n.multiply(n.subtract(whole, c(ROUNDING_ADDEND), ORDERED), c(math.log(2)), ORDERED)
     power = n.polynomial(n.subtract(x, half, ORDERED), EXP, ORDERED)
     shift = n.integer("shl", n.as_bits(whole), n.whole(52))
     return n.multiply(power, n.of_bits(n.integer("add", shift, n.whole(ONE))), ORDERED)
@@ -43,7 +43,7 @@ def log(n: Any, x: Any) -> Any:
     m = n.of_bits(n.integer("sub", bits, n.integer("shl", two, n.whole(52))))  # from sqrt(1/2) to sqrt(2)
     s = n.divide(n.subtract(m, c(1.0)), n.add(m, c(1.0)))
     odd = n.multiply(n.multiply(c(2.0), s), n.polynomial(n.multiply(s, s), ATANH))
-    exponent = n.subtract(n.of_bits(n.integer("add", two, n.whole(WHOLE))), c(ROUNDS), ORDERED)
+    exponent = n.subtract(n.of_bits(n.integer("add", two, n.whole(ROUNDING_ADDEND_BITS))), c(ROUNDING_ADDEND), ORDERED)
     spoilt = n.subtract(x, x, ORDERED)  # nan of nan and infinity, else 0
     return n.add(n.fused(exponent, c(math.log(2)), odd), spoilt, ORDERED)
 
@@ -67,8 +67,8 @@ def cos(n: Any, x: Any) -> Any:
 def _wave(n: Any, x: Any, ahead: int) -> Any:
     """sin(x + ahead pi/2)."""
     c = n.constant
-    shifted = n.fused(x, c(2 / math.pi), c(ROUNDS), ORDERED)
-    whole = n.subtract(shifted, c(ROUNDS), ORDERED)
+    shifted = n.fused(x, c(2 / math.pi), c(ROUNDING_ADDEND), ORDERED)
+    whole = n.subtract(shifted, c(ROUNDING_ADDEND), ORDERED)
     r = x
     for part in QUARTER:
         r = n.subtract(r, n.multiply(whole, c(part), ORDERED), ORDERED)

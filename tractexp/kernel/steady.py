@@ -7,11 +7,11 @@ taken. The Jacobian is by differences, its equations solved by Gaussian eliminat
 from tractexp.kernel.function import Function
 from tractexp.kernel.numbers import Numbers
 
-ITERATIONS = 40
-DIFFERENCE = 1e-7  # of 1 + |x|
-STILL = 1e-12  # of 1 + |x|: a lane that moves less has ended
+NEWTON_ITERATIONS = 40
+STATE_DIFFERENCE = 1e-7  # of 1 + |x|
+LARGEST_SETTLED_MOVE = 1e-12  # of 1 + |x|: a lane that moves less has ended
 SETTLED, BALANCED = 1e-9, 1e-6  # of what has ended: how far it moved last, and what is left of its balances
-MOST = 1e6  # by which a steady state is missed
+LARGEST_MISS = 1e6  # by which a steady state is missed
 ARGUMENTS = "ptr %rest, ptr %event, ptr %given, ptr %x, ptr %missed, ptr %work, i64 %n"
 
 
@@ -43,7 +43,7 @@ class _Newton:
         n.store(n.constant(1.0), self.moved)
         f.do(f"store i64 1, ptr {self.going}, align 8")
         load = f"load i64, ptr {self.going}, align 8"
-        with f.loop(0, ITERATIONS), f.when(f.fresh(f"icmp ne i64 {f.fresh(load)}, 0")):
+        with f.loop(0, NEWTON_ITERATIONS), f.when(f.fresh(f"icmp ne i64 {f.fresh(load)}, 0")):
             self.rest(self.balance)
             self.differences()
             self.elimination()
@@ -68,7 +68,7 @@ class _Newton:
         with f.loop(0, "%n", always=True) as k:
             place = self.at("%x", k)
             x = n.load(place)
-            ahead = n.multiply(n.constant(DIFFERENCE), n.add(n.constant(1.0), n.size(x)))
+            ahead = n.multiply(n.constant(STATE_DIFFERENCE), n.add(n.constant(1.0), n.size(x)))
             n.store(n.add(x, ahead), place)
             self.rest(self.beside)
             n.store(x, place)
@@ -126,7 +126,7 @@ class _Newton:
         """Half of 1 + |x| at most, by the lanes that have not ended."""
         f, n = self.f, self.n
         size, before = n.load(self.size), n.load(self.moved)
-        active = n.compare("ogt", before, n.constant(STILL))
+        active = n.compare("ogt", before, n.constant(LARGEST_SETTLED_MOVE))
         short = n.select(n.compare("olt", size, n.constant(0.5)), n.constant(1.0), n.divide(n.constant(0.5), size))
         with f.loop(0, "%n", always=True) as k:
             place = self.at("%x", k)
@@ -135,7 +135,7 @@ class _Newton:
             n.store(n.select(active, ahead, x), place)
         moved = n.select(active, size, before)
         n.store(moved, self.moved)
-        some = n.some(n.compare("ogt", moved, n.constant(STILL)))
+        some = n.some(n.compare("ogt", moved, n.constant(LARGEST_SETTLED_MOVE)))
         f.do(f"store i64 {f.value(f'zext i1 {some} to i64')}, ptr {self.going}, align 8")
 
     def verdict(self) -> None:
@@ -149,5 +149,5 @@ class _Newton:
         still = n.compare("ole", moved, n.constant(SETTLED))
         settled = n.logic("and", still, n.compare("olt", left, n.constant(BALANCED)))
         finite = n.compare("oge", left, n.constant(0.0))
-        far = n.select(finite, n.smaller(n.add(n.constant(1.0), left), n.constant(MOST)), n.constant(MOST))
+        far = n.select(finite, n.smaller(n.add(n.constant(1.0), left), n.constant(LARGEST_MISS)), n.constant(LARGEST_MISS))
         n.store(n.select(settled, n.constant(0.0), far), "%missed")

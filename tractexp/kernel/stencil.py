@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NUMBERS, WHOLE
-from tractexp.kernel.layout import WIDTH
+from tractexp.kernel.layout import VECTOR_LANES
 from tractexp.kernel.numbers import ORDERED, Numbers
 from tractexp.texts import text_in
 
@@ -79,9 +79,9 @@ class Stencil:
             raise ValueError(f"a stencil's parts must have a sample each, and {parts} of {samples} have {lengths}")
         beyond = max(int(each.max()) + last, -int(each.min()) - first, 0)
         rows, shared = [given[name] for name in self.rows], [given[name] for name in self.shared]
-        rooms = np.empty((len(rows) + len(shared) + len(self.sums), int(lengths.max()) + 2 * beyond + 3 * WIDTH))
+        rooms = np.empty((len(rows) + len(shared) + len(self.sums), int(lengths.max()) + 2 * beyond + 3 * VECTOR_LANES))
         given_at = [array.ctypes.data for array in (out, *rows, *shared, *numbers)]
-        rooms_at = rooms.ctypes.data + rooms.itemsize * (WIDTH + rooms.shape[1] * np.arange(len(rooms)))
+        rooms_at = rooms.ctypes.data + rooms.itemsize * (VECTOR_LANES + rooms.shape[1] * np.arange(len(rooms)))
         places = np.array([*given_at, *rooms_at], dtype=WHOLE)
         steps = [step // array.itemsize for array in (out, *rows) for step in array.strides[:2]]
         sizes = np.concatenate([np.array([*whole, beyond, *steps], dtype=WHOLE), ends.ravel()])
@@ -124,7 +124,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     used = symbols_of(expression)
     elements = {symbol: element for symbol, element in elements.items() if symbol in used}
     f = Function()
-    lanes, scalars = Numbers(f, WIDTH), Numbers(f, 1)
+    lanes, scalars = Numbers(f, VECTOR_LANES), Numbers(f, 1)
     given = ("out", *stencil.rows, *stencil.shared, *stencil.numbers)
     place = {name: f.address("%places", k) for k, name in enumerate(given)}
     held = (*stencil.rows, *stencil.shared, *stencil.sums)
@@ -137,7 +137,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
         begin, end = f.count("%sizes", at), f.count("%sizes", f.integer("add", at, 1))
         samples = f.integer("sub", end, begin)
         for name in stencil.shared:
-            _copied(lanes, f.at(place[name], begin), room[name], samples, beyond)
+            _emit_copy(lanes, f.at(place[name], begin), room[name], samples, beyond)
         with f.loop(0, channels) as c, f.loop(0, count) as i:
             row = f.integer("add", f.integer("mul", f.integer("add", f.integer("mul", e, channels), c), count), i)
             where = {}
@@ -145,9 +145,9 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
                 further = f.integer("add", f.integer("mul", c, channel), f.integer("mul", i, candidate))
                 where[name] = f.at(place[name], f.integer("add", begin, further))
             for name in stencil.rows:
-                _copied(lanes, where[name], room[name], samples, beyond, stencil.onward)
+                _emit_copy(lanes, where[name], room[name], samples, beyond, stencil.onward)
             for name, summed in stencil.sums.items():
-                _summed(lanes, room[summed], room[name], samples, beyond)
+                _emit_running_sum(lanes, room[summed], room[name], samples, beyond)
             scope: dict[Any, str] = {
                 symbol: lanes.everywhere(scalars.part(f.at(place[name], row), "")) for name, symbol in single.items()
             }
@@ -167,7 +167,7 @@ def ir_of(stencil: Stencil) -> tuple[int, int, str]:
     return min(offsets), max(offsets), text
 
 
-def _copied(lanes: Numbers, row: str, room: str, samples: str, beyond: str, onward: bool = False) -> None:
+def _emit_copy(lanes: Numbers, row: str, room: str, samples: str, beyond: str, onward: bool = False) -> None:
     """A row into its room, between what it is beyond its first and its last sample, each `beyond` times."""
     f, last = lanes.f, lanes.f.integer("sub", samples, 1)
 
@@ -185,7 +185,7 @@ def _copied(lanes: Numbers, row: str, room: str, samples: str, beyond: str, onwa
         lanes.store(edges[1], f.at(body, f.integer("add", samples, i)), alignment=8)
 
 
-def _summed(lanes: Numbers, row: str, room: str, samples: str, beyond: str) -> None:
+def _emit_running_sum(lanes: Numbers, row: str, room: str, samples: str, beyond: str) -> None:
     """The running sum of a row in its room from its first sample on, into another room.
 
     Beyond the ends it is a straight line. No sum depends on `beyond`, and so on what other rows need.

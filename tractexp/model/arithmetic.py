@@ -11,7 +11,7 @@ FUNCTIONS = SimpleNamespace(**{name: getattr(np, name, getattr(math, name)) for 
 VALUES = "at"  # what holds the numbers in such a text: at['T_m']
 
 
-def evaluated(texts: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, float]:
+def evaluate_texts(texts: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, float]:
     """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE 754 has it."""
     values = {name: np.float64(value) for name, value in numbers.items()}
     with np.errstate(all="ignore"):

@@ -12,9 +12,9 @@ from tractexp.model import sites
 from tractexp.model.drive import PHASORS
 from tractexp.model.equations import Equations
 from tractexp.model.parts import Effect, Measurement, Motor, Part, Static
-from tractexp.model.signature import asked
+from tractexp.model.signature import select_arguments
 
-ROUNDING = 1e-9  # how far from 1 a law may be before the event
+LAW_ROUNDING = 1e-9  # how far from 1 a law may be before the event
 
 
 class Refused(UserError):
@@ -25,7 +25,7 @@ class Refused(UserError):
         self.effect, self.reason = effect, reason
 
 
-def declared(
+def declare_equations(
     motor: Motor, static: Static, effects: Sequence[Effect], title: str, domain: str = PHASORS
 ) -> Equations:  # fmt: skip
     """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
@@ -88,7 +88,7 @@ def _static(eq: Equations, static: Static) -> None:
     f = sympy.Symbol("static_frequency", real=True)
     symbols = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
     law = static.law(u, **symbols)
-    for requirement in static.require(**asked(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})):
+    for requirement in static.require(**select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})):
         eq.require(*requirement)
     if law is None:
         return
@@ -98,7 +98,7 @@ def _static(eq: Equations, static: Static) -> None:
         eq.define(f.name, (eq.omega_n + eq.omega_s) / (eq.omega_n + eq.omega_s0), "f")
     P, Q = law
     powers = eq.place(sites.P_static, eq.P_s0 * P), eq.place(sites.Q_static, eq.Q_s0 * Q)
-    eq.consume(*powers, static.damping(**asked(static.damping, own)))
+    eq.consume(*powers, static.damping(**select_arguments(static.damping, own)))
 
 
 def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:
@@ -112,7 +112,7 @@ def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -
             raise UserError(
                 f"{where}: {what} reads {', '.join(sorted(map(str, value.free_symbols)))}, which it does not have"
             )
-        if not abs(float(value) - 1) < ROUNDING:
+        if not abs(float(value) - 1) < LAW_ROUNDING:
             raise UserError(f"{where}: {what} is {float(value):.6g} before the event (u = 1), and must be 1 there")
 
 

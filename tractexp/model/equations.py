@@ -17,9 +17,9 @@ from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.model import sites
 from tractexp.model.apart import Apart
 from tractexp.model.drive import OUTPUTS, PHASORS, WAVES
-from tractexp.model.graph import replaced
+from tractexp.model.graph import replace_symbols
 from tractexp.model.names import check_name
-from tractexp.model.real_form import RealForm, expanded
+from tractexp.model.real_form import RealForm, expand_definitions
 from tractexp.model.sites import Site
 from tractexp.model.states import UNSAID, Memory, Requirement, State
 from tractexp.model.symbols import is_real as _is_real
@@ -133,7 +133,7 @@ class Equations:
 
     def expression(self, site: Site | str) -> sympy.Expr:
         """What stands at a site now, before any later edit."""
-        site = sites.named(site)
+        site = sites.find_site(site)
         return self._drawn[site] if site in self._drawn else self.definitions[self[site]]
 
     @property
@@ -260,7 +260,7 @@ class Equations:
         The site keeps its name, so effects stack in any order. A real site must stay real. `shown` is what LaTeX
         prints where the change is the solution of an equation. Raises `Unfit` where the model lacks the site.
         """
-        site = sites.named(site)
+        site = sites.find_site(site)
         before = self.expression(site)
         if site is sites.current:
             before = self._named("current", before)
@@ -449,9 +449,9 @@ class Equations:
         without_static = {self.P_s0: sympy.Integer(0), self.Q_s0: sympy.Integer(0)}
         if self.waves:  # space vectors first by their parts, which are short: products across names are long
             whole = self.parts(self.v * conjugate(self._drawn[sites.current]))
-            others = [replaced(power, without_static | self._starts()) for power in whole]
+            others = [replace_symbols(power, without_static | self._starts()) for power in whole]
         else:
-            powers = (replaced(self.expand(power), without_static) for power in (self.P, self.Q))
+            powers = (replace_symbols(self.expand(power), without_static) for power in (self.P, self.Q))
             others = [self.real(self.before(power)) for power in powers]
         lost = [self.real(self.before(power)) for power in self._lost]
         size = sum(part**2 for part in self.parts(self.before(self.v)))
@@ -477,7 +477,7 @@ class Equations:
                     )
         for state in self.states.values():
             if state.derived:
-                state.initial = replaced(self.before(state.initial), values)
+                state.initial = replace_symbols(self.before(state.initial), values)
 
     def _check_still(self, what: str, expression: sympy.Expr) -> None:
         """Raise `UserError` where a value before the event is written in what moves after it."""
@@ -489,7 +489,7 @@ class Equations:
 
     def before(self, expression: sympy.Expr) -> sympy.Expr:
         """An expression's value before the event, of constants: `eq.before(eq.omega)` is the speed there."""
-        return replaced(self.expand(expression), self._starts())
+        return replace_symbols(self.expand(expression), self._starts())
 
     def _starts(self) -> dict[Symbol, sympy.Expr]:
         """What stands before the event for all that moves, states and their parts by what they start from."""
@@ -507,7 +507,7 @@ class Equations:
 
     def expand(self, expression: sympy.Expr, named: Callable[[Symbol], bool] = lambda _: True) -> sympy.Expr:
         """The expression with the quantities that are `named` (by default all) replaced by what they stand for."""
-        return expanded(sympy.sympify(expression), self.definitions, named)
+        return expand_definitions(sympy.sympify(expression), self.definitions, named)
 
     def real_states(self) -> list[tuple[Symbol, sympy.Expr, sympy.Expr]]:
         """(symbol, derivative, initial) of each real state, phasors split in two, names expanded."""

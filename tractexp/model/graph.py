@@ -8,7 +8,7 @@ import sympy
 from tractexp.kernel.graph import Basic, Symbol
 
 
-def replaced(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
+def replace_symbols(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
     """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
     new: dict[Basic, Basic] = {**substitutes}
 

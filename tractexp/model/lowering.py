@@ -17,10 +17,10 @@ from tractexp.kernel.graph import Symbol, arguments, symbols_of
 from tractexp.kernel.layout import EVENT, INPUTS
 from tractexp.kernel.lowered import Lowered, Phase, symbols
 from tractexp.model.equations import Equations
-from tractexp.model.graph import replaced
+from tractexp.model.graph import replace_symbols
 
 POINTS, TRIES = 5, 200  # admissible points looked at, of so many that are drawn
-ROUNDING = 1e-7  # of a balance [pu/s, rad/s²]: above what doubles leave of zero, below what a guess misses by
+BALANCE_ROUNDING = 1e-7  # of a balance [pu/s, rad/s²]: above what doubles leave of zero, below what a guess misses by
 EVENTS: Mapping[str, tuple[float, float]] = {
     "U0": (0.9, 1.1), "omega_s0": (-3.0, 3.0), "U20": (0.01, 0.05), "omega_n": (310.0, 380.0), "step": (1e-3, 1e-2),
     "P0": (0.5, 1.5), "Q0": (0.3, 0.9),
@@ -109,10 +109,10 @@ def lower(eq: Equations) -> Lowered:
     output = _phase(hoist, [eq.real(e) for e in outputs.values()], steps)
     first = [i for _, _, i in rows] + [eq.real(m.initial) for m in eq.memories.values()]
     begin = dict(zip(starts, first, strict=True))
-    slack = [replaced(eq.expand(r.slack), begin) for r in eq.requirements]
+    slack = [replace_symbols(eq.expand(r.slack), begin) for r in eq.requirements]
     start = _phase(None, first + slack)
     at_rest = eq.at_rest() | dict(zip((*states, *memories), starts, strict=True))
-    balances = _phase(None, [replaced(b, at_rest) for b in eq.real_balances()])
+    balances = _phase(None, [replace_symbols(b, at_rest) for b in eq.real_balances()])
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(
@@ -120,10 +120,10 @@ def lower(eq: Equations) -> Lowered:
         tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases, tuple(outputs),
     )  # fmt: skip
     _check_closed(lowered, lane)
-    return replace(lowered, rest=None) if not eq.edits and _settled(eq, start, balances, starts) else lowered
+    return replace(lowered, rest=None) if not eq.edits and _is_steady_state_exact(eq, start, balances, starts) else lowered
 
 
-def _settled(eq: Equations, start: Phase, rest: Phase, starts: Sequence[Symbol]) -> bool:
+def _is_steady_state_exact(eq: Equations, start: Phase, rest: Phase, starts: Sequence[Symbol]) -> bool:
     """Whether the steady state that the parts declare is exact, and no first guess that the kernel has to solve for.
 
     Every balance vanishes there, at random parameters and events. `start` computes `starts` and then the slack of each
@@ -140,14 +140,14 @@ def _settled(eq: Equations, start: Phase, rest: Phase, starts: Sequence[Symbol])
     admissible = finite & (np.array([np.ones(TRIES), *slacks]) >= 0).all(axis=0)
     points = np.flatnonzero(admissible)[:POINTS]
     missed = np.abs(np.array([np.zeros(TRIES), *balances])[:, points]).max(axis=0)
-    return len(points) == POINTS and bool((missed < ROUNDING).all())
+    return len(points) == POINTS and bool((missed < BALANCE_ROUNDING).all())
 
 
 def _phase(
     hoist: _Hoister | None, expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr] | None = None
 ) -> Phase:
     signals = ()
-    needed = _needed(expressions, steps or {})
+    needed = _select_needed_steps(expressions, steps or {})
     targets, expressions = list(needed), [*needed.values(), *expressions]
     if hoist is not None:
         expressions = [hoist(e) for e in expressions]
@@ -157,7 +157,7 @@ def _phase(
     return Phase(signals, _in_order(computed), tuple(expressions[len(targets) :]))
 
 
-def _needed(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
+def _select_needed_steps(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
     """The steps that some expressions need, and those that these need in turn."""
     needed: set[Symbol] = set()
     new = set().union(*map(symbols_of, expressions)) & steps.keys()

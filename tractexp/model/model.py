@@ -13,17 +13,17 @@ from tractexp.errors import MODEL, UserError, check_choice
 from tractexp.kernel import objects
 from tractexp.kernel.kernel import NOTHING, Kernel
 from tractexp.kernel.layout import EVENT, INPUTS, LANES
-from tractexp.model.arithmetic import evaluated
+from tractexp.model.arithmetic import evaluate_texts
 from tractexp.model.drive import DOMAINS, PHASORS, WAVES, Drive
 from tractexp.model.parts import Effect, Measurement, Motor, Static
 from tractexp.parameter import Parameter
 from tractexp.record.window import averaged_power
 from tractexp.texts import text_of
 
-TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
+SUBSTEP_TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
 MOST_STORED = 8_000_000  # numbers of responses that are held at once
-LONGEST = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
+MOST_STEPS_A_CALL = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
 CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
 
 
@@ -124,9 +124,9 @@ class Model:
     @functools.cached_property
     def equations(self) -> Any:
         """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""
-        from tractexp.model.declaration import declared
+        from tractexp.model.declaration import declare_equations
 
-        return declared(self.motor, self.static, self.effects, self.title, self.domain)
+        return declare_equations(self.motor, self.static, self.effects, self.title, self.domain)
 
     def acceptance(self, effect: Effect) -> "Acceptance":
         """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
@@ -196,7 +196,7 @@ class Model:
                 outputs[:, :, part] = averaged_power(outputs[:, :, part], drive.inputs[0, part], window)
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
-            outputs = _observed(effect, outputs, drive, columns)
+            outputs = _observe_outputs(effect, outputs, drive, columns)
         return ModelResponse(outputs, miss)
 
     def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
@@ -226,7 +226,7 @@ class Model:
         self,
         drive: Drive,
         values: np.ndarray,
-        tolerance: float = TOLERANCE,
+        tolerance: float = SUBSTEP_TOLERANCE,
         share: float = 1.0,
         until: Sequence[float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -285,13 +285,13 @@ class Model:
         substitutes = dict(zip((*self.names, "P0", "Q0", *EVENT), numbers, strict=True))
         starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[0, :, 0].tolist()
         substitutes |= dict(zip(stated["starts"], starts, strict=True))
-        return evaluated(stated["quantities"], substitutes)
+        return evaluate_texts(stated["quantities"], substitutes)
 
     def _at_rest(self) -> str:
-        from tractexp.model.printed import stated
+        from tractexp.model.printed import list_stated_quantities
 
         starts = [symbol.name for symbol in self.equations.real_starts()]
-        return json.dumps({"starts": starts, "quantities": stated(self.equations)})
+        return json.dumps({"starts": starts, "quantities": list_stated_quantities(self.equations)})
 
     def latex(self) -> list[str]:
         """The model's equations, one a line."""
@@ -317,7 +317,7 @@ class Model:
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
-        lanes = LANES * max(1, int(LONGEST / (LANES * max(drive.samples * int(steps.max()), 1))))
+        lanes = LANES * max(1, int(MOST_STEPS_A_CALL / (LANES * max(drive.samples * int(steps.max()), 1))))
         if n > lanes:
             for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
                 some = np.ascontiguousarray(candidates[..., part])
@@ -341,7 +341,7 @@ class Model:
         return sums, miss
 
 
-def _observed(effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]) -> np.ndarray:
+def _observe_outputs(effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]) -> np.ndarray:
     """Outputs (C, n, N) as a recorder shows them: changed are those of candidates with an effect off its null."""
     sizes = [columns[p.name] != p.null for p in effect.parameters if p.null is not None]
     off = np.any(sizes, axis=(0, 1)) if sizes else np.ones(outputs.shape[1], dtype=bool)

@@ -18,7 +18,7 @@ KINDS = {
     "fadd": "additions", "fsub": "additions", "fmul": "multiplications", "fdiv": "divisions", "fcmp": "others",
     "shl": "others", "ashr": "others",
 }  # fmt: skip
-POINTS = 2  # of each step, at which what is the same in all lanes is computed: its beginning and its middle
+POINTS_A_STEP = 2  # of each step, at which what is the same in all lanes is computed: its beginning and its middle
 
 
 @dataclass(frozen=True)
@@ -70,4 +70,4 @@ def count(text: str) -> Cost:
             if kind:
                 totals[inside[-1]][kind] += 1
     points, signals, outputs, step = (Operations(**total) for total in totals.values())
-    return Cost(step + points * (POINTS / LANES), outputs + signals * (1 / LANES))
+    return Cost(step + points * (POINTS_A_STEP / LANES), outputs + signals * (1 / LANES))

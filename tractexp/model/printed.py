@@ -30,7 +30,7 @@ def lines(eq: "Equations") -> list[str]:
     return equations + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]
 
 
-def changed(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:
+def list_changed_lines(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:
     """(line before, line after) of equations that are not as they were; None before one that came in.
 
     What holds before the event is left out: it follows from the others.
@@ -46,7 +46,7 @@ class _Printer(PythonCodePrinter):
         return f"{VALUES}[{expr.name!r}]"
 
 
-def stated(eq: "Equations") -> dict[str, str]:
+def list_stated_quantities(eq: "Equations") -> dict[str, str]:
     """{quantity: text of its value before the event, of what stands above it}; phasors are left out."""
     printer, texts = _Printer({"strict": True}), dict[str, str]()
     for symbol in eq.definitions:

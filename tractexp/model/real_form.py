@@ -8,19 +8,19 @@ import sympy
 from sympy import I
 
 from tractexp.kernel.graph import Symbol, nodes, operations, symbols_of
-from tractexp.model.graph import as_real_imag, halves, replaced
+from tractexp.model.graph import as_real_imag, halves, replace_symbols
 from tractexp.model.symbols import is_real, phasor_parts, real_symbol, start_symbol
 
-LONG = 300  # nodes of an expression
+MOST_EXPANDED_NODES = 300  # nodes of an expression
 Halves = tuple[sympy.Expr, sympy.Expr]
 
 
-def expanded(
+def expand_definitions(
     expression: sympy.Expr, definitions: Mapping[Symbol, sympy.Expr], named: Callable[[Symbol], bool] = lambda _: True
 ) -> sympy.Expr:
     """The expression with the defined symbols that are `named` (by default all) replaced by what they stand for."""
     while names := {s for s in symbols_of(expression) & definitions.keys() if named(s)}:
-        expression = replaced(expression, {s: definitions[s] for s in names})
+        expression = replace_symbols(expression, {s: definitions[s] for s in names})
     return expression
 
 
@@ -61,23 +61,23 @@ class RealForm:
 
     def _at_once(self, expression: sympy.Expr) -> Halves:
         """Complex names are expanded first."""
-        whole = expanded(expression, self.definitions, lambda s: not s.is_real)
-        lowered = replaced(whole, self._complex_states())
+        whole = expand_definitions(expression, self.definitions, lambda s: not s.is_real)
+        lowered = replace_symbols(whole, self._complex_states())
         if is_real(lowered):
             both = (lowered if lowered.is_real else _shorter(lowered), sympy.Integer(0))
         else:
             both = map(_shorter, as_real_imag(lowered))
-        real, imaginary = (replaced(e, self._named(e)) for e in both)
+        real, imaginary = (replace_symbols(e, self._named(e)) for e in both)
         return real, imaginary
 
     def _name_by_name(self, expression: sympy.Expr) -> Halves:
         """Every name, real or complex, is lowered by itself."""
         pairs = {s: phasor_parts(s) for s in symbols_of(expression) & self.definitions.keys() if not s.is_real}
-        lowered = replaced(expression, self._complex_states() | {s: a + I * b for s, (a, b) in pairs.items()})
+        lowered = replace_symbols(expression, self._complex_states() | {s: a + I * b for s, (a, b) in pairs.items()})
         values: dict[Symbol, sympy.Expr] = {}
         for s, pair in pairs.items():
             values |= zip(pair, self.parts(self.definitions[s]), strict=True)
-        real, imaginary = (replaced(_shorter(e), values | self._named(e)) for e in halves(lowered))
+        real, imaginary = (replace_symbols(_shorter(e), values | self._named(e)) for e in halves(lowered))
         return real, imaginary
 
     def _named(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
@@ -90,7 +90,7 @@ def _shorter(expression: sympy.Expr) -> sympy.Expr:
 
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
-    if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), LONG + 1)) > LONG:
+    if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), MOST_EXPANDED_NODES + 1)) > MOST_EXPANDED_NODES:
         return expression
     if not any(
         isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args) for part in nodes(expression)

@@ -41,7 +41,7 @@ def check_signature(
         )
 
 
-def asked(method: Any, given: dict[str, Any]) -> dict[str, Any]:
+def select_arguments(method: Any, given: dict[str, Any]) -> dict[str, Any]:
     """Those of `given` that a method asks for by name."""
     arguments = inspect.signature(method).parameters.values()
     if any(a.kind is a.VAR_KEYWORD for a in arguments):

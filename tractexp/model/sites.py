@@ -79,7 +79,7 @@ def __getattr__(name: str) -> NoReturn:
     raise Unknown(f"there is no 'sites.{name}'{among(name, SITES, 'Sites')}")
 
 
-def named(what: "Site | str") -> Site:
+def find_site(what: "Site | str") -> Site:
     """The site itself, or the one of that name. Raises `UserError` with the nearest name where there is none."""
     if isinstance(what, Site):
         return what

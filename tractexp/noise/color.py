@@ -16,8 +16,8 @@ from tractexp.kernel.stencil import Stencil
 from tractexp.record.change import runs
 
 HIGHEST_ORDER = 16
-SMALLEST = 1e-9  # pu: stands for the noise of a record that has none
-FEWEST = 20  # samples to estimate a noise model from
+SMALLEST_DEVIATION = 1e-9  # pu: stands for the noise of a record that has none
+FEWEST_NOISE_SAMPLES = 20  # samples to estimate a noise model from
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +66,7 @@ class Autoregression:
                     white[:, lag:] += weights[lag] * y[:, :-lag]
         else:
             taps = {f"c{lag}": weight for lag, weight in enumerate(weights)}
-            filtered(p)(out[None], parts, np.array(0), y=rows[None], **taps)
+            build_filter_stencil(p)(out[None], parts, np.array(0), y=rows[None], **taps)
         for part in parts if p else ():  # of the first few fewer are known
             first = rows[:, part][:, :p]
             known = self._beginning[: first.shape[1], : first.shape[1]]
@@ -89,7 +89,7 @@ class Autoregression:
 
 
 @functools.cache
-def filtered(order: int) -> Stencil:
+def build_filter_stencil(order: int) -> Stencil:
     """The sum of the samples 0, 1, ... `order` before each, times the numbers c0, c1, ... of their row."""
 
     def expression(y: Callable[[int], Any], **c: Any) -> Any:
@@ -100,14 +100,14 @@ def filtered(order: int) -> Stencil:
 
 def white_noise(deviation: float) -> Autoregression:
     """Independent samples of one standard deviation [pu]."""
-    return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST)]))
+    return Autoregression(np.empty((1, 0)), np.array([max(deviation, SMALLEST_DEVIATION)]))
 
 
 def check_count(samples: int) -> None:
     """Raise `UserError` for too few quiet samples."""
-    if samples < FEWEST:
+    if samples < FEWEST_NOISE_SAMPLES:
         raise UserError(
-            f"the noise cannot be told from {samples} quiet samples before and after the dips: at least {FEWEST} are"
+            f"the noise cannot be told from {samples} quiet samples before and after the dips: at least {FEWEST_NOISE_SAMPLES} are"
             " needed; give records that start earlier"
         )
 
@@ -123,14 +123,14 @@ def fit_autoregression(
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
     highest = min(highest, count // 10, max(map(len, stretches), default=1) - 1)
     forward, backward = [x[1:] for x in stretches], [x[:-1] for x in stretches]
-    table, variance = [np.empty(0)], [max(power, SMALLEST**2)]
+    table, variance = [np.empty(0)], [max(power, SMALLEST_DEVIATION**2)]
     for _ in range(highest):
         both = sum(float(f @ b) for f, b in zip(forward, backward, strict=True))
         energy = sum(float(f @ f + b @ b) for f, b in zip(forward, backward, strict=True))
         reflection = 2 * both / energy if energy > 0 else 0.0
         last = table[-1]
         table.append(np.concatenate((last - reflection * last[::-1], [reflection])))
-        variance.append(max(variance[-1] * (1 - reflection**2), SMALLEST**2))
+        variance.append(max(variance[-1] * (1 - reflection**2), SMALLEST_DEVIATION**2))
         pairs = [(f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)]
         forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
     orders = np.arange(len(variance))

@@ -17,7 +17,7 @@ from tractexp.noise.color import Autoregression, white_noise
 from tractexp.noise.random_walk import Load, RandomWalk
 
 BURN_IN = 500  # samples
-UNSEEN = 0.05  # standard deviations of the fast noise: shapes that do less are left out
+LEAST_SHAPE_DEVIATION = 0.05  # standard deviations of the fast noise: shapes that do less are left out
 
 Pair = tuple[Autoregression, ...]  # of P and of Q, or of each current
 Shrunk = tuple[np.ndarray, np.ndarray]  # orthonormal shapes (k, R), and how much of each goes (k,)
@@ -255,5 +255,5 @@ def _shrunk(shapes: np.ndarray) -> Shrunk:
     """
     flat = shapes.reshape(len(shapes), -1)
     squares, vectors = np.linalg.eigh(flat @ flat.T)
-    seen = squares > UNSEEN**2
+    seen = squares > LEAST_SHAPE_DEVIATION**2
     return (vectors[:, seen] / np.sqrt(squares[seen])).T @ flat, 1 - 1 / np.sqrt(1 + squares[seen])

@@ -6,17 +6,17 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tractexp.model.drive import Drive
-from tractexp.noise.color import SMALLEST, Autoregression, check_count, fit_autoregression, white_noise
+from tractexp.noise.color import SMALLEST_DEVIATION, Autoregression, check_count, fit_autoregression, white_noise
 from tractexp.noise.model import Noise
 from tractexp.noise.random_walk import RandomWalk, without_slow
 from tractexp.record import Event
 
-HIGHEST = 8  # order of the autoregressions
-TAIL = 0.35  # share of the record after the dip that counts as quiet
-SHORTEST = 8  # samples of a stretch
-MANY = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
+HIGHEST_NOISE_ORDER = 8  # order of the autoregressions
+QUIET_TAIL_SHARE = 0.35  # share of the record after the dip that counts as quiet
+SHORTEST_QUIET_STRETCH = 8  # samples of a stretch
+FEWEST_EMPIRICAL_SAMPLES = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
 DEGREES = np.array([2.5, 3, 3.5, 4, 5, 6, 8, 10, 15, 20])  # of freedom of Student's t that are tried
-CLEARLY = 10.0  # of twice the log-likelihood: by chance once in some 1,500
+LEAST_QUIET_GAIN = 10.0  # of twice the log-likelihood: by chance once in some 1,500
 LOUDER = 1e-3  # p below which the end of a record is louder than its beginning
 QUANTILES = 20_000  # that stand for a law
 
@@ -26,9 +26,9 @@ def quiet_stretches(events: Sequence[Event], drive: Drive) -> list[slice]:
     parts = []
     for e, event in enumerate(events):
         first, n = int(drive.first[e]), event.record.samples
-        tail = round(n - TAIL * (n - event.end))
+        tail = round(n - QUIET_TAIL_SHARE * (n - event.end))
         parts += [slice(first + event.first, first + event.start), slice(first + tail, first + n)]
-    return [p for p in parts if p.stop - p.start >= SHORTEST]
+    return [p for p in parts if p.stop - p.start >= SHORTEST_QUIET_STRETCH]
 
 
 def estimate(
@@ -58,9 +58,9 @@ def estimate(
     if slow is not None:
         fast = [[without_slow(p) for p in channel] for channel in fast]
     # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
-    fitted = [fit_autoregression(channel, HIGHEST, sparing=True) for channel in fast]
+    fitted = [fit_autoregression(channel, HIGHEST_NOISE_ORDER, sparing=True) for channel in fast]
     shocks = None
-    if count >= MANY and measured.all():
+    if count >= FEWEST_EMPIRICAL_SAMPLES and measured.all():
         shocks = tuple(map(_shocks, fitted, fast))
     colors = iter(fitted)
     pair = tuple(next(colors) if there else white_noise(1.0) for there in measured)
@@ -77,13 +77,13 @@ def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
     if not (late and calm):
         return False
     (a, n), (b, m) = (_variance(pieces) for pieces in (late, calm))
-    return bool(fdtrc(n, m, a / max(b, SMALLEST**2)) < LOUDER)
+    return bool(fdtrc(n, m, a / max(b, SMALLEST_DEVIATION**2)) < LOUDER)
 
 
 def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
     """Variance of stretches, and how many independent samples it is worth."""
     count = sum(map(len, pieces))
-    color = fit_autoregression(list(pieces), min(HIGHEST, max(count // 10, 0)), sparing=True)
+    color = fit_autoregression(list(pieces), min(HIGHEST_NOISE_ORDER, max(count // 10, 0)), sparing=True)
     return sum(float(p @ p) for p in pieces) / max(count, 1), max(Noise(((color,),)).worth(count), 2.0)
 
 
@@ -109,7 +109,7 @@ def _heavy(unit: np.ndarray) -> np.ndarray | None:
     constant = gammaln((freedom + 1) / 2) - gammaln(freedom / 2) - np.log(np.pi * (freedom - 2)) / 2
     likely = (constant - (freedom + 1) / 2 * np.log1p(unit**2 / (freedom * scale))).sum(axis=1)
     normal = -(np.log(2 * np.pi) + unit**2).sum() / 2
-    if 2 * (likely.max() - normal) < CLEARLY:
+    if 2 * (likely.max() - normal) < LEAST_QUIET_GAIN:
         return None
     return _quantiles(float(DEGREES[likely.argmax()]))
 

@@ -12,13 +12,13 @@ import numpy as np
 
 from tractexp.model.drive import Drive
 from tractexp.noise.color import Autoregression, fit_autoregression
-from tractexp.noise.span import spanned
+from tractexp.noise.span import compute_basis
 from tractexp.record import Event
 
 MODES = 48
-LEAST = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
-SLOW = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-DISTINCT = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
+LEAST_LEVEL_SHARE = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
+WANDERING_COSINES = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
+LEAST_DIRECTION_SHARE = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
 LESS = 1.0  # log-likelihood below the largest at which the intensity is taken: the larger end of an interval of 84 %
 GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
 STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
@@ -90,7 +90,7 @@ class RandomWalk:
         n = part.stop - part.start
         walk = _random_walk(n, self.step, min(MODES, n // 8))
         level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
-        whole = max(abs(level[0]), LEAST * float(np.linalg.norm(level)))
+        whole = max(abs(level[0]), LEAST_LEVEL_SHARE * float(np.linalg.norm(level)))
         together = np.sqrt(self.intensity[0]) / whole * walk[:, None] * power
         apart = np.sqrt(self.intensity[1]) * walk * self.load.apparent[part]
         return np.concatenate([together, np.stack([np.zeros_like(apart), apart], axis=1)])
@@ -115,7 +115,7 @@ def find(
     log-likelihood gains `seen`. What is left of the events counts, too, where both show twice that, but no more than
     the stretches before them allow: what answers a dip does not wander.
     """
-    stretches = [b for b in before if b.shape[1] >= 8 * (SLOW + 2)]
+    stretches = [b for b in before if b.shape[1] >= 8 * (WANDERING_COSINES + 2)]
     if not stretches:
         return None
     fast = [fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)]
@@ -156,7 +156,7 @@ def _last(likelihood: np.ndarray) -> int:
 
 def without_slow(stretch: np.ndarray) -> np.ndarray:
     """A stretch (n,) without its mean and slowest cosines."""
-    basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), SLOW)])
+    basis = np.vstack([np.ones(len(stretch)), cosines(len(stretch), WANDERING_COSINES)])
     basis /= np.linalg.norm(basis, axis=1, keepdims=True)
     return stretch - (stretch @ basis.T) @ basis
 
@@ -183,7 +183,7 @@ def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: flo
     """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of one channel."""
     total = np.zeros(len(GRID))
     for stretch in without_drift(stretches):
-        total += _of(stretch, np.ones((1, len(stretch))), fast, step)
+        total += _compute_log_likelihood(stretch, np.ones((1, len(stretch))), fast, step)
     return total
 
 
@@ -192,14 +192,14 @@ def _within(rest: Rest, channel: int, fast: Autoregression, step: float) -> np.n
     columns = rest.columns[:, channel]
     columns = columns[np.linalg.norm(columns, axis=1) > 0]
     fixed = np.vstack([np.ones(columns.shape[1]), columns])
-    return _of(rest.left[channel], fixed, fast, step, rest.profile)
+    return _compute_log_likelihood(rest.left[channel], fixed, fast, step, rest.profile)
 
 
-def _of(
+def _compute_log_likelihood(
     stretch: np.ndarray, columns: np.ndarray, fast: Autoregression, step: float, profile: np.ndarray | float = 1.0
 ) -> np.ndarray:  # fmt: skip
     """Logarithm of the likelihood of each intensity in a stretch (n,) with columns (k, n) of any amplitude."""
     n, k = len(stretch), len(columns)
     modes = _random_walk(n, step, min(MODES, n // 8)) * profile
     rows = fast.whiten(np.vstack([columns, stretch, modes]), np.ones(n, dtype=bool))
-    return Walk.of(rows[k], spanned(rows[:k], DISTINCT), rows[k + 1 :]).likelihood(GRID)
+    return Walk.of(rows[k], compute_basis(rows[:k], LEAST_DIRECTION_SHARE), rows[k + 1 :]).likelihood(GRID)

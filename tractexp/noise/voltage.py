@@ -17,12 +17,12 @@ from tractexp.record.change import runs
 
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
 AGREE = 2.5  # standard deviations within which they do
-MARGIN = 3  # samples beside an edge that are not smooth
+EDGE_MARGIN = 3  # samples beside an edge that are not smooth
 BOUND, BESIDE = 4.0, 3.0  # standard deviations of an average that smoothing may leave, and beside an edge
-SHORTEST = 24  # samples of a stretch worth smoothing
+SHORTEST_SMOOTHED_STRETCH = 24  # samples of a stretch worth smoothing
 DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
-MOST = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
-UNSEEN = 0.01  # share of a direction's noise: less of it is left out
+MOST_FOLLOWED_SAMPLES = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
+LEAST_NOISE_SHARE = 0.01  # share of a direction's noise: less of it is left out
 SILENT = 1e-5  # pu: less noise than this is none
 
 
@@ -44,14 +44,14 @@ class SmoothedEvent:
         return replace(self.event, record=replace(record, U=record.U + self.errors[shape]))
 
 
-def smoothed(event: Event) -> SmoothedEvent:
+def smooth_voltage(event: Event) -> SmoothedEvent:
     """Take the noise of the voltage out of one event."""
     U, deviation = event.record.U, noise_of(event.record.U[event.steady])
     if deviation < SILENT:
         return SmoothedEvent(event, np.empty((0, len(U))))
     rough = _edges(U, deviation)
     rough[[event.start, min(event.end, len(U) - 1)]] = True
-    rough = _widened(rough)
+    rough = _widen_rough_stretches(rough)
     while True:
         smooth, errors = U.copy(), []
         for part in runs(~rough):
@@ -59,14 +59,14 @@ def smoothed(event: Event) -> SmoothedEvent:
             smooth[part] = curve
             errors.append(np.zeros((len(own), len(U))))
             errors[-1][:, part] = own
-        far = _distance(U - smooth, deviation) / np.where(_widened(rough), BESIDE, BOUND) * ~rough
+        far = _distance(U - smooth, deviation) / np.where(_widen_rough_stretches(rough), BESIDE, BOUND) * ~rough
         if far.max() < 1:
             break
         rough[far.argmax()] = True
-        rough = _widened(rough)
+        rough = _widen_rough_stretches(rough)
     raw = np.flatnonzero(rough)
     apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
-    raw = raw[np.argsort(apart, kind="stable")[:MOST]]
+    raw = raw[np.argsort(apart, kind="stable")[:MOST_FOLLOWED_SAMPLES]]
     errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
     return SmoothedEvent(replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors))
 
@@ -89,11 +89,11 @@ def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
     return low > high
 
 
-def _widened(rough: np.ndarray) -> np.ndarray:
+def _widen_rough_stretches(rough: np.ndarray) -> np.ndarray:
     """Rough samples with those beside them, and the stretches between them that are too short to be smoothed."""
-    wide = np.convolve(rough, np.ones(2 * MARGIN + 1), "same") > 0.5
+    wide = np.convolve(rough, np.ones(2 * EDGE_MARGIN + 1), "same") > 0.5
     for part in runs(~wide):
-        if part.stop - part.start < SHORTEST:
+        if part.stop - part.start < SHORTEST_SMOOTHED_STRETCH:
             wide[part] = True
     return wide
 
@@ -115,5 +115,5 @@ def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
     walk = Walk.of(U / deviation, fixed, cosines(n, count) / np.arange(1, count + 1)[:, None] ** 2)
     share = walk.share(walk.likeliest)
     curve = (U @ fixed.T) @ fixed + deviation * ((walk.along * share) @ walk.basis)
-    seen = share > UNSEEN
+    seen = share > LEAST_NOISE_SHARE
     return curve, deviation * np.concatenate([fixed, np.sqrt(share[seen, None]) * walk.basis[seen]])

@@ -10,13 +10,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.noise.color import SMALLEST, Autoregression, check_count, of_orders, white_noise
+from tractexp.noise.color import SMALLEST_DEVIATION, Autoregression, check_count, of_orders, white_noise
 from tractexp.noise.model import Noise
 
-HIGHEST = 48  # order of the autoregressions
+HIGHEST_WAVE_ORDER = 48  # order of the autoregressions
 GAINED = 1.001  # times its least variance: a prediction as good is good enough
 SHARES = (0.0, 0.25, 0.5, 1.0)  # of the voltage's deviations from its periodic course that are noise
-CLEARLY = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
+LEAST_WAVE_GAIN = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
 FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that is left in quiet
 FINER = np.geomspace(FLOORS[1], 1 / FLOORS[1], 15)  # times the best of these
 
@@ -38,18 +38,18 @@ def of_waves(
     count = sum(part.stop - part.start for part in quiet)
     check_count(count)
     vector = residuals[0] + 1j * residuals[1] if phases == 3 else residuals[0]
-    first = _fitted([vector[part][valid[0, part]] for part in quiet], answers[0])
+    first = _fit_wave_noise([vector[part][valid[0, part]] for part in quiet], answers[0])
     pair = [first, first if phases == 3 else white_noise(1.0), white_noise(1.0)]
     if measured[2]:
-        pair[2] = _fitted([residuals[2, part][valid[2, part]] for part in quiet], answers[1])
+        pair[2] = _fit_wave_noise([residuals[2, part][valid[2, part]] for part in quiet], answers[1])
     return Noise((tuple(pair),), np.eye(3), input_modes=input_modes, vector=phases == 3)
 
 
-def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
+def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     """The most likely sum of white noise and noise of the voltage, of stretches (n_i,) real or complex."""
     per = 2 if np.iscomplexobj(pieces[0]) else 1
-    level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST)
-    passed = covariances(answer, HIGHEST)
+    level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST_DEVIATION)
+    passed = covariances(answer, HIGHEST_WAVE_ORDER)
     if per == 1:
         passed = np.real(passed)
     shares = SHARES if passed[0].real > (1e-3 * level) ** 2 else (0.0,)
@@ -57,8 +57,8 @@ def _fitted(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
     def of(share: float, floor: float) -> tuple[float, float, float, Autoregression]:
         whole = share**2 * passed
         whole[0] += (floor * level) ** 2
-        color = predicted(whole)
-        price = sum(_surprise(color, piece, per) for piece in pieces) - CLEARLY * (share == 1.0)
+        color = solve_levinson(whole)
+        price = sum(_surprise(color, piece, per) for piece in pieces) - LEAST_WAVE_GAIN * (share == 1.0)
         return price, share, floor, color
 
     tried = [of(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
@@ -81,7 +81,7 @@ def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
     return np.array([np.vdot(answer, padded[k : k + len(answer)]) for k in range(highest + 1)])
 
 
-def predicted(covariance: np.ndarray) -> Autoregression:
+def solve_levinson(covariance: np.ndarray) -> Autoregression:
     """The autoregression of these covariances (p + 1,), by Levinson's recursion; of less order where that is as good.
 
     Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and Modeling, section 5.2.

@@ -28,9 +28,9 @@ def until_change(record: Record, start: int, end: int, S: complex) -> Record:
             continue
         what, at = clause(record, start, change), start + change.first
         if at - end >= least:
-            return _cut(record, at, what)
+            return _cut_aftermath(record, at, what)
         said = f"{what}, {1000 * (at - end) * record.step:.0f} ms after the dip: it is fitted as part of the answer"
-        return _noted(record, said)
+        return _add_note(record, said)
     return _until_gone(record, end + least, S, BACK * float(np.median(record.U[:start])))
 
 
@@ -47,11 +47,11 @@ def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
     what = (
         f"the load goes after t = {record.t[at]:g} s, to {100 * size[-n:].mean() / abs(S):.0f} % of that before the dip"
     )
-    return _cut(record, at, what)
+    return _cut_aftermath(record, at, what)
 
 
-def _cut(record: Record, at: int, why: str) -> Record:
-    return _noted(replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there")
+def _cut_aftermath(record: Record, at: int, why: str) -> Record:
+    return _add_note(replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there")
 
 
 def loss(record: Record, end: int, S: complex) -> list[str]:
@@ -69,5 +69,5 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
     ]
 
 
-def _noted(record: Record, note: str) -> Record:
+def _add_note(record: Record, note: str) -> Record:
     return record if note in record.notes else replace(record, notes=(*record.notes, note))

@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.record.record import DEAD, Record
+from tractexp.record.record import DEAD_VOLTAGE_SHARE, Record
 
 CHANGED = 0.05  # of the apparent power: what a load that is steady does not leave
 CHANGED_U = 0.01  # of the voltage: a step of a tap changer
 ANSWERED = 4.0  # times the relative change of voltage: what a load answers to it at most
-ABRUPT = 3.0  # times the changes right before and after: what does not go on
-USUAL = 8.0  # times the lower quartile of all such changes of P and Q, six standard deviations of noise: more is none
+ABRUPT_CHANGE_RATIO = 3.0  # times the changes right before and after: what does not go on
+LARGEST_USUAL_CHANGE = 8.0  # times the lower quartile of all such changes of P and Q, six standard deviations of noise: more is none
 USUAL_U = 19.0  # the same of the voltage: the lower quartile of one quantity is smaller than that of two
-SMALL = 0.2  # of the greatest apparent power: steps of a smaller load count as those of this one
+SMALL_LOAD_SHARE = 0.2  # of the greatest apparent power: steps of a smaller load count as those of this one
 STAYS = 5, 0.5  # cycles over which a step is still seen, and how much of it
 
 
@@ -43,9 +43,9 @@ def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> l
     (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
     if not len(before):
         return []
-    size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL * _greatest(S))
-    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), DEAD * _greatest(high))
-    return list(_steps(before, after, size, answer, (CHANGED, USUAL), n))
+    size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL_LOAD_SHARE * _greatest(S))
+    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), DEAD_VOLTAGE_SHARE * _greatest(high))
+    return list(_steps(before, after, size, answer, (CHANGED, LARGEST_USUAL_CHANGE), n))
 
 
 def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
@@ -77,7 +77,7 @@ def _steps(
     apart = np.pad(change, 2 * n)
     beside = np.maximum(apart[: -4 * n], apart[4 * n :])
     enough = max(least[0], least[1] * float(np.percentile(change, 25)))
-    steps = (change - answer > enough) & (change > ABRUPT * beside)
+    steps = (change - answer > enough) & (change > ABRUPT_CHANGE_RATIO * beside)
     for run in runs(steps):
         k = run.start + int(np.argmax(np.abs(after - before)[run]))
         earlier, later = before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n], after[k : k + (STAYS[0] - 1) * n + 1 : n]
@@ -111,7 +111,7 @@ def smear(record: Record) -> float:
 
 def clause(record: Record, begin: int, change: Change) -> str:
     """What a step is; its samples count from `begin`."""
-    name = "is switched off" if change.ratio < SMALL else "changes"
+    name = "is switched off" if change.ratio < SMALL_LOAD_SHARE else "changes"
     when = record.t[begin + (change.first + change.stop) // 2]
     return f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while the voltage stays"
 

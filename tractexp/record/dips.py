@@ -13,7 +13,7 @@ from tractexp.record.fall import find_dips
 from tractexp.record.reader import Events
 from tractexp.record.record import GREATEST_CURRENT, SIZES, Record
 
-REACH = 60.0  # s of a record that are used before its dip and after
+LONGEST_REACH = 60.0  # s of a record that are used before its dip and after
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class FileDip:
     result: Record | UserError
 
 
-def numbered(
+def cut_dips(
     wholes: Sequence[Record], where: str, pre: float, post: float, trigger: float | None = None
 ) -> list[FileDip]:
     """The dips of records that follow each other, with at most `pre` and `post` [s] about the start of each.
@@ -58,7 +58,7 @@ def around(event: Event) -> Event:
     """
     record, t = event.record, event.record.t
     end = t[min(event.end, record.samples - 1)]
-    first, stop = np.searchsorted(t, [event.t_start - REACH, end + REACH]).tolist()
+    first, stop = np.searchsorted(t, [event.t_start - LONGEST_REACH, end + LONGEST_REACH]).tolist()
     if record.waves is not None or stop - first == record.samples:
         return event
     note = f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about the first dip"
@@ -120,10 +120,10 @@ def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, val
     results = {dip.number: dip.result for dip in dips}
     usable = [number for number, result in results.items() if isinstance(result, Record)]
     fitted = list(train or usable[:1] or [1])
-    first, *rest = [_picked(where, number, results) for number in fitted]
+    first, *rest = [_pick_dip(where, number, results) for number in fitted]
     notes = (*first.notes, *notes)
     if validate is not None:
-        held = [_picked(where, number, results) for number in validate]
+        held = [_pick_dip(where, number, results) for number in validate]
         return Events([replace(first, notes=notes), *rest], held)
     others = [result for number, result in results.items() if number not in fitted]
     notes += tuple(f"not used for validation: {result}" for result in others if isinstance(result, UserError))
@@ -140,7 +140,7 @@ def check_numbers(train: Sequence[int] | None, validate: Sequence[int] | None) -
             raise UserError(f"{DATA.train} and {DATA.validate} name dip {number} twice; a dip may serve only once")
 
 
-def _picked(where: str, number: int, results: Mapping[int, Record | UserError]) -> Record:
+def _pick_dip(where: str, number: int, results: Mapping[int, Record | UserError]) -> Record:
     usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in results.items() if isinstance(r, Record))
     result = results.get(number, UserError(f"{where}: there is no dip {number}; the file has {len(results)}"))
     if isinstance(result, UserError):

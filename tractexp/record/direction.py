@@ -3,13 +3,13 @@
 import numpy as np
 
 DISTURBED = 0.03  # of the voltage: a larger deviation is a disturbance, which a load answers
-CALM = 0.01  # of the voltage: within this deviation P counts as before the disturbance
-FEWEST = 3  # samples in either state
-FALLS = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
-STEEPEST = 4.0  # exponent that no load exceeds: what falls faster was switched off
+LARGEST_CALM_DEVIATION = 0.01  # of the voltage: within this deviation P counts as before the disturbance
+FEWEST_STATE_SAMPLES = 3  # samples in either state
+LEAST_LOAD_EXPONENT = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
+STEEPEST_EXPONENT = 4.0  # exponent that no load exceeds: what falls faster was switched off
 IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
-REACTIVE = 0.1  # of |P|: a smaller Q says nothing about the direction
-NOISY = 3.0  # times the noise that P must exceed to have a sign
+LEAST_REACTIVE_SHARE = 0.1  # of |P|: a smaller Q says nothing about the direction
+LEAST_SIGN_RATIO = 3.0  # times the noise that P must exceed to have a sign
 OUTWARD = "its current is counted out of it, or this feeder supplies such loads"  # where that is certain
 TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
 REMEDY = "set data.reverse_current=true"
@@ -36,14 +36,14 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, ca
         return ""
     U, P, Q = U[valid], P[valid], Q[valid]
     rough = 3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12) if len(U) > 1 else 0.0
-    near = max(CALM, rough)
+    near = max(LARGEST_CALM_DEVIATION, rough)
     calm = at_level(U, near) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
     normal = np.abs(U - level) <= near * level
     spread = float(np.median(np.abs(np.diff(P)))) if len(P) > 1 else 0.0
-    if not -NOISY * spread > P0:
+    if not -LEAST_SIGN_RATIO * spread > P0:
         return ""
-    if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST, 0.02 * len(P)):
+    if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
         return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
     a, fell = _exponent(U / level, P / P0)
     answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls" if fell else "the voltage is never disturbed"
@@ -54,21 +54,21 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, ca
         return f"{shown}: {OUTWARD} ({REMEDY})"
     if polarity > 0:
         return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
-    if fell and a < FALLS:
+    if fell and a < LEAST_LOAD_EXPONENT:
         return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
     return f"{answer}, which cannot separate a reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:
     """Whether power answers as that of a load with its sign turned: inductive, or as an impedance."""
-    inductive = -Q0 > REACTIVE * -P0
-    return a <= STEEPEST and ((a >= FALLS and inductive) or (a >= IMPEDANCE and Q0 < REACTIVE * -P0))
+    inductive = -Q0 > LEAST_REACTIVE_SHARE * -P0
+    return a <= STEEPEST_EXPONENT and ((a >= LEAST_LOAD_EXPONENT and inductive) or (a >= IMPEDANCE and Q0 < LEAST_REACTIVE_SHARE * -P0))
 
 
 def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
     """(exponent of p over u while u is low, whether u is low long enough for it); p is 1 where u is 1."""
     low = (u < 1 - DISTURBED) & (u > 0.1)
-    if np.count_nonzero(low) < FEWEST:
+    if np.count_nonzero(low) < FEWEST_STATE_SAMPLES:
         return float("nan"), False
     x, y = np.log(u[low]), np.log(np.clip(p[low], 0.05, None))
     return float(np.median(y / x)), True

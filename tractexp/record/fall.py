@@ -3,7 +3,7 @@
 import numpy as np
 
 from tractexp.record.change import voltage_changes
-from tractexp.record.record import DEAD
+from tractexp.record.record import DEAD_VOLTAGE_SHARE
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
@@ -43,7 +43,7 @@ def starting_level(
         return level
     if count < first.shape[1] and t[count - 1] - t[0] < CERTAIN / 2:
         return np.maximum(level, after)
-    begun = (np.abs(usual - after) <= limits * after).all() and (level > DEAD * after).all()
+    begun = (np.abs(usual - after) <= limits * after).all() and (level > DEAD_VOLTAGE_SHARE * after).all()
     return after if begun and level[0] < (1 - NO_STEP) * after[0] else level
 
 
@@ -94,7 +94,7 @@ def falls(
 
 def margin_of(U: np.ndarray) -> float:
     """The share of the reference by which a dip must fall; a voltage that is gone has no noise to exceed."""
-    alive = U[DEAD * U.max() < U]
+    alive = U[DEAD_VOLTAGE_SHARE * U.max() < U]
     if len(alive) < FEWEST_BEFORE:
         return SHALLOWEST
     return max(SHALLOWEST, NOISE_FACTOR * float(sample_noise(alive) / np.median(alive)))

@@ -106,7 +106,7 @@ def distinct(identities: Iterable[Identity]) -> list[Identity]:
     return recordings
 
 
-def described(identities: Iterable[Identity]) -> list[str]:
+def describe_identities(identities: Iterable[Identity]) -> list[str]:
     """The recordings in words, each once; what is unknown of several is said once, with those it concerns."""
     recordings = distinct(identities)
     unknown = [one for one in recordings if one.unknown]

@@ -4,7 +4,7 @@ import numpy as np
 
 from tractexp.record.change import smear
 from tractexp.record.fall import FEWEST_BEFORE, SHALLOWEST, margin_of
-from tractexp.record.record import DEAD, Record
+from tractexp.record.record import DEAD_VOLTAGE_SHARE, Record
 
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
 PHASE_GONE = 0.42  # the same where next to nothing of a phase is left
@@ -12,7 +12,7 @@ UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
 # Of a current that stays: how far it moves, and for how much of the time it may move farther. Motors answer a fault of
 # one phase by a tenth.
 SAME_CURRENT = 0.05
-STEP_AT_MOST = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
+LARGEST_TAP_STEP = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
 COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
 
@@ -28,7 +28,7 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
             f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of the voltage "
             "transformers, or their wiring, and no dip of the network; choose another event"
         )
-    if lowest < DEAD * before:
+    if lowest < DEAD_VOLTAGE_SHARE * before:
         if end < len(U):
             return (
                 f"the voltage is gone from t = {t[start]:g} to {t[end]:g} s (U falls to {lowest:.3g}): an "
@@ -47,7 +47,7 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
                 "than a fault lasts: one pole is open, which is no dip of all phases; choose another event"
             )
     if end == len(U):
-        return _unfinished(record, start, before)
+        return _explain_unfinished_fall(record, start, before)
     if record.rate < COARSE and end - start < FEWEST_INSIDE:
         return (
             f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show a response; give a "
@@ -64,7 +64,7 @@ def _current_stays(record: Record, start: int, end: int) -> bool:
         return False
     U = record.U[inside]
     share = 0.0 if record.U2 is None else float(np.median(record.U2[inside] / np.maximum(U, 1e-12)))
-    gone = float(np.median(U)) < DEAD * float(record.U[:start].mean())
+    gone = float(np.median(U)) < DEAD_VOLTAGE_SHARE * float(record.U[:start].mean())
     if not gone and not share > (OPEN_POLE if (end - start) * record.step > UNCLEARED else PHASE_GONE):
         return False
     usual, current = (np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12) for at in (before, inside))
@@ -72,13 +72,13 @@ def _current_stays(record: Record, start: int, end: int) -> bool:
     return level > 0 and bool((np.abs(current / level - 1) < SAME_CURRENT).mean() > 1 - SAME_CURRENT)
 
 
-def _unfinished(record: Record, start: int, before: float) -> str:
+def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
     """The reason against a fall that lasts to the record's end."""
     t, U = record.t, record.U
     fall = 1 - float(np.median(U[start:])) / before
     level = np.abs(U[start:] / float(np.median(U[start:])) - 1) <= margin_of(U)
     lasts = float(t[-1] - t[start])
-    if fall <= STEP_AT_MOST and lasts >= STEP_LASTS and level.mean() > 0.8:
+    if fall <= LARGEST_TAP_STEP and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
             f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
             "remain: a step (a tap changer, or something switched), no dip; choose another event"

@@ -11,8 +11,8 @@ import numpy as np
 
 PASSED, BETWEEN = 7.0, 4.0  # times the frequency: upper end of the pass band, and width of the transition about it
 RIPPLE = 80.0  # dB below one: ripple in the pass band
-LOUD = 2.5  # of the variance of fast noise, below which it is taken for noise
-NEAR = 8  # windows a cycle in which the power of fast changes is averaged
+LARGEST_NOISE_RATIO = 2.5  # of the variance of fast noise, below which it is taken for noise
+AVERAGED_WINDOWS = 8  # windows a cycle in which the power of fast changes is averaged
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class NoiseFilter:
         from scipy.signal import firwin, kaiserord
 
         edge, width = PASSED * frequency, BETWEEN * frequency
-        near = max(5, round(rate / frequency / NEAR))
+        near = max(5, round(rate / frequency / AVERAGED_WINDOWS))
         if edge + width / 2 >= rate / 2:
             return cls(np.ones(1), near)
         taps, beta = kaiserord(RIPPLE, 2 * width / rate)
@@ -47,4 +47,4 @@ class NoiseFilter:
         fast = departure - slow
         loud = np.convolve(np.abs(fast) ** 2, np.ones(self.near) / self.near, "same")
         rest = noise * (1 - 2 * self.weights[half] + float(self.weights @ self.weights))
-        return slow + np.clip(1 - LOUD * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
+        return slow + np.clip(1 - LARGEST_NOISE_RATIO * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast

@@ -19,7 +19,7 @@ from tractexp.record.record import DECLARATION, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves
 
 LEAST_S, MOST_P = 0.5, 1.05  # pu before the dip, on a base of the load: bounds reach to a torque of one
-SMALLEST = 1e-6  # pu: less apparent power is no load, and no base
+SMALLEST_BASE = 1e-6  # pu: less apparent power is no load, and no base
 
 Scalable = TypeVar("Scalable", float, np.ndarray)
 
@@ -44,7 +44,7 @@ class OwnBase:
         """The base for a first fitted event: its power before the dip, or its present base if that is its own."""
         at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
         own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
-        return at if own or not S > SMALLEST else replace(at, power=S * at.power)
+        return at if own or not S > SMALLEST_BASE else replace(at, power=S * at.power)
 
     @property
     def ratio(self) -> float:
@@ -67,7 +67,7 @@ class OwnBase:
     def put(self, event: Event) -> Event:
         """The event on this base; itself where it is on it."""
         ratio = self.over(event.record)
-        return event if ratio == 1 else rebased(event, ratio, self)
+        return event if ratio == 1 else convert_base(event, ratio, self)
 
     @property
     def file(self) -> str:
@@ -76,7 +76,7 @@ class OwnBase:
 
     def values(self, values: Mapping[str, float], exponents: Mapping[str, int]) -> dict[str, float]:
         """Parameters by name, or by name and event as `T_m[1]`, on the file's base."""
-        return {name: scaled(value, exponents[name.partition("[")[0]], self.ratio) for name, value in values.items()}
+        return {name: scale_parameter(value, exponents[name.partition("[")[0]], self.ratio) for name, value in values.items()}
 
     def __str__(self) -> str:
         return f"{self.power:.4g} MVA" if self.in_mva else f"{self.power:.4g} pu of the file"
@@ -102,10 +102,10 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
     return [own.put(event) for event in events]
 
 
-def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
+def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
     """An event on a base of `ratio` times the power. Voltages, times and frequencies stay."""
     if isinstance(event, WaveEvent):  # its currents are per unit of the record's base
-        return in_waves(rebased(event.phasors, ratio, own))
+        return in_waves(convert_base(event.phasors, ratio, own))
     record = event.record
     by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
@@ -119,6 +119,6 @@ def rebased(event: Event, ratio: float, own: OwnBase) -> Event:
     )  # fmt: skip
 
 
-def scaled(value: Scalable, power_exponent: int, ratio: float) -> Scalable:
+def scale_parameter(value: Scalable, power_exponent: int, ratio: float) -> Scalable:
     """A parameter's value on a base of a `ratio`-th of the power."""
     return value * ratio**power_exponent

@@ -13,7 +13,7 @@ TURN = np.exp(2j * np.pi / 3)  # the operator a of symmetrical components
 SLOWEST, FASTEST = 0.9, 1.1  # of the nominal frequency: what is tracked
 SMOOTHED = 4.0  # cycles, over which a tracked frequency is
 PASSES = 3  # of the tracking, each at the frequency that the previous one measured
-DEAD = 0.01  # of the highest voltage: a phasor below it has no angle to speak of
+DEAD_PHASOR_SHARE = 0.01  # of the highest voltage: a phasor below it has no angle to speak of
 BLOCK = 1 << 15  # samples measured at once, about: what fits into a processor's cache
 
 
@@ -58,7 +58,7 @@ def one_cycle(rate: float, nominal: float) -> Averager:
     return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, cycle_means)
 
 
-def weighted(weights: np.ndarray) -> Averager:
+def make_weighted_averager(weights: np.ndarray) -> Averager:
     """Means with these weights (2 reach + 1,), symmetric; by the fast Fourier transform, as windows may be long."""
     reach, weights = len(weights) // 2, weights / weights.sum()
 
@@ -116,7 +116,7 @@ def symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
 
 
-def turning(angle: np.ndarray, rate: float) -> np.ndarray:
+def measure_turning(angle: np.ndarray, rate: float) -> np.ndarray:
     """Frequency [Hz] at which a phasor's angle (N,) [rad] turns in its frame."""
     return np.gradient(np.unwrap(angle)) * rate / (2 * np.pi)
 
@@ -128,7 +128,7 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
     each at the frequency that the previous one measured, remove the error of the frequency from the phasors.
     A voltage below `least` has no angle: spans end before it, and within the nominal frequency is taken.
     """
-    n, (every, reach, half) = voltages.shape[-1], _tracking(rate, nominal)
+    n, (every, reach, half) = voltages.shape[-1], _choose_tracking_grid(rate, nominal)
     at = np.arange(reach, n - reach, every)
     f = np.full(n, nominal)
     for _ in range(PASSES):
@@ -151,7 +151,7 @@ def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
     return speed
 
 
-def _tracking(rate: float, nominal: float) -> tuple[int, int, int]:
+def _choose_tracking_grid(rate: float, nominal: float) -> tuple[int, int, int]:
     """Samples from one tracked phasor to the next, samples a phasor needs on either side, phasors in half a span."""
     every = max(1, int(rate / nominal / 20))
     return every, one_cycle(rate, nominal).reach, int(SMOOTHED * rate / nominal / 2 / every)
@@ -203,7 +203,7 @@ class Phasors:
         return np.sqrt(len(self.V)) * np.abs(self.V2)
 
 
-def joined(parts: Sequence[Phasors]) -> Phasors:
+def join_phasors(parts: Sequence[Phasors]) -> Phasors:
     """Phasors that follow each other without a gap as one, evenly spaced by the widest of their steps.
 
     The frame of each part is turned so that V1 goes on where the part before it ends; what no window saw at a change
@@ -259,9 +259,9 @@ def measure(
             f"{nominal:g} Hz and more than their window"
         )
     tracked = {} if tracked is None else tracked
-    least = DEAD * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
+    least = DEAD_PHASOR_SHARE * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
     at, angle, pieces, distortions = np.arange(over.reach, n - over.reach, every), 0.0, [], []
-    for (first, stop), (a, b) in _overlapping(n, rate, nominal, over.reach, block):
+    for (first, stop), (a, b) in _cut_overlapping_blocks(n, rate, nominal, over.reach, block):
         x = waves[:, first:stop]
         f = tracked[a] = tracked[a] if a in tracked else track(x[:K], rate, nominal, least=least)
         here = at[(at >= a) & (at < b)] - first
@@ -278,7 +278,7 @@ def measure(
     X, f = (np.concatenate([part[k] for part in pieces], axis=-1) for k in (0, 1))
     more = {name: np.concatenate([one[name] for one in distortions]) for name in next(iter(distortions), ())}
     phasors = Phasors(start + at / rate, X[:K], X[K:], f, more)
-    return replace(phasors, f=_turned(phasors, rate / every, least))
+    return replace(phasors, f=_measure_frequency(phasors, rate / every, least))
 
 
 def _distortion(
@@ -301,21 +301,21 @@ def _distortion(
     return channels
 
 
-def _turned(phasors: Phasors, rate: float, least: float) -> np.ndarray:
+def _measure_frequency(phasors: Phasors, rate: float, least: float) -> np.ndarray:
     """Frequency (M,) [Hz] at which the voltage really turns; where it is dead, that before and after."""
     dead = np.abs(phasors.V1) < least
     alive = ~(dead | np.r_[dead[1:], False] | np.r_[False, dead[:-1]])  # a slope needs both neighbours
     if not alive.any():
         return phasors.f
     k = np.arange(len(alive))
-    return np.interp(k, k[alive], (phasors.f + turning(np.angle(phasors.V1), rate))[alive])
+    return np.interp(k, k[alive], (phasors.f + measure_turning(np.angle(phasors.V1), rate))[alive])
 
 
 def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
     return ((a, min(a + block, n)) for a in range(0, n, block))
 
 
-def _overlapping(
+def _cut_overlapping_blocks(
     n: int, rate: float, nominal: float, reach: int, block: int
 ) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
     """Samples to look at, and those within to give phasors of: wherever a cut lies, it changes nothing.
@@ -323,7 +323,7 @@ def _overlapping(
     A pass of the tracking sees what lies a window and half a span away, and so many times as there are passes. Cuts
     lie on the grid of tracked phasors.
     """
-    every, own, half = _tracking(rate, nominal)
+    every, own, half = _choose_tracking_grid(rate, nominal)
     margin = (PASSES * (own + (half + 2) * every) + max(own, reach)) // every * every + every
     for a, b in _blocks(n, max(block // every, 1) * every):
         yield (max(a - margin, 0), min(b + margin, n)), (a, b)

@@ -9,15 +9,15 @@ from tractexp.errors import DATA, UserError
 from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
-JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
+LARGEST_JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
 # s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant T' of 50 to 300 ms
 # cannot be identified. The slowest phasor units that record dips send 25 per second.
 LONGEST_STEP = 0.05
 SELDOM = 0.05  # of the steps: where more than these are odd, a simulator chose them
-WHOLE = 0.02  # of a step: a step so close to a multiple of the usual one is of missing rows
+WHOLE_STEP_TOLERANCE = 0.02  # of a step: a step so close to a multiple of the usual one is of missing rows
 FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
-DEAD = 0.05  # of the voltage at the start: less is no voltage at all
+DEAD_VOLTAGE_SHARE = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 GREATEST_CURRENT = 50.0  # kA, of a load before a dip
 SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
@@ -150,7 +150,7 @@ class Record:
         off = float(np.abs(self.t - grid).max() / self.step)
         if off == 0:
             return self
-        if off <= JITTER:
+        if off <= LARGEST_JITTER:
             return replace(self, t=grid)
         steps = np.diff(self.t)
         usual = float(np.median(steps[steps > 0]))
@@ -176,7 +176,7 @@ class Record:
             )
         ratio = steps / usual
         long = ratio > 1.5
-        multiple = long & (np.abs(ratio - np.round(ratio)) < WHOLE * ratio)
+        multiple = long & (np.abs(ratio - np.round(ratio)) < WHOLE_STEP_TOLERANCE * ratio)
         seldom = (np.abs(ratio - 1) > 0.5).mean() < SELDOM
         if not long.any() or not (seldom or multiple.sum() > 0.9 * long.sum()):
             return
@@ -237,11 +237,11 @@ class Record:
 
     def _check_times(self, place: Callable[[int], str]) -> None:
         off = np.abs(self.t - np.linspace(self.t[0], self.t[-1], self.samples)) / self.step
-        if off.max() > JITTER:
+        if off.max() > LARGEST_JITTER:
             i = int(np.argmax(off))
             raise UserError(
                 f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is {100 * off[i]:.2g} % of "
-                f"a step off the uniform grid; at most {100 * JITTER:g} % is allowed"
+                f"a step off the uniform grid; at most {100 * LARGEST_JITTER:g} % is allowed"
             )
         span = self.samples * self.step
         if span < 1 / self.base.frequency:
@@ -273,7 +273,7 @@ class Record:
             )
         if self.f is None:
             return
-        alive = self.U > DEAD * U  # what turns while there is no voltage is noise
+        alive = self.U > DEAD_VOLTAGE_SHARE * U  # what turns while there is no voltage is noise
         off = np.where(alive, np.abs(self.f / self.base.frequency - 1), 0.0)
         if off.max() > 0.2:
             i = int(np.argmax(off))

@@ -6,7 +6,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.errors import UserError
-from tractexp.record.change import CHANGED, USUAL, Change, clause, load_changes, smear, voltage_changes, without_gaps
+from tractexp.record.change import (
+    CHANGED,
+    LARGEST_USUAL_CHANGE,
+    Change,
+    clause,
+    load_changes,
+    smear,
+    voltage_changes,
+    without_gaps,
+)
 from tractexp.record.record import Record
 
 REVERSED = 0.25  # of its range: a load that turns back by more swings
@@ -126,7 +135,7 @@ def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) 
     noise = float(np.hypot(*(np.median(np.abs(np.diff(x))) for x in (S.real, S.imag)))) / np.sqrt(n)
     name, course = max((("P", smooth.real), ("Q", smooth.imag)), key=lambda each: float(np.ptp(each[1])))
     span = float(np.ptp(course))
-    if not at_all and span <= max(CHANGED * size, USUAL * noise):
+    if not at_all and span <= max(CHANGED * size, LARGEST_USUAL_CHANGE * noise):
         return None
     change = "swings" if _turns(course, REVERSED * span) else "rises" if course[-1] > course[0] else "falls"
     return Course(name, change, span, size, len(course))

@@ -20,13 +20,13 @@ from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
 COARSEST = 16  # samples per cycle
-SHORT = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
-UNBALANCED = 0.1  # of the voltage before
+LONGEST_SHORT_DIP = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
+LEAST_UNBALANCE = 0.1  # of the voltage before
 FEWEST_CYCLES = 2  # before the event
 LEAD = 6  # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
-HIGHEST = 25  # harmonic that is fitted
-LEAVES = 0.03  # of the voltage: how far it leaves its periodic course where an event begins
-NOISY = 6.0  # standard deviations of its noise, if that is more
+HIGHEST_HARMONIC = 25  # harmonic that is fitted
+LARGEST_PERIODIC_DEPARTURE = 0.03  # of the voltage: how far it leaves its periodic course where an event begins
+NOISE_DEVIATIONS = 6.0  # standard deviations of its noise, if that is more
 SILENT, LOUDER = 0.02, 3.0  # of the current, and times what is there before: less zero sequence than this is none
 
 
@@ -121,7 +121,7 @@ class Periodic:
     @classmethod
     def of(cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float) -> "Periodic":
         """Fitted to channels x (channels, n) at times t (n,) [s]."""
-        highest = max(1, min(HIGHEST, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2))
+        highest = max(1, min(HIGHEST_HARMONIC, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2))
         series = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
         basis = series.basis(t)
         coefficients = np.linalg.lstsq(basis, x.T, rcond=None)[0]
@@ -192,7 +192,7 @@ def in_waves(event: Event) -> WaveEvent:
     steady = slice(lead, lead + np.count_nonzero(before))
     residual = (i - I * np.exp(-1j * np.angle(V)) * turn)[steady]
     calm = np.stack([residual.real, residual.imag, i_zero[steady]])  # no fundamental
-    compared = _compared(currents[:, start:], calm, K)
+    compared = _choose_compared_components(currents[:, start:], calm, K)
     currents[~compared] = np.nan
     levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
     slow = replace(
@@ -214,11 +214,11 @@ def in_waves(event: Event) -> WaveEvent:
     )  # fmt: skip
 
 
-def smeared(duration: float, U2: float, frequency: float) -> str:
+def describe_smearing(duration: float, U2: float, frequency: float) -> str:
     """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; "" where no harm."""
-    if duration * frequency < SHORT:
-        return f"lasts {1000 * duration:.0f} ms, less than {SHORT:g} cycles, which phasors smear"
-    if U2 > UNBALANCED:
+    if duration * frequency < LONGEST_SHORT_DIP:
+        return f"lasts {1000 * duration:.0f} ms, less than {LONGEST_SHORT_DIP:g} cycles, which phasors smear"
+    if U2 > LEAST_UNBALANCE:
         return f"is unbalanced, U2 {U2:.0%} of U, which phasors leave out"
     return ""
 
@@ -279,7 +279,7 @@ def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float
 def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.ndarray) -> int:
     """The first sample at which a voltage (K, M) departs from its periodic course."""
     off = np.abs(v - periodic.at(t)[:K]).max(axis=0)
-    limit = max(LEAVES, NOISY * float(periodic.rest[:K].max()))
+    limit = max(LARGEST_PERIODIC_DEPARTURE, NOISE_DEVIATIONS * float(periodic.rest[:K].max()))
     beyond = off > limit
     beyond &= np.r_[beyond[1:], False] | np.r_[beyond[2:], False, False]
     beyond[: np.count_nonzero(before) // 2] = False
@@ -303,7 +303,7 @@ def half_cycle(
     return np.abs(V), V * I.conj(), np.abs(mean(np.conj(v * turn) / turn))
 
 
-def _compared(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:
+def _choose_compared_components(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:
     """Which of alpha, beta and zero (3, n) are compared: of one phase the first, of three zero if the dip shows it."""
     if phases == 1:
         return np.array([True, False, False])

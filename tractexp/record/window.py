@@ -17,8 +17,8 @@ import numpy as np
 if TYPE_CHECKING:
     from tractexp.record.event import Event
 
-LONGEST = 10.0  # s about a time stamp: far more than any recorder averages over
-EDGE = 0.05  # s on either side of a window around an edge, in which the voltage may bend
+LONGEST_WINDOW = 10.0  # s about a time stamp: far more than any recorder averages over
+BEND_SECONDS = 0.05  # s on either side of a window around an edge, in which the voltage may bend
 BENT, CALM = 0.01, 3e-4  # pu: second differences of the voltage there, and elsewhere
 ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if its noise allows
 
@@ -55,7 +55,7 @@ class Window:
         at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
         if at.ndim != 1 or at.shape != weights.shape or len(at) < 2 or not np.isfinite(weights).all():
             raise ValueError("times and weights are two lists of as many numbers")
-        if not (np.abs(at) <= LONGEST).all() or not (np.diff(at) > 0).all():
+        if not (np.abs(at) <= LONGEST_WINDOW).all() or not (np.diff(at) > 0).all():
             raise ValueError("times increase")
         return cls(str(content["name"]), at, weights)
 
@@ -97,7 +97,7 @@ def averaged_power(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.
     return average(power / u, weights) * average(u, weights)
 
 
-def sharpened(event: "Event", weights: np.ndarray, window: float) -> "Event":
+def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Event":
     """The event with the voltage that the load saw, where the record's was average with weights over `window` [s].
 
     That which bends least, weighted, among those whose average is the recorded one: least squares.
@@ -105,7 +105,7 @@ def sharpened(event: "Event", weights: np.ndarray, window: float) -> "Event":
     from scipy.linalg import cho_solve_banded
 
     step, U = event.record.step, event.record.U
-    at, near = np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1), (window + EDGE) / step
+    at, near = np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1), (window + BEND_SECONDS) / step
     free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
     error = max(ERROR, event.noise_U)
     factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)

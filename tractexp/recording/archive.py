@@ -14,7 +14,7 @@ from tractexp.record import Reader, Record, endings, reader_of
 from tractexp.record.foreign import is_record
 from tractexp.recording.overview import LoadEvent, Sight, View, view_of
 from tractexp.recording.reader import WaveformReader
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 NAMED = re.compile(r"(?P<file>.+?)(?:#(?P<load>\d+)(?:\.(?P<dip>\d+))?)?")
 BEGINNING = 65536  # bytes
@@ -40,11 +40,11 @@ def files(folder: Path) -> Iterator[Path]:
         below[:] = sorted(name for name in below if not name.startswith("."))
         beside = {name.lower() for name in names}
         for name in sorted(names):
-            if not name.startswith(".") and _wanted(Path(place, name), readable, beside):
+            if not name.startswith(".") and _is_wanted(Path(place, name), readable, beside):
                 yield Path(place, name)
 
 
-def _wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> bool:
+def _is_wanted(path: Path, readable: Collection[str], beside: Collection[str]) -> bool:
     """Whether a file is looked at: it can be read, or is a record of another format; what belongs to one is not."""
     if path.suffix.lower() not in readable:
         return is_record(path)
@@ -81,7 +81,7 @@ def _is_number(cell: bytes) -> bool:
     return True
 
 
-def looked(path: Path) -> View:
+def look_at_file(path: Path) -> View:
     """A file of an archive, looked at by the reader of its ending. Raises `UserError` where it cannot be read."""
     cls = reader_of(str(path))
     return view_of(str(path), {"name": cls.name, **cls.of(str(path))})
@@ -98,7 +98,7 @@ def records(folder: Path, names: list[str], where: str) -> list[Record]:
     FILE#LOAD.DIP is dip DIP of load LOAD as `look` numbers them, FILE#LOAD the first event of the load that is worth
     fitting, FILE that of the first load. Raises `UserError` for what is not there or cannot be fitted.
     """
-    see = functools.cache(looked)
+    see = functools.cache(look_at_file)
     return [_record(folder, name, where, see) for name in names]
 
 
@@ -113,7 +113,7 @@ def _record(folder: Path, name: str, where: str, see: "functools._lru_cache_wrap
         raise UserError(f"{where}: there is no file '{path.relative_to(folder)}' in {folder}{nearest(name, there)}")
     view = see(path)
     if not 1 <= load <= len(view.sights):
-        loads = counted(len(view.sights), "load")
+        loads = count_noun(len(view.sights), "load")
         raise UserError(f"{where}: {name}: {path} shows {loads}, and there is no load {load}; the first is 1")
     event = _select(view.sights[load - 1], dip, f"{where}: {name}")
     assert event.event is not None

@@ -24,16 +24,16 @@ from tractexp.recording.nominal_voltage import is_between_phases
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import OTHER_FREQUENCY, frequency, nearest_nominal, snapshots
 
-ALIVE = 0.5  # of the upper level of V1: less is a fault, or a dead line
+LEAST_LIVE_SEQUENCE = 0.5  # of the upper level of V1: less is a fault, or a dead line
 LOADED = 0.2  # of the upper level of I1, as well
-CALM = 0.05  # of the median V1: the state in which orders are compared
+LARGEST_CALM_VOLTAGE_SHARE = 0.05  # of the median V1: the state in which orders are compared
 UNEVEN = 0.25  # V2 over V1 in the calm: no network's voltages are so uneven
-BALANCED = 0.5  # I2 over I1 of an order that makes sense
+LARGEST_SENSIBLE_UNBALANCE = 0.5  # I2 over I1 of an order that makes sense
 SENSIBLE = 75.0  # degrees between V1 and I1 that a load has at most
 BACKWARD = 135.0  # degrees from which on the current is turned round, or power fed back
-REACTIVE = 2.0  # degrees about 90: a capacitor bank or a reactor, whatever its order
+LARGEST_REACTIVE_ANGLE = 2.0  # degrees about 90: a capacitor bank or a reactor, whatever its order
 ZERO = 0.02  # V0 over V2 of line voltages in a fault to earth, whose sum is zero whatever happens
-UNBALANCED = 0.05  # V2 over V1 of such a fault
+LEAST_FAULT_UNBALANCE = 0.05  # V2 over V1 of such a fault
 EARTH = 0.1  # I0 over I1 of such a fault
 ROOT3 = 0.02  # line over phase voltages may be so far from sqrt 3, and 3 degrees from 30
 ANSWERS = (-110.0, 30.0)  # degrees of I2 / V2 of a passive load: inductive, at most a little capacitive
@@ -64,7 +64,7 @@ class _OtherOrder(UserError):
         self.why, self.voltages, self.currents = why, tuple(voltages), tuple(currents)
 
 
-def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
+def tune_frequency(recording: Recording, numbers: Sequence[int]) -> Recording:
     """The recording with the nominal frequency that its voltages `numbers` really have, and a note where it differs."""
     f = frequency(recording, numbers)
     if f is None or (nominal := nearest_nominal(f)) is None or abs(nominal / recording.frequency - 1) < OTHER_FREQUENCY:
@@ -76,18 +76,18 @@ def tuned(recording: Recording, numbers: Sequence[int]) -> Recording:
     return replace(recording, frequency=nominal, notes=(*recording.notes, note))
 
 
-def arranged(recording: Recording, feeder: Feeder) -> Feeder:
+def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
     """The feeder unchanged, or with line voltages taken as such, and a sentence for each observation in `why`.
 
     Raises `UserError` where the order makes no sense: with another one, its P and Q, where that one is accepted.
     """
     try:
-        return _arranged(recording, feeder)
+        return _arrange_order(recording, feeder)
     except _OtherOrder as other:
         advised = replace(feeder, voltages=other.voltages, currents=other.currents)
         refused = other
     try:
-        _arranged(recording, advised)
+        _arrange_order(recording, advised)
     except UserError:
         raise UserError(
             f"{refused.why}; no other order of these channels makes sense either: they are not those of one load, or "
@@ -96,7 +96,7 @@ def arranged(recording: Recording, feeder: Feeder) -> Feeder:
     raise refused
 
 
-def _arranged(recording: Recording, feeder: Feeder) -> Feeder:
+def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
     """As `arranged`; raises `_OtherOrder` with an order that nobody has tried yet."""
     _residuals(recording, feeder)
     feeder = _lines_by_label(recording, feeder)
@@ -106,7 +106,7 @@ def _arranged(recording: Recording, feeder: Feeder) -> Feeder:
         _labels(recording, feeder, None)
         return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
     if len(live.V) < 3:
-        return _directed(feeder, live)
+        return _note_direction(feeder, live)
     _lines(recording, feeder)
     if _to_ground(feeder) and (reason := _lines_by_shape(recording, feeder, live)):
         feeder = replace(feeder, connection=_between(feeder), why=(*feeder.why, reason))
@@ -117,7 +117,7 @@ def _arranged(recording: Recording, feeder: Feeder) -> Feeder:
             feeder = replace(feeder, why=(*feeder.why, said))
         if live.current_turns:
             _currents(recording, feeder, live)
-    return _directed(feeder, live)
+    return _note_direction(feeder, live)
 
 
 def _residuals(recording: Recording, feeder: Feeder) -> None:
@@ -127,7 +127,7 @@ def _residuals(recording: Recording, feeder: Feeder) -> None:
             rest = [i for i in numbers if i not in odd]
             where = setting(f"data.{key}")
             raise UserError(
-                f"{where}={[*numbers]}: {_called(recording, odd[0])} is the residual of all phases, and no phase; "
+                f"{where}={[*numbers]}: {_name_channel(recording, odd[0])} is the residual of all phases, and no phase; "
                 f"give the phases, or with two line voltages or two current transformers those alone: {where}={rest}"
             )
 
@@ -182,15 +182,15 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
     size, load = (np.linalg.norm(x, axis=0) for x in (V, I))
     if not V.shape[1] or size.max() == 0 or load.max() == 0:
         return None
-    alive = size > ALIVE * np.percentile(size, 90)
+    alive = size > LEAST_LIVE_SEQUENCE * np.percentile(size, 90)
     if len(V) == 3:
         small, large = np.sort(np.abs(sequences(V)), axis=0)  # whatever the order is
-        even = alive & (small < UNBALANCED * large)
+        even = alive & (small < LEAST_FAULT_UNBALANCE * large)
         even = even if even.any() else alive
     else:
         even = alive
     calm = np.zeros(len(size), bool)
-    calm[even] = at_level(size[even], CALM)
+    calm[even] = at_level(size[even], LARGEST_CALM_VOLTAGE_SHARE)
     alive &= load > LOADED * np.median(load[calm])  # not of all: a fault may last longer than the calm
     if not (alive & calm).any():
         return None
@@ -207,14 +207,14 @@ def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) ->
     used = f"they are line to line, and data.connection={_between(feeder)} is used"
     V1, V2 = (np.abs(x) for x in sequences(live.V))
     I0, I1 = _zero(live.I), np.median(np.abs(sequences(live.I)[0])[live.calm])
-    fault = (V2 > UNBALANCED * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
+    fault = (V2 > LEAST_FAULT_UNBALANCE * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
     if np.count_nonzero(fault) >= 2 and (_zero(live.V)[fault] < ZERO * V2[fault]).all():
         return f"the voltages add up to zero even in a fault to earth, where the currents do not: {used}"
     size = _level(recording, feeder.voltages)
     for numbers, other in _levels(recording):
         alike = abs(size / max(other, 1e-12) / np.sqrt(3) - 1) < 5 * ROOT3
         if alike and not {*numbers} & {*feeder.voltages} and _root3(recording, feeder.voltages, numbers):
-            others = ", ".join(_called(recording, i) for i in numbers)
+            others = ", ".join(_name_channel(recording, i) for i in numbers)
             return f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
     level = float(np.median(V1[live.calm]))
     if is_between_phases(level) and not any(is_to_ground(recording.channels[i]) for i in feeder.voltages):
@@ -237,7 +237,7 @@ def _level(recording: Recording, numbers: Sequence[int]) -> float:
     if windows is None:
         return 0.0
     size = np.nan_to_num(np.abs(sequences(windows.of(numbers))[0]))
-    return float(np.median(size[size >= ALIVE * size.max()]))
+    return float(np.median(size[size >= LEAST_LIVE_SEQUENCE * size.max()]))
 
 
 def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> bool:
@@ -246,7 +246,7 @@ def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> 
     if windows is None:
         return False
     x, y = (sequences(windows.of(numbers))[0] for numbers in (ours, theirs))
-    large = np.nan_to_num(np.abs(y)) > ALIVE * np.nanmax(np.abs(y), initial=0)
+    large = np.nan_to_num(np.abs(y)) > LEAST_LIVE_SEQUENCE * np.nanmax(np.abs(y), initial=0)
     if not large.any():
         return False
     ratio = np.median(np.abs(x[large] / y[large])) * np.exp(1j * np.median(np.angle(x[large] / y[large])))
@@ -257,24 +257,24 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     """Refuse voltages whose negative sequence exceeds the positive one while they are alive."""
     V1, V2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.V))
     if UNEVEN * V1 < V2 <= V1:
-        names = ", ".join(_called(recording, i) for i in feeder.voltages)
+        names = ", ".join(_name_channel(recording, i) for i in feeder.voltages)
         raise UserError(
             f"{DATA.voltages}={[*feeder.voltages]}: in the calm, the negative sequence is {100 * V2 / V1:.0f} % of the "
             f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the file holds"
         )
     if V2 <= V1:
         return
-    if _to_ground(feeder) and (k := _turned(live.V[:, live.calm])) is not None:
-        raise UserError(f"{DATA.voltages}={[*feeder.voltages]}: {_called(recording, feeder.voltages[k])} {TURNED}")
-    voltages, currents = _swapped(feeder)
+    if _to_ground(feeder) and (k := _find_reversed_phase(live.V[:, live.calm])) is not None:
+        raise UserError(f"{DATA.voltages}={[*feeder.voltages]}: {_name_channel(recording, feeder.voltages[k])} {TURNED}")
+    voltages, currents = _propose_other_order(feeder)
     raise _OtherOrder(
         f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
         f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one",
-        f"; give {_said(voltages, currents)}", voltages, currents,
+        f"; give {_describe_arrangement(voltages, currents)}", voltages, currents,
     )  # fmt: skip
 
 
-def _swapped(feeder: Feeder) -> tuple[list[int], Sequence[int]]:
+def _propose_other_order(feeder: Feeder) -> tuple[list[int], Sequence[int]]:
     """(voltages, currents) in the other order of phases, in ascending numbers where that is possible."""
     n = len(feeder.voltages)
     turns = [(0, 2, 1), (2, 1, 0), (1, 0, 2)] if n == 3 == len(feeder.currents) else [(*range(n)[::-1],)]
@@ -283,7 +283,7 @@ def _swapped(feeder: Feeder) -> tuple[list[int], Sequence[int]]:
     return [feeder.voltages[k] for k in best], currents
 
 
-def _turned(X: np.ndarray) -> int | None:
+def _find_reversed_phase(X: np.ndarray) -> int | None:
     """The one of three phasors that must be turned round for them to be balanced; None where that does not help."""
     for k in range(3):
         tried = X.copy()
@@ -294,12 +294,12 @@ def _turned(X: np.ndarray) -> int | None:
     return None
 
 
-def _said(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
+def _describe_arrangement(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
     currents_text = f"{DATA.currents}=[{', '.join(map(str, currents))}]"
     return currents_text if voltages is None else f"{DATA.voltages}=[{', '.join(map(str, voltages))}] {currents_text}"
 
 
-def _called(recording: Recording, number: int) -> str:
+def _name_channel(recording: Recording, number: int) -> str:
     return f"channel {number} '{recording.channels[number].name}'"
 
 
@@ -321,7 +321,7 @@ def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> 
             return f"{said}the file; the waves say that they are in the same order, which is taken"
         both = f", which gives {_mw(_power(live, other))} where the present order has {_mw(_power(live, present))}"
     raise _OtherOrder(
-        f"{said}{recording.source}", f"; give both in the same order: {_said(None, labelled)}{both}",
+        f"{said}{recording.source}", f"; give both in the same order: {_describe_arrangement(None, labelled)}{both}",
         feeder.voltages, labelled,
     )  # fmt: skip
 
@@ -330,7 +330,7 @@ def _is_balanced(live: _LivePhasors, permutation: tuple[int, ...]) -> bool:
     """Whether currents in an order have a positive sequence, and an angle that a load has or power fed back."""
     first, second = (np.median(np.abs(x)[live.calm]) for x in sequences(live.I[[*permutation]]))
     angle = abs(_angle(_power(live, permutation)))
-    return bool(second < BALANCED * first) and not SENSIBLE < angle < BACKWARD
+    return bool(second < LARGEST_SENSIBLE_UNBALANCE * first) and not SENSIBLE < angle < BACKWARD
 
 
 def _letters(places: Sequence[int]) -> str:
@@ -362,8 +362,8 @@ def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
         return
     labelled = [order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)]
     confirmed = None not in labelled
-    middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > REACTIVE
-    if confirmed or not middle or I2 > BALANCED * I1:
+    middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > LARGEST_REACTIVE_ANGLE
+    if confirmed or not middle or I2 > LARGEST_SENSIBLE_UNBALANCE * I1:
         return
     better = [p for p in ((1, 2, 0), (2, 0, 1)) if abs(_angle(_power(live, p))) <= SENSIBLE and _answers(live, p) >= 0]
     if len(better) == 1:
@@ -374,12 +374,12 @@ def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
 
 def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: complex, ratio: float) -> None:
     """Refuse currents of the opposite sequence where another order, or one turned round, is balanced."""
-    if (k := _turned(live.I[:, live.calm])) is not None:
-        raise UserError(f"{DATA.currents}={[*feeder.currents]}: {_called(recording, feeder.currents[k])} {TURNED}")
+    if (k := _find_reversed_phase(live.I[:, live.calm])) is not None:
+        raise UserError(f"{DATA.currents}={[*feeder.currents]}: {_name_channel(recording, feeder.currents[k])} {TURNED}")
     tried = []
     for p in permutations(range(3)):
         first, second = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I[[*p]]))
-        if second < BALANCED * first:
+        if second < LARGEST_SENSIBLE_UNBALANCE * first:
             tried.append(p)
     if tried:
         best = min(tried, key=lambda p: abs(_angle(_power(live, p))))
@@ -391,7 +391,7 @@ def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], wh
     proposal = tuple(feeder.currents[k] for k in permutation)
     raise _OtherOrder(
         f"{DATA.currents}={[*feeder.currents]}: {why}",
-        f"; {_said(None, proposal)} gives {_mw(_power(live, permutation))}", feeder.voltages, proposal,
+        f"; {_describe_arrangement(None, proposal)} gives {_mw(_power(live, permutation))}", feeder.voltages, proposal,
     )  # fmt: skip
 
 
@@ -418,7 +418,7 @@ def _still(live: _LivePhasors) -> np.ndarray:
     return V1.conj() / np.maximum(np.abs(V1), 1e-12)
 
 
-def _directed(feeder: Feeder, live: _LivePhasors) -> Feeder:
+def _note_direction(feeder: Feeder, live: _LivePhasors) -> Feeder:
     """The feeder with a sentence on negative power, where it is."""
     if len(live.V) == 3:
         V1, I1 = sequences(live.V)[0], sequences(live.I)[0]

@@ -10,7 +10,7 @@ from tractexp.errors import UserError
 from tractexp.recording.recording import Recording, Segment
 
 
-def cut(recording: Recording, begin: float, end: float) -> Recording:
+def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
     """The samples from `begin` to `end` [s since the first], as a recording of its own that starts at 0.
 
     Raises `UserError` where nothing was recorded then.

@@ -7,7 +7,7 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.plugin import Plugin, chosen, discover
-from tractexp.record.phasor import Averager, weighted
+from tractexp.record.phasor import Averager, make_weighted_averager
 from tractexp.record.window import Window
 
 SPACING = 1e-3  # s between the weights that a record stores, as phasors are a millisecond apart
@@ -36,7 +36,7 @@ class Estimator(Plugin):
     def averager(self, rate: float, nominal: float) -> Averager:
         """The window on samples taken at `rate` [Hz]."""
         reach = int(self.half(nominal) * rate + 1e-9)
-        return weighted(self.weight(np.arange(-reach, reach + 1) / rate, nominal))
+        return make_weighted_averager(self.weight(np.arange(-reach, reach + 1) / rate, nominal))
 
     def window(self, nominal: float) -> Window:
         """The window as a record stores it, at the nominal frequency."""

@@ -10,18 +10,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.record.fall import NOISE_FACTOR, RECOVERED, REFERENCE, sample_noise, starting_level
-from tractexp.record.record import DEAD
+from tractexp.record.record import DEAD_VOLTAGE_SHARE
 from tractexp.recording.trace import Trace
 
-LEAVES = 0.03  # of the reference, positive sequence
+LARGEST_USUAL_DEPARTURE = 0.03  # of the reference, positive sequence
 LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
 DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
 SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
-TOGETHER = 1024  # half cycles that are compared with their reference at once
+HALF_CYCLES_AT_ONCE = 1024  # half cycles that are compared with their reference at once
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
-LONGEST = 60.0  # s: what lasts longer is a new level
-ABRUPT = 3.0  # cycles within which a fault or a switch changes the voltage
+LONGEST_EXCURSION = 60.0  # s: what lasts longer is a new level
+LONGEST_ABRUPT_CYCLES = 3.0  # cycles within which a fault or a switch changes the voltage
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     levels, limits = _levels(trace)
     if not levels.any() or len(trace.t) < 4:
         return []
-    alive = levels.max(axis=0) > DEAD * np.percentile(levels.max(axis=0), 95)
-    levels = np.maximum(levels, DEAD * levels.max(axis=1, keepdims=True))  # what is gone does not change
+    alive = levels.max(axis=0) > DEAD_VOLTAGE_SHARE * np.percentile(levels.max(axis=0), 95)
+    levels = np.maximum(levels, DEAD_VOLTAGE_SHARE * levels.max(axis=1, keepdims=True))  # what is gone does not change
     events: list[Excursion] = []
     k = int(np.argmax(alive))
     count = max(2, round(REFERENCE / trace.step))
@@ -53,9 +53,9 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
         events.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
     reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
-    reference = np.maximum(reference, DEAD * levels.max(axis=1))
+    reference = np.maximum(reference, DEAD_VOLTAGE_SHARE * levels.max(axis=1))
     while k < len(trace.t):
-        inside, reference = _inside(levels[:, k : k + TOGETHER], limits, reference, trace.step)
+        inside, reference = _inside(levels[:, k : k + HALF_CYCLES_AT_ONCE], limits, reference, trace.step)
         if inside:
             k += inside
             continue
@@ -65,7 +65,7 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
             reference = _reference(levels, event.end, count)
         k = event.end
         if event.returned:
-            k, reference = _after(trace, levels, limits, reference, k, count)
+            k, reference = _find_next_reference(trace, levels, limits, reference, k, count)
     return events
 
 
@@ -83,10 +83,10 @@ def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
     """The positive sequence and each phase that is ever alive, and by how much of its reference each must leave it."""
     levels = np.concatenate([trace.U[None], trace.phases])
     most = np.percentile(levels, 95, axis=1)
-    levels = levels[most > DEAD * most.max()]
+    levels = levels[most > DEAD_VOLTAGE_SHARE * most.max()]
     middle = np.maximum(np.median(levels, axis=1), 1e-12)
     spread = sample_noise(levels) / middle
-    usual = np.array([LEAVES] + [LEAVES_PHASE] * (len(levels) - 1))
+    usual = np.array([LARGEST_USUAL_DEPARTURE] + [LEAVES_PHASE] * (len(levels) - 1))
     return levels, np.maximum(usual, NOISE_FACTOR * spread)
 
 
@@ -103,7 +103,7 @@ def _one(
     inside = np.all(np.abs(off) <= allowed, axis=0)
     crossed = (side * off[row] < -limits[row]) & (side * off < 0).any(axis=0)
     back = np.flatnonzero(inside | crossed)
-    back = back[back * trace.step <= LONGEST]
+    back = back[back * trace.step <= LONGEST_EXCURSION]
     start = _onset(levels[row], reference[row], limits[row], k, earliest)
     flat = _flat(levels, limits, k, trace.step)
     leaves = len(back) and (inside[back[0]] or flat is None or k + back[0] - flat < FLAT / trace.step)
@@ -119,7 +119,7 @@ def _one(
     if new_level:
         after = trace.U[end : end + max(2, round(REFERENCE / trace.step))]
         most = float(np.median(after)) / reference[0] - 1 if len(after) else most
-    within = max(2, round(ABRUPT * trace.cycle / trace.step))
+    within = max(2, round(LONGEST_ABRUPT_CYCLES * trace.cycle / trace.step))
     sudden = _fastest(levels[row, max(start - 2, 0) : end + 1] / reference[row], within) > 0.5 * max(
         np.abs(whole[row]).max(), limits[row]
     )
@@ -151,7 +151,7 @@ def _flat(levels: np.ndarray, limits: np.ndarray, k: int, step: float) -> int | 
     return k + int(np.argmax(level)) if level.any() else None
 
 
-def _after(
+def _find_next_reference(
     trace: Trace, levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, k: int, count: int
 ) -> tuple[int, np.ndarray]:
     """Where to go on after a return, and the reference: a slow rest of the recovery is no excursion of its own."""
@@ -169,4 +169,4 @@ def _after(
 
 def _reference(levels: np.ndarray, k: int, count: int) -> np.ndarray:
     """The level from sample k on; never zero, so that a phase that is dead there is far below what it becomes."""
-    return np.maximum(np.median(levels[:, k : k + count], axis=1), DEAD * levels.max(axis=1))
+    return np.maximum(np.median(levels[:, k : k + count], axis=1), DEAD_VOLTAGE_SHARE * levels.max(axis=1))

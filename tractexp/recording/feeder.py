@@ -27,12 +27,12 @@ from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.unit import in_doubt
 
-ALIKE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
+LARGEST_PHASE_DIFFERENCE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
 SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
-SYSTEM = 0.75  # of the RMS: what three phases have of one sequence at some time
+LEAST_SEQUENCE_SHARE = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
-FOLLOWS = 0.5  # of another bus's residual: by less the currents do not follow a bus better
+LARGEST_RESIDUAL_SHARE = 0.5  # of another bus's residual: by less the currents do not follow a bus better
 COUPLER = re.compile(r"coupler|bus[ _-]?tie|sectionali[sz]|kuppl|母联|分段|шсв|секцион|acoplador")
 ALONE = "no current is recorded: there is no load to fit"
 HALF = "half of an autotransformer feeder"
@@ -91,7 +91,7 @@ def propose(recording: Recording) -> list[Feeder]:
     options += _single(recording, phasors, volts, amps, taken, level)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
-    marked = (_marked(recording, phasors, feeder, level, strange) for feeder in feeders)
+    marked = (_mark_unloaded(recording, phasors, feeder, level, strange) for feeder in feeders)
     return sorted(marked, key=lambda f: not f.loaded)
 
 
@@ -140,7 +140,7 @@ def can_be_named(recording: Recording) -> bool:
     return volts > 0 and amps > 0 and len(waves) > 1
 
 
-def unrecognised(recording: Recording) -> str:
+def explain_unrecognized(recording: Recording) -> str:
     """Why a recording shows no load by itself, one clause."""
     kinds = [kind(c) for c in recording.channels if c.form == "waveform"]
     longest = max(recording.segments, key=lambda s: (s.stop - s.first) / s.rate)
@@ -215,7 +215,7 @@ def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
         return ()
     X = np.nanmedian(X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1)
     size = np.abs(X)
-    if not size.min() > 0 or np.ptp(size) > ALIKE * size.mean():
+    if not size.min() > 0 or np.ptp(size) > LARGEST_PHASE_DIFFERENCE * size.mean():
         return ()
     off = np.abs(np.degrees(np.angle(X[1:] / X[0] * [[TURN, TURN**2], [TURN**2, TURN]])))
     for angles, order in zip(off, ((0, 1, 2), (0, 2, 1)), strict=True):
@@ -246,10 +246,10 @@ def _feeders(
             said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
         name = load.name or bus.name or "the feeder"
         feeders.append(Feeder(voltages, load.numbers, connection, name=name, why=tuple(said)))
-    return _asked(recording, phasors, feeders)
+    return _add_question(recording, phasors, feeders)
 
 
-def _asked(recording: Recording, phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
+def _add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
     """The same, and where they are several that exclude each other, the question which it is in each of them."""
     if len(feeders) == 1:
         return feeders
@@ -314,14 +314,14 @@ def _buses(
     ties, why = _named_alike(recording, phasors, load, buses)
     if len(ties) == 1:
         return [(ties[0], why)]
-    apart = max(_apart(phasors, a, b) for a, b in combinations(ties, 2))
+    apart = max(_measure_difference(phasors, a, b) for a, b in combinations(ties, 2))
     if apart < SAME_BUS:
         return [(ties[0], f"{len(ties)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken")]
     stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
     best = min(buses, key=lambda bus: stray[id(bus)])
-    if FOLLOWS * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
+    if LARGEST_RESIDUAL_SHARE * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
         best = min(ties, key=lambda bus: stray[id(bus)])
-    others = [b for b in buses if FOLLOWS * stray[id(b)] < stray[id(best)] and _apart(phasors, best, b) >= SAME_BUS]
+    others = [b for b in buses if LARGEST_RESIDUAL_SHARE * stray[id(b)] < stray[id(best)] and _measure_difference(phasors, best, b) >= SAME_BUS]
     if not (loaded and any(b in ties for b in others)):
         return [(best, "the currents follow these voltages best")]
     return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
@@ -358,7 +358,7 @@ def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
     return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
 
 
-def _apart(phasors: Snapshots, a: Group, b: Group) -> float:
+def _measure_difference(phasors: Snapshots, a: Group, b: Group) -> float:
     """How far two groups of voltages differ at worst, as a share of the larger."""
     x, y = (_positive(phasors.of(g.numbers), g.pairs) for g in (a, b))
     return float(np.nanmax(np.abs(x - y)) / max(np.nanmax(np.abs(x)), 1e-12))
@@ -417,7 +417,7 @@ def _single(
             loaded = not is_return(recording, i)
             name = f"{group.name} ({HALF})" if any(HALF in each for each in said) else group.name
             feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded))
-        single.append(_asked(recording, phasors, feeders))
+        single.append(_add_question(recording, phasors, feeders))
     return single
 
 
@@ -445,10 +445,10 @@ def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     X = np.nan_to_num(phasors.of(numbers))
     rest = np.nan_to_num(phasors.rest[[phasors.numbers.index(i) for i in numbers]])
     size = np.sqrt((np.abs(X) ** 2 + rest**2).mean(axis=0))
-    return not (np.abs(sequences(X)).max(axis=0) > SYSTEM * size).any()
+    return not (np.abs(sequences(X)).max(axis=0) > LEAST_SEQUENCE_SHARE * size).any()
 
 
-def _marked(recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
+def _mark_unloaded(recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
     """The feeder, marked as unloaded where it carries no load."""
     if not feeder.loaded:
         return feeder

@@ -4,29 +4,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tractexp.record.change import SMALL, Change, load_changes, runs
+from tractexp.record.change import SMALL_LOAD_SHARE, Change, load_changes, runs
 from tractexp.record.fall import FEWEST_BEFORE, REFERENCE, SHALLOWEST, STEADY
 from tractexp.record.no_dip import OPEN_POLE, UNCLEARED
 from tractexp.record.phasor import Phasors, WaveSource
 from tractexp.record.record import Record
-from tractexp.recording.excursion import DEAD, Excursion, excursions
+from tractexp.recording.excursion import DEAD_VOLTAGE_SHARE, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
-STEP_AT_MOST = 0.15  # of the voltage: a larger change that stays is no tap or switching step
-SYSTEM = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
+LARGEST_SWITCHING_STEP = 0.15  # of the voltage: a larger change that stays is no tap or switching step
+LEAST_POSITIVE_SHARE = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
 SWINGS = 2  # so many at least
 SWING_PERIOD = (0.15, 5.0)  # s
-EVEN = 3.0  # the longest period of a pole slip over its shortest, at most
-BALANCED = 0.05  # U2 over U1: swings are balanced, faults are not
+LARGEST_PERIOD_RATIO = 3.0  # the longest period of a pole slip over its shortest, at most
+LARGEST_SWING_UNBALANCE = 0.05  # U2 over U1: swings are balanced, faults are not
 OPEN_CURRENT = 0.05  # of the mean of the other two: a phase that carries less is open
 OPEN_CYCLES = 3.0  # so long at least
 SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
 OF_LOADS = ("load loss", "load step")  # kinds of which the voltage shows nothing
-LISTED = 0.2  # of the apparent power: a smaller step of a load is no event
-SAME = 0.1  # of a current: within it the current stays while a voltage is lost
+LEAST_LISTED_STEP = 0.2  # of the apparent power: a smaller step of a load is no event
+LARGEST_CURRENT_CHANGE = 0.1  # of a current: within it the current stays while a voltage is lost
 BLOWN = 0.1  # of a phase: less is left where a fuse has blown
 LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03  # the same, longer than a fault lasts; how little the others change
 FUSE_CYCLES = 3.0  # so long at least
@@ -79,14 +79,14 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     spans += _open_alone(trace, spans)
     spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
     changes = _own_changes(trace, [e for _, e in spans])
-    listed = (c for c in changes if abs(c.ratio - 1) > LISTED)
-    spans += [("load loss" if c.ratio < SMALL else "load step", _beside(trace, c.first + 1, c.stop)) for c in listed]
+    listed = (c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP)
+    spans += [("load loss" if c.ratio < SMALL_LOAD_SHARE else "load step", _build_current_span(trace, c.first + 1, c.stop)) for c in listed]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
-    return [_describe(trace, kind, e, bounds) for kind, e in _merged(spans)]
+    return [_describe(trace, kind, e, bounds) for kind, e in _merge_ramps(spans)]
 
 
-def _merged(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
+def _merge_ramps(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursion]]:
     """The same in order of time, with ramps between which nothing else happens as one."""
     merged: list[tuple[str, Excursion]] = []
     for kind, e in spans:
@@ -109,12 +109,12 @@ def _no_system(trace: Trace) -> bool:
     """Whether three voltages never turn as three phases do: pick-up on a dead line, or one quantity three times."""
     if len(trace.phases) < 3:
         return False
-    return not (np.maximum(trace.U, trace.U2) > SYSTEM * np.sqrt((trace.phases**2).mean(axis=0))).any()
+    return not (np.maximum(trace.U, trace.U2) > LEAST_POSITIVE_SHARE * np.sqrt((trace.phases**2).mean(axis=0))).any()
 
 
 def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
     """Whether an excursion is a swing of a pole slip: in it, or a smaller one right beside it."""
-    near = round(SWING_PERIOD[1] / 5 / trace.step) if abs(e.worst) < STEP_AT_MOST else 0
+    near = round(SWING_PERIOD[1] / 5 / trace.step) if abs(e.worst) < LARGEST_SWITCHING_STEP else 0
     return e.start < slip.end + near and e.end > slip.start - near
 
 
@@ -129,7 +129,7 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
         return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
-    if not e.returned and abs(e.worst) <= STEP_AT_MOST and e.new_level:
+    if not e.returned and abs(e.worst) <= LARGEST_SWITCHING_STEP and e.new_level:
         return [("step" if e.sudden else "ramp", e)]
     if not e.sudden:
         return [("ramp", e)]
@@ -146,7 +146,7 @@ def _until_alive(trace: Trace, e: Excursion) -> Excursion:
 
 def _dead(trace: Trace, e: Excursion) -> np.ndarray:
     """When (M,) every phase is gone."""
-    return np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD * e.reference
+    return np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD_VOLTAGE_SHARE * e.reference
 
 
 def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
@@ -161,12 +161,12 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
     flows = current.min() > CARRIES * np.percentile(trace.I, 95) and np.median(_clean(trace)[:, before], axis=1).all()
     if not flows or (inside.stop - inside.start) * trace.step < FUSE_CYCLES * trace.cycle:
         return None
-    stays = np.abs(trace.I[:, inside] - current[:, None]) < SAME * current[:, None]
+    stays = np.abs(trace.I[:, inside] - current[:, None]) < LARGEST_CURRENT_CHANGE * current[:, None]
     left = np.median(trace.phases[:, inside], axis=1) / voltage
     lasts = (end - e.start) * trace.step > UNCLEARED
     gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
     alone = gone.any() and not gone.all() and ((gone | others).all() or lasts)
-    blown = stays.mean() > 1 - CARRIES and ((left < DEAD).all() or alone)
+    blown = stays.mean() > 1 - CARRIES and ((left < DEAD_VOLTAGE_SHARE).all() or alone)
     return replace(e, end=min(end, len(trace.t) - 1)) if blown else None
 
 
@@ -203,7 +203,7 @@ def _open_alone(trace: Trace, spans: list[tuple[str, Excursion]]) -> list[tuple[
     if len(trace.I) != 3:
         return []
     return [
-        ("open pole", _beside(trace, a, b))
+        ("open pole", _build_current_span(trace, a, b))
         for a, b in _open_runs(trace)
         if not any(s.start < b and s.end > a for _, s in spans)
     ]
@@ -216,7 +216,7 @@ def _inrush(trace: Trace) -> list[tuple[str, Excursion]]:
     carries = CARRIES * np.percentile(trace.I, 99)
     rich = ((trace.second > SECOND * trace.I) & (carries < trace.I) & _clean(trace)).any(axis=0)
     least = max(3, round(INRUSH_CYCLES * trace.cycle / trace.step))
-    return [("inrush", _beside(trace, run.start, run.stop)) for run in runs(rich, least)]
+    return [("inrush", _build_current_span(trace, run.start, run.stop)) for run in runs(rich, least)]
 
 
 def _clean(trace: Trace) -> np.ndarray:
@@ -224,7 +224,7 @@ def _clean(trace: Trace) -> np.ndarray:
     return trace.I**2 + trace.second**2 > CLEAN * trace.content**2
 
 
-def _beside(trace: Trace, a: int, b: int) -> Excursion:
+def _build_current_span(trace: Trace, a: int, b: int) -> Excursion:
     """A span that the currents mark, not the voltage."""
     return Excursion(a, b, 0.0, True, False, True, max(float(np.median(trace.U)), 1e-12))
 
@@ -237,7 +237,7 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
     if level <= 0:
         return []
     lows = [k for k in _swings(U / level) if _smooth(U / level, k, trace)]
-    lows = [k for k in lows if not trace.U2[k] > BALANCED * max(trace.U[k], level)]
+    lows = [k for k in lows if not trace.U2[k] > LARGEST_SWING_UNBALANCE * max(trace.U[k], level)]
     slips, first = [], 0
     while first < len(lows):
         last = first + 1
@@ -284,7 +284,7 @@ def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
 def _even(t: np.ndarray) -> bool:
     steps = np.diff(t)
     low, high = SWING_PERIOD
-    return bool(steps.min() >= low and steps.max() <= high and steps.max() <= EVEN * steps.min())
+    return bool(steps.min() >= low and steps.max() <= high and steps.max() <= LARGEST_PERIOD_RATIO * steps.min())
 
 
 def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int]]) -> Happening:

@@ -21,16 +21,16 @@ def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
     three = [k for k, f in enumerate(feeders) if len(f.currents) == 3]
     level = max((phasors.size(feeders[k].currents) for k in three), default=0.0)
     loaded = [k for k in three if phasors.size(feeders[k].currents) > UNLOADED * level]
-    if closed := _closed(phasors, feeders, loaded):
-        return _said(feeders, loaded, *closed)
+    if closed := _find_closed_sum(phasors, feeders, loaded):
+        return _describe_closure(feeders, loaded, *closed)
     for bus in sorted({feeders[k].voltages for k in loaded}):
         own = [k for k in loaded if feeders[k].voltages == bus]
-        if closed := _closed(phasors, feeders, own):
-            feeders = _said(feeders, own, *closed)
+        if closed := _find_closed_sum(phasors, feeders, own):
+            feeders = _describe_closure(feeders, own, *closed)
     return feeders
 
 
-def _closed(phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]) -> tuple[np.ndarray, float] | None:
+def _find_closed_sum(phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]) -> tuple[np.ndarray, float] | None:
     """(signs, residual) of the simplest sum of three or more currents that closes; None where none does."""
     if len(loaded) < 3:
         return None
@@ -65,7 +65,7 @@ def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
     return np.sqrt(sums / np.maximum(most, 1e-300))
 
 
-def _said(feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float) -> "list[Feeder]":
+def _describe_closure(feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float) -> "list[Feeder]":
     marked = list(feeders)
     out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
     for k, sign in zip(loaded, signs, strict=True):

@@ -12,20 +12,20 @@ from tractexp.errors import UserError
 from tractexp.plugin import build
 from tractexp.record import Event, Record, detect, find_dips
 from tractexp.record.dips import FileDip, check_load
-from tractexp.record.phasor import Phasors, joined
-from tractexp.recording.arrangement import arranged
+from tractexp.record.phasor import Phasors, join_phasors
+from tractexp.recording.arrangement import arrange_feeder
 from tractexp.recording.feeder import Feeder, buses_alone, propose
 from tractexp.recording.happening import OF_LOADS, Happening, happenings_in, happenings_of
 from tractexp.recording.measure import FeederWaves, phasors_of
-from tractexp.recording.quality import Quality, network_frequency, quality, stamped
+from tractexp.recording.quality import Quality, measure_stamp_jitter, network_frequency, quality
 from tractexp.recording.reader import WaveformReader
 from tractexp.recording.recording import Recording, Segment
-from tractexp.recording.trace import joined as joined_traces
+from tractexp.recording.trace import join_traces as joined_traces
 from tractexp.recording.trace import of_waves
 from tractexp.recording.unit import check_doubt, in_doubt, secondary_of
 
-ALIVE = 0.5  # of the greatest voltage: at less the frequency is not measured
-APART = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
+LEAST_MEASURED_VOLTAGE = 0.5  # of the greatest voltage: at less the frequency is not measured
+LATEST_START = 0.06  # s: three cycles, within which what happened and the dip that is fitted begin
 
 
 @dataclass(frozen=True)
@@ -144,7 +144,7 @@ class View:
         if recording is None:
             return []
         segment = max(recording.segments, key=lambda s: s.rate)
-        stamps, f = stamped(recording, segment), network_frequency(recording)
+        stamps, f = measure_stamp_jitter(recording, segment), network_frequency(recording)
         return [quality(recording, k, segment, stamps, f) for k in range(len(recording.channels))]
 
     @functools.cached_property
@@ -181,7 +181,7 @@ class View:
         for shown in self.sights:
             source = shown.phasors[0] if shown.phasors else shown.record
             if source is not None and source.f is not None:
-                return float(np.median(source.f[ALIVE * source.U.max() <= source.U]))
+                return float(np.median(source.f[LEAST_MEASURED_VOLTAGE * source.U.max() <= source.U]))
         return None
 
 
@@ -212,7 +212,7 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
         try:
             check_doubt(recording, feeder.channels)
             if feeder.loaded or not loaded:
-                feeder = arranged(recording, feeder)
+                feeder = arrange_feeder(recording, feeder)
         except UserError as error:
             said = (str(error),)
         bus = buses.setdefault(str((feeder.voltages, feeder.connection)), _Bus())
@@ -254,7 +254,7 @@ def sight(
                 waves = FeederWaves.of(recording, feeder, segment)
                 trace = of_waves(waves, segment.rate, segment.start, recording.frequency, measured)
                 traces.append(trace if feeder.currents else trace.without_currents())
-        phasors += [joined(parts)] if parts else []
+        phasors += [join_phasors(parts)] if parts else []
         changes += happenings_in(joined_traces(traces), recording.trigger) if traces else []
     dips, refused = [], ""
     try:
@@ -263,7 +263,7 @@ def sight(
             dips = reader.dips(feeder, streams, recording.frequency, recording.trigger)
     except UserError as error:
         refused = str(error)
-    numbered = _numbered(changes, dips, reader.path, refused)
+    numbered = _number_events(changes, dips, reader.path, refused)
     unexamined = "; ".join(said) if said and not phasors else ""
     secondary = secondary_of(recording, feeder.channels)
     shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said), unexamined=unexamined,
@@ -293,7 +293,7 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
                 after=(power * what.after[0], power * what.after[1]))
         for what in happenings_of(record)
     ]  # fmt: skip
-    numbered = list(_numbered(changes, _own(record) if dips is None else dips, record.source))
+    numbered = list(_number_events(changes, _own(record) if dips is None else dips, record.source))
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
     return Sight(record.name, tuple(numbered), record=record)
@@ -308,14 +308,14 @@ def _own(record: Record) -> list[FileDip]:
     ]
 
 
-def _numbered(
+def _number_events(
     changes: Sequence[Happening], dips: Sequence[FileDip], source: str, refused: str = ""
 ) -> Iterator[LoadEvent]:
     """The events, each with the dip that the reader cuts out of it."""
     results = {dip.number: dip.result for dip in dips}
     for what, number in zip(changes, _numbers(changes, dips), strict=True):
         event, why = _event(results.get(number) if number else None, refused)
-        if event is not None and abs(event.t_start - what.start) > APART:
+        if event is not None and abs(event.t_start - what.start) > LATEST_START:
             why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
         yield LoadEvent(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
 

@@ -53,12 +53,12 @@ def plain(text: str) -> str:
 @functools.cache
 def pair_pattern(letters: str) -> re.Pattern[str]:
     """Two different phases of one order as a name writes them: AB, A-B, L1-L2, L1L2, Ua-Ub, R/Y."""
-    one, before = _beginning(letters)
+    one, before = _build_beginning(letters)
     word = r"\d" if letters == DIGITS else "[a-z]"
     return re.compile(rf"{before}({one})(?:[-_/. ](?:[uve][_ ]?)?)?(l?)({one})(?!{word}(?![ng]))")
 
 
-def _beginning(letters: str) -> tuple[str, str]:
+def _build_beginning(letters: str) -> tuple[str, str]:
     """(one letter of an order, what may stand before it) as patterns."""
     before = r"(?<!\d)" if letters == DIGITS else rf"(?:(?<![a-z])|(?<=[{QUANTITY}l]))"
     return f"[{letters}]", before
@@ -96,7 +96,7 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
     name = re.sub(rf"(?<![a-z\d])(l?{one})\s*相", r" phase \1 ", name)
     text = name.translate(CYRILLIC)
     for order in (letters, DIGITS):
-        mark = _found(text, order)
+        mark = _find_mark(text, order)
         if mark is not None:
             begin = mark.begin
             if re.search(rf"(?:(?<![a-z])|(?<=(?<![a-z])[{QUANTITY}pq]))l$", text[:begin]):
@@ -109,7 +109,7 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
     return name, False
 
 
-def _found(text: str, letters: str) -> PhaseMark | None:
+def _find_mark(text: str, letters: str) -> PhaseMark | None:
     """The mark of a name; where U and V are phases, the first letter may be that of the quantity (U U-V, V_W)."""
     quantity = re.search(r"(?<![a-z])[uv][ _(]*(?=[a-z])", text) if letters.lower() == "uvw" else None
     if quantity is not None:

@@ -15,16 +15,16 @@ FLAT_TOP = 1e-4  # of the span: values so near each other are one value
 WAVES = 1000.0  # Hz: slower sampling cannot show a stator transient
 FEW_CLIPPED = 1e-3  # of the samples: more is not fit for waves
 WHITE = 3.0  # standard errors that the lag-1 correlation of white noise stays within
-GAP = 1.5  # steps: time stamps farther apart leave a gap
+STAMP_GAP_STEPS = 1.5  # steps: time stamps farther apart leave a gap
 HARMONICS = 25  # as many as the rate allows are taken away to see the noise
 QUIET_CYCLES = 10  # whole cycles in which noise and distortion are estimated, if so many are calm
 LONGEST_CALM = 60.0  # s of it in which they are sought
 SORTED = 1 << 20  # samples among which the least difference of two is sought
-TOGETHER = 1024  # cycles that are compared at once
+CYCLES_AT_ONCE = 1024  # cycles that are compared at once
 WINDOWS_AT_ONCE = 64  # of ten cycles each
 FEWEST_CALM = 2  # cycles in a row that repeat: one alone is no calm
-REPEATS = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
-LEVEL = 0.05  # by which their RMS differs at most
+LARGEST_REPEAT_DIFFERENCE = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
+LARGEST_RMS_DIFFERENCE = 0.05  # by which their RMS differs at most
 AT_WORK = {"voltage": 0.5}  # of the RMS of the largest calm: less is a dead line's, and not the state before an event
 IDLE = 0.005  # the same of a current, which a fault multiplies
 
@@ -59,14 +59,14 @@ def quality(
 
     `network` [Hz] is the frequency that the others show; a channel that is no wave of it is measured by itself.
     """
-    jitter, holes = stamps or stamped(recording, segment)
+    jitter, holes = stamps or measure_stamp_jitter(recording, segment)
     channel = recording.channels[number]
     x = channel.values(segment.first, segment.stop)
     valid = np.isfinite(x)
     gaps = int(np.count_nonzero(~valid)) + holes
     step, span = _step(channel, x if valid.all() else x[valid])
     f = _frequency(recording, number, segment, network)
-    clipped = _clipped(channel, x, segment, f or recording.frequency, step)
+    clipped = _measure_clipped_share(channel, x, segment, f or recording.frequency, step)
     offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE))
     colour = _colour(lag, count, noise, step)
     return Quality(
@@ -75,7 +75,7 @@ def quality(
     )  # fmt: skip
 
 
-def stamped(recording: Recording, segment: Segment) -> tuple[float, int]:
+def measure_stamp_jitter(recording: Recording, segment: Segment) -> tuple[float, int]:
     """(jitter in steps, holes) of the time stamps of a segment; (nan, 0) where the file has none."""
     stamps = recording.extra.get("stamps")
     if stamps is None or len(stamps) < segment.stop or segment.stop - segment.first < 3:
@@ -85,7 +85,7 @@ def stamped(recording: Recording, segment: Segment) -> tuple[float, int]:
     usual = float(np.median(steps))
     if not usual > 0:
         return float("nan"), 0
-    holes = steps > GAP * usual
+    holes = steps > STAMP_GAP_STEPS * usual
     t -= t[0]
     if holes.any():
         t[1:] -= np.cumsum(np.where(holes, steps - usual, 0.0))
@@ -106,7 +106,7 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     return (float(steps.min()) if len(steps) else 0.0), span
 
 
-def _clipped(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
+def _measure_clipped_share(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
     """Share of samples in runs at a limit: the converter's where the file says it, else the extreme values."""
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
@@ -201,8 +201,8 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
     energy, changed = _variances(blocks)
     both, whole = energy[1:] + energy[:-1], slice(0, len(x))
     with np.errstate(invalid="ignore", divide="ignore"):
-        alike = changed / both < REPEATS
-        alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LEVEL
+        alike = changed / both < LARGEST_REPEAT_DIFFERENCE
+        alike &= np.abs(np.sqrt(energy[1:] / energy[:-1]) - 1) < LARGEST_RMS_DIFFERENCE
     spans = [(run.start, run.stop) for run in runs(alike, FEWEST_CALM - 1)]
     size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in spans]
     for (a, b), rms in zip(spans, size, strict=True):
@@ -214,7 +214,7 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
 
 def _variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Variances of cycles (M, n), (M,), and of what each differs by from the one before, (M - 1,); some at a time."""
-    parts = [cycles[max(first - 1, 0) : first + TOGETHER] for first in range(0, len(cycles), TOGETHER)]
+    parts = [cycles[max(first - 1, 0) : first + CYCLES_AT_ONCE] for first in range(0, len(cycles), CYCLES_AT_ONCE)]
     own = [part[min(k, 1) :].var(axis=1) for k, part in enumerate(parts)]
     changed = [np.diff(part, axis=0).var(axis=1) for part in parts]
     return np.concatenate([np.empty(0), *own]), np.concatenate([np.empty(0), *changed])

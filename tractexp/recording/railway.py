@@ -22,8 +22,8 @@ RETURN = re.compile(r"return|retour|rück|(?<![a-z])(?:rc|ret|rail|rl|bt)(?![a-z
 CONTACT = re.compile(r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс")
 FEED = re.compile(r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线")
 DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
-CYCLE = 0.02  # s over which its ripple is averaged out
-FALLS = 0.03  # of it: a dip
+RIPPLE_SECONDS = 0.02  # s over which its ripple is averaged out
+LEAST_DC_DIP = 0.03  # of it: a dip
 LONGEST = 1 << 20  # samples that are looked at
 
 
@@ -102,7 +102,7 @@ def direct_voltage(recording: Recording) -> str:
     """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else ""."""
     volts = [c for c in recording.channels if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)]
     segment = max(recording.segments, key=lambda s: s.stop - s.first)
-    n, said = max(3, round(CYCLE * segment.rate)) | 1, ""
+    n, said = max(3, round(RIPPLE_SECONDS * segment.rate)) | 1, ""
     for channel in volts:
         x = channel.values(segment.first, min(segment.stop, segment.first + LONGEST))
         x = x[np.isfinite(x)]
@@ -118,12 +118,12 @@ def direct_voltage(recording: Recording) -> str:
             continue
         low = int(np.argmin(smooth / mean))
         fall = 1 - float(smooth[low]) / mean
-        below = smooth / mean < 1 - max(FALLS, fall / 2)
+        below = smooth / mean < 1 - max(LEAST_DC_DIP, fall / 2)
         at = segment.start + (int(np.argmax(below)) + n // 2) / segment.rate
         dip = (
             f", and falls to {1000 * smooth[low]:.4g} V ({fall:.1%}) at {at:.3f} s for "
             f"{1000 * np.count_nonzero(below) / segment.rate:.0f} ms"
-            if fall > FALLS
+            if fall > LEAST_DC_DIP
             else ""
         )
         said = said or (

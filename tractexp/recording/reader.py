@@ -8,20 +8,20 @@ from typing import Any, ClassVar
 
 from tractexp import plugin, quoting
 from tractexp.errors import DATA, UserError, check_range, setting
-from tractexp.overrides import assigned
+from tractexp.overrides import format_assignment
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
-from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, level, numbered
-from tractexp.record.phasor import Phasors, joined
+from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut_dips, level
+from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.record.record import LOAD
-from tractexp.recording.arrangement import arranged, tuned
+from tractexp.recording.arrangement import arrange_feeder, tune_frequency
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
-from tractexp.recording.feeder import Feeder, can_be_named, propose, unrecognised
+from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized, propose
 from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
 from tractexp.recording.unit import check_doubt, check_units, in_units
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 Stream = tuple[Phasors, Sequence[Waves]]  # of segments that follow each other without a gap
 BESIDE = 2  # cycles of waveforms stored beside a record's phasors, for the windows of its first and last
@@ -56,7 +56,7 @@ class WaveformReader(Reader):
         numbers = {x: [recording.number(i, f"data.{key}") for i in getattr(self, key)] for x, key in keys.items()}
         recording, chosen = in_units(recording, self.units, numbers), numbers["U"]
         every = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage" and c.form == "waveform"]
-        return tuned(recording, chosen or every)
+        return tune_frequency(recording, chosen or every)
 
     @abstractmethod
     def recording(self) -> Recording:
@@ -87,7 +87,7 @@ class WaveformReader(Reader):
         Raises `UserError` where there is none, and where the load carries no power.
         """
         wholes = [self._whole(feeder, stream, frequency) for stream in streams]
-        file_dips = numbered(wholes, self.path, self.pre, self.post, trigger)
+        file_dips = cut_dips(wholes, self.path, self.pre, self.post, trigger)
         waves = [each for _, several in streams if len(several) > 1 for each in several]
         file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:
@@ -145,7 +145,7 @@ class WaveformReader(Reader):
                     )
         feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
         check_doubt(recording, feeder.channels)
-        return arranged(recording, feeder)
+        return arrange_feeder(recording, feeder)
 
     def _usual(self, recording: Recording) -> Any:
         """The connection that the number of channels says; two voltages to ground say none."""
@@ -164,18 +164,18 @@ class WaveformReader(Reader):
             why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *only.why)
             check_doubt(recording, only.channels)
             reverse = only.reverse_current != self.reverse_current
-            return arranged(recording, replace(only, reverse_current=reverse, why=why))
+            return arrange_feeder(recording, replace(only, reverse_current=reverse, why=why))
         if not proposed:
             every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
             noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
             remedy = f"{DATA.voltages} and {DATA.currents} name one; " if can_be_named(recording) else ""
             raise UserError(
-                f"{recording.source} shows no load by itself: {unrecognised(recording)}{noted}; {remedy}its channels: "
+                f"{recording.source} shows no load by itself: {explain_unrecognized(recording)}{noted}; {remedy}its channels: "
                 f"{every}"
             )
         loads = "; ".join(
             f"{f.name}: "
-            + quoting.shell(*(assigned(setting(f"data.{key}"), value) for key, value in f.settings.items()))
+            + quoting.shell(*(format_assignment(setting(f"data.{key}"), value) for key, value in f.settings.items()))
             for f in proposed
         )
         asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
@@ -202,7 +202,7 @@ class WaveformReader(Reader):
                 late = waves.late if self.skew else None
                 several.append(Waves(waves, segment.start, segment.rate, self.estimator, late))
             if parts:
-                streams.append((joined(parts), several))
+                streams.append((join_phasors(parts), several))
         if not streams:
             raise short[0]
         return streams
@@ -211,7 +211,7 @@ class WaveformReader(Reader):
         kind = estimator_of(self.estimator).name.replace("_", "-")
         steps = [dip.result.step for dip in dips if isinstance(dip.result, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
-        notes = [f"{kind} phasors{every}, {counted(len(dips), 'dip')}", *recording.notes, *feeder.why]
+        notes = [f"{kind} phasors{every}, {count_noun(len(dips), 'dip')}", *recording.notes, *feeder.why]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:

@@ -15,7 +15,7 @@ TUNED = 0.06  # of a nominal frequency: a network's frequency strays no farther
 MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a longer one is sampled
 PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
-LONG = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
+LONG_SNAPSHOT_WINDOWS = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
 
 
 # {recording: {(number, segment, f): (phasors, rest)}}: each load, bus and check of a file asks for the same channels
@@ -62,7 +62,7 @@ class Snapshots:
         size = np.nan_to_num(np.abs(self.of(numbers))).mean(axis=0)
         if not len(size):
             return 0.0
-        spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG, len(size) // 4)))
+        spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG_SNAPSHOT_WINDOWS, len(size) // 4)))
         return float(np.percentile(spans, 25, axis=1).max())
 
 

@@ -51,7 +51,7 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
     K, n = waves.shape[0] // 2, waves.shape[-1]
     first, last = phasors.t[0], phasors.t[-1]
     t = np.arange(first, last + 1e-9, 0.5 / nominal)
-    f = _tracked(phasors, nominal)
+    f = _track_frequency(phasors, nominal)
     width = rate / np.interp(t, phasors.t, f)  # samples in a window
     center = (t - start) * rate + 0.5  # sample k lies between k and k + 1
     low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
@@ -71,7 +71,7 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
         np.interp(t, phasors.t, np.abs(phasors.V2)) if K == 3 else np.full(len(t), np.nan),
         np.interp(t, phasors.t, phasors.S.real),
         np.interp(t, phasors.t, phasors.S.imag),
-        _turning(t, phasors.t, phasors.f),
+        _average_frequency(t, phasors.t, phasors.f),
         np.sqrt(2) * turned[:K],
         np.sqrt(2) * turned[K:],
         np.sqrt(np.maximum(squares[K:] - offset**2, 0)),
@@ -79,7 +79,7 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
     )
 
 
-def joined(traces: Sequence[Trace]) -> Trace:
+def join_traces(traces: Sequence[Trace]) -> Trace:
     """Traces that follow each other without a gap as one; what no window saw at a change of rate is interpolated."""
     if len(traces) == 1:
         return traces[0]
@@ -145,7 +145,7 @@ def of_record(record: Record) -> Trace:
     return Trace(thin(record.t), U, none, thin(record.U2), P, Q, thin(record.f), none, none, none, cycle)
 
 
-def _tracked(phasors: Phasors, nominal: float) -> np.ndarray:
+def _track_frequency(phasors: Phasors, nominal: float) -> np.ndarray:
     """The network's frequency at the phasors: a median over five cycles, within 10 % of nominal."""
     n = len(phasors.t)
     step = (phasors.t[-1] - phasors.t[0]) / max(n - 1, 1)
@@ -155,7 +155,7 @@ def _tracked(phasors: Phasors, nominal: float) -> np.ndarray:
     return np.clip(np.interp(np.arange(n), knots, smooth), 0.9 * nominal, 1.1 * nominal)
 
 
-def _turning(t: np.ndarray, at: np.ndarray, f: np.ndarray) -> np.ndarray:
+def _average_frequency(t: np.ndarray, at: np.ndarray, f: np.ndarray) -> np.ndarray:
     """The mean of f between the middles of the steps of t, so that its integral, the angle, stays the same."""
     angle = np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(at))])
     middles = np.concatenate([[t[0]], (t[1:] + t[:-1]) / 2, [t[-1]]])

@@ -65,12 +65,12 @@ def in_units(recording: Recording, units: Mapping[str, Any], chosen: Mapping[str
                 channels[i] = _of_unit(channels[i], quantity, small)
             taken |= {letter: bare}
         voltage = next((c.unit for c in (channels[i] for i in ours) if not in_doubt(c)), "")
-    channels = _sided(channels)
+    channels = _mark_secondary(channels)
     notes = (*recording.notes, *_note(channels, taken), *_secondary_note(channels))
     return replace(recording, channels=channels, notes=notes)
 
 
-def _sided(channels: Sequence[Channel]) -> list[Channel]:
+def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
     """The channels with S where their values are secondary: if a voltage has the size of one, and none is larger."""
     if not any(c.side for c in channels):
         return [*channels]

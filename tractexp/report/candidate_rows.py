@@ -12,7 +12,7 @@ from tractexp.discrepancy.judgement import judgements
 from tractexp.discrepancy.precision import effect_sizes
 from tractexp.inference.chance import by_draws
 from tractexp.inference.interval import ParameterEstimate
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 CHOSEN = "added"
 FITTED, ONE_STEP = "refitted", "one step"
@@ -68,18 +68,18 @@ def why_not_the_most_helpful(findings: Findings) -> str:
         return f"{promise}, but that does not make it an explanation: {_verdict_on(findings, best.name)}."
     chosen = next(r for r in list_candidates(findings) if r.standing == 0)
     return (
-        f"{promise}, yet the verdict is {joined(findings.names)}, which lowers the deviance by {chosen.drop:.0f}:"
+        f"{promise}, yet the verdict is {join_words(findings.names)}, which lowers the deviance by {chosen.drop:.0f}:"
         f" {_verdict_on(findings, best.name)}."
     )
 
 
-def beside(findings: Findings) -> str:
+def describe_untestable_beside(findings: Findings) -> str:
     """Why an effect that helps the base model may be called not testable: one sentence; "" where nothing is added."""
     chosen = findings.last.fit.names
     if not chosen:
         return ""
     return (
-        f"With {joined(chosen)} in the model there is less left for the others to explain: one that helps the"
+        f"With {join_words(chosen)} in the model there is less left for the others to explain: one that helps the"
         " base model alone may here be irrelevant, or not testable because a size that matters would stay in the noise."
     )
 

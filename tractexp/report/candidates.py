@@ -17,35 +17,35 @@ from tractexp.report.candidate_rows import (
     FITTED,
     ONE_STEP,
     CandidateRow,
-    beside,
     chance_level,
+    describe_untestable_beside,
     list_candidates,
     why_not_the_most_helpful,
 )
-from tractexp.report.predicted import BAR, predicted
-from tractexp.wording import joined
+from tractexp.report.predicted import BAR, add_prediction_section
+from tractexp.wording import join_words
 
 COLORS = {CHOSEN: PALETTE[2], TIED: PALETTE[4]}
 REFITTED, ESTIMATED = PALETTE[0], MEASURED
-ROOM = 1.2  # of the longest bar, for what stands beside the bars
+BAR_ROOM = 1.2  # of the longest bar, for what stands beside the bars
 MOST_SETS = 12  # that are compared in a table
 
 
 def candidates(page: Report, findings: Findings) -> None:
     """By the deviance that each lowers, or where names go by the model's error, by that."""
     if findings.evidence.there is not None:
-        return predicted(page, findings)
+        return add_prediction_section(page, findings)
     rows = list_candidates(findings)
     labels = _labels(rows)
     page.heading("Candidates by their evidence")
     finite = [row for row in rows if np.isfinite(row.drop)]
     if finite:
         page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
-    for sentence in (why_not_the_most_helpful(findings), beside(findings)):
+    for sentence in (why_not_the_most_helpful(findings), describe_untestable_beside(findings)):
         page.text(*[sentence] * bool(sentence))
     entries = [
         [
-            f"{labels[r]}: {joined(r.names)}" if len(r.names) > 1 else labels[r],
+            f"{labels[r]}: {join_words(r.names)}" if len(r.names) > 1 else labels[r],
             "" if np.isnan(r.drop) else f"{r.drop:.1f}",
             r.status,
             "; ".join(map(str, r.sizes)),
@@ -54,7 +54,7 @@ def candidates(page: Report, findings: Findings) -> None:
         for r in rows
     ]
     chosen = findings.last.fit.names
-    single = f"; that of an effect outside of it is what the events say with {joined(chosen)} in the model"
+    single = f"; that of an effect outside of it is what the events say with {join_words(chosen)} in the model"
     page.table(
         ["candidate", "deviance lowered by", "status", "size", "why"], entries,
         f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
@@ -77,7 +77,7 @@ def _bars(findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[Cand
     chance = chance_level(findings)
     chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
     chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
-    return chart.edge(chance, dash="dash").limits(None, 0.0, ROOM * max(chance, *(r.drop for r in rows)))
+    return chart.edge(chance, dash="dash").limits(None, 0.0, BAR_ROOM * max(chance, *(r.drop for r in rows)))
 
 
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
@@ -94,7 +94,7 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
 
 def _sets(page: Report, findings: Findings) -> None:
     rows = [
-        [joined(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
+        [join_words(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
          find_status(r, findings.verdict, findings.evidence, findings.context),
          "" if r.tests is None else by_draws(r.p_left)]
         for r in findings.evidence.rows[:MOST_SETS]
@@ -116,7 +116,7 @@ def _further(page: Report, findings: Findings) -> None:
         if j.score is not None:
             size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
         rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
-    names = joined(findings.last.fit.names)
+    names = join_words(findings.last.fit.names)
     with page.folded(f"What each effect would add to a model that has {names}"):
         page.table(
             ["effect", "status", "deviance lowered by", "one-step size", "why"], rows,

@@ -14,14 +14,14 @@ from tractexp.discrepancy.investigate import Findings
 from tractexp.discrepancy.precision import estimates
 from tractexp.discrepancy.remainder import Remainder
 from tractexp.inference.model_error import in_percent
-from tractexp.record.identity import Identity, described, title
+from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.candidates import candidates
 from tractexp.report.disagreement import noise, places
 from tractexp.report.extended import equations, interval, laws, parameters, value
 from tractexp.report.next_event import section
 from tractexp.report.overlay import overlaid
-from tractexp.report.proposal import headlines, proposed
-from tractexp.wording import alternatives, as_sentence, counted, epsilon, joined
+from tractexp.report.proposal import add_proposal_section, headlines
+from tractexp.wording import alternatives, as_sentence, count_noun, epsilon, join_words
 
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
@@ -52,9 +52,9 @@ def summary(findings: "Outcome") -> Report:
         )
     if near := content["nearest"]:
         closed = {role: (near["gap"][role] or {}).get("closed") for role in ROLES}
-        shares = joined([f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None])
+        shares = join_words([f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None])
         sizes = ", ".join(findings.sizes_of_nearest)
-        report.text(f"nearest, not accepted: {joined(near['effects'])}; gap closed {shares or 'unknown'}; {sizes}")
+        report.text(f"nearest, not accepted: {join_words(near['effects'])}; gap closed {shares or 'unknown'}; {sizes}")
     return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
 
 
@@ -80,13 +80,13 @@ def gap(content: Mapping[str, Any]) -> Table:
 
 def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[Identity]) -> Report:
     """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
-    fitted = f"{counted(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held out"
-    lead = "; ".join([*described(identities), f"{findings.context.model.title}, {fitted}"])
+    fitted = f"{count_noun(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held out"
+    lead = "; ".join([*describe_identities(identities), f"{findings.context.model.title}, {fitted}"])
     page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
     spoken = [[findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets]
     head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
-    sentences = [as_sentence(findings.reason), *left, *headlines(findings), _graded(findings)]
+    sentences = [as_sentence(findings.reason), *left, *headlines(findings), _describe_grade(findings)]
     kind = "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
     page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
@@ -94,9 +94,9 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
     )
     _smaller(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:
-        proposed(page, findings)
+        add_proposal_section(page, findings)
     if not findings.verdict.complete:
-        _left(page, findings)
+        _add_remainder_section(page, findings)
     if (chosen := findings.next_event) is not None:
         page.heading("What to record next").text(as_sentence(chosen.sentence()))
         section(page, chosen)
@@ -110,7 +110,7 @@ def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[
     return page
 
 
-def _graded(findings: Findings) -> str:
+def _describe_grade(findings: Findings) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if findings.names else "base"
     grade = findings.final_grade.adequacy
@@ -123,7 +123,7 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     table, near = gap(content), findings.nearest
     page.add(replace(table, rows=_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
-        rows = [[joined(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
+        rows = [[join_words(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
         page.text("What each name contributes:")
         page.table(["with", "model error, held out"], rows, "One more at a time, the one that helps most first.")
     if findings.fitted_to_both:
@@ -160,13 +160,13 @@ def _off(misfit: Mapping[str, Any]) -> list[str]:
     return [*(epsilon(misfit[name]) for name in shown), "" if chi2 is None else f"{chi2:.3f}"]
 
 
-def _left(page: Report, findings: Findings) -> None:
+def _add_remainder_section(page: Report, findings: Findings) -> None:
     """What is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
     shapes, near = findings.remainder, findings.nearest
-    whose = "the base model" if near is None else f"{joined(near.names)}, the nearest candidates,"
+    whose = "the base model" if near is None else f"{join_words(near.names)}, the nearest candidates,"
     if findings.names:
-        whose = f"the model with {joined(findings.names)}"
+        whose = f"the model with {join_words(findings.names)}"
     _shapes(page, findings, shapes, whose)
     if near is not None:
         _shapes(page, findings, findings.remainder_of_base, "the base model alone")
@@ -198,11 +198,11 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     assert near.row.tests is not None
     by_name = {e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)}
     own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
-    rows = [[joined(near.names), *map(_share, near.closed)]]
-    rows += [[joined(names), _share(share), ""] for names, share in near.others]
+    rows = [[join_words(near.names), *map(_share, near.closed)]]
+    rows += [[join_words(names), _share(share), ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
     page.table(["nearest candidates", "gap closed, fitted", "held out"], rows, words=(0,))
-    with page.folded(f"How large {joined(near.names)} would be"):
+    with page.folded(f"How large {join_words(near.names)} would be"):
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
             [[p.name, p.about, p.unit, value(e), interval(*e.interval), e.verdict] for e, p in own],

@@ -6,11 +6,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from tractexp.blocks import style
-from tractexp.blocks.chart import MOST, Chart
+from tractexp.blocks.chart import MOST_LINE_POINTS, Chart
 from tractexp.record import Event
 
 EXCESS = "#E69F00"  # shades what stands out
-WITHIN = 2.0  # standard deviations of the noise band
+BAND_DEVIATIONS = 2.0  # standard deviations of the noise band
 PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
 PIXELS = 580
@@ -52,7 +52,7 @@ def event_chart(
         above, measured = 1 + 2 * c, getattr(record, channel)
         if deviation is not None and around is not None:
             for panel, middle in ((above, around[c]), (above + 1, np.zeros(len(t)))):
-                _noise_band(chart, t, middle, WITHIN * deviation[c], panel)
+                _noise_band(chart, t, middle, BAND_DEVIATIONS * deviation[c], panel)
         for place in places:
             if place.channel == channel:
                 for panel in (above, above + 1):
@@ -66,6 +66,6 @@ def event_chart(
 
 def _noise_band(chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""
-    some = slice(None, None, -(-len(t) // MOST))
-    name = f"± {WITHIN:g} σ of the noise"
+    some = slice(None, None, -(-len(t) // MOST_LINE_POINTS))
+    name = f"± {BAND_DEVIATIONS:g} σ of the noise"
     chart.band(name, t[some], (middle - half)[some], (middle + half)[some], style.FAINT, panel)

@@ -11,7 +11,7 @@ from tractexp.identification.verdict import brief
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.model.model import compose
 from tractexp.model.sites import KINDS
-from tractexp.wording import alternatives, joined, with_error
+from tractexp.wording import alternatives, join_words, with_error
 
 CURVE, TEXTBOOK = "#0072B2", "#D55E00"
 
@@ -23,7 +23,7 @@ def laws(page: Report, findings: Findings) -> None:
     entries = forms(findings)
     page.heading("Where it acts, and by which law")
     rows = [
-        [f.name, joined(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
+        [f.name, join_words(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
          f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs, f.effect.name]
         for f in entries
     ]  # fmt: skip
@@ -69,7 +69,7 @@ def parameters(page: Report, findings: Findings) -> None:
         words=(1, 2, len(columns) - 1),
     )  # fmt: skip
     if retained := findings.held:
-        page.text(f"These events cannot tell {joined(list(retained))}: the extended model holds what was found.")
+        page.text(f"These events cannot tell {join_words(list(retained))}: the extended model holds what was found.")
     if why := [f"{e.parameter.name} is {e.verdict}." for e in parameter_estimates if brief(e.verdict) != e.verdict]:
         with page.folded("Why some are known badly, and what of them is known"):
             page.items(why)
@@ -77,17 +77,17 @@ def parameters(page: Report, findings: Findings) -> None:
 
 def equations(page: Report, findings: Findings) -> None:
     """The equations that changed or came in, and how the extended model is used."""
-    from tractexp.model.printed import changed
+    from tractexp.model.printed import list_changed_lines
 
     page.heading("The extended model")
     if others := alternatives(findings.verdict.sets[1:]):
-        page.text(f"It has {joined(findings.names)}; {others} instead would fit these events as well.")
+        page.text(f"It has {join_words(findings.names)}; {others} instead would fit these events as well.")
     command = use_of(findings.context.load.domain, "conf/model/extended.yaml")
     page.text(f"conf/model/extended.yaml beside this page: {command}. Its equations that changed or came in:")
     base = findings.context.load
     effects = [findings.catalogue[n].effect for n in findings.names]
     extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain, window=base.window)
-    for was, line in changed(base.latex(), extended.latex()):
+    for was, line in list_changed_lines(base.latex(), extended.latex()):
         if was is not None:
             page.text("before").equation(was).text("after")
         page.equation(line)

@@ -19,10 +19,10 @@ from tractexp.identification.yardstick import poles_in_words
 from tractexp.inference.model_error import in_percent
 from tractexp.inference.residual_tests import LAGS, REJECTED, autocorrelation
 from tractexp.provenance import command
-from tractexp.record.identity import Identity, described, title
+from tractexp.record.identity import Identity, describe_identities, title
 from tractexp.report.events import CAPTION, CalculatedCurve, event_chart
 from tractexp.report.waves import CAPTION as WAVE_CAPTION
-from tractexp.report.waves import IN_WAVES, Drawn, prepared, spectrum_chart, wave_chart
+from tractexp.report.waves import IN_WAVES, Drawn, describe_preparation, spectrum_chart, wave_chart
 from tractexp.wording import as_sentence, epsilon, in_words, shown_in_words
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 ROLES = {"train": "fitted", "validate": "held out"}
 KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
-SHOWN = 4  # events whose curves are not folded away
+MOST_OPEN_EVENTS = 4  # events whose curves are not folded away
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
 EXACT = (
     "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power before each dip free."
@@ -45,7 +45,7 @@ MODEL_ERROR = (
     " apparent power S. epsilon: Eq. (20)."
 )
 FIXED = "fixed"
-SMALLEST = 0.01  # of the deviance: starts closer than this ended in the same place
+SAME_END_SHARE = 0.01  # of the deviance: starts closer than this ended in the same place
 
 
 def digits(value: float) -> str:
@@ -107,7 +107,7 @@ def report(fit: "Identification") -> Report:
     result, details = fit.result, fit.details
     uncertainty, together = details.uncertainty, details.agreement
     names, of = [e["name"] for e in result.events if e["role"] == "train"], result.identities
-    lead = "; ".join([*described(of), f"{result.optimizer}, seed {result.seed}."])
+    lead = "; ".join([*describe_identities(of), f"{result.optimizer}, seed {result.seed}."])
     page = Report(f"Identification of {title(of, names)}", lead)
     page.verdict(
         as_sentence(fit.headline),
@@ -124,11 +124,11 @@ def report(fit: "Identification") -> Report:
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
-    page.heading("The search and the estimate").add(ended(fit)).text(as_sentence(fit.end_of_search))
+    page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(as_sentence(fit.end_of_search))
     page.chart(_fitness(fit.search_result.history, result), "Best objective of the search; dashed: the estimate's.")
     _starts(page, details.estimation, uncertainty)
     page.heading("What the fit leaves")
-    _left(page, uncertainty)
+    _add_residual_section(page, uncertainty)
     page.heading("How the estimates depend on each other")
     _correlation(page, uncertainty)
     page.heading("How this page was made")
@@ -156,13 +156,13 @@ def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None
     page.text(*[IN_WAVES] * waves).text(CAPTION)
     all_curves(page, fits, [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)])
     if waves:
-        page.heading("What was done to the records", level=3).items(prepared(problem, fits))
+        page.heading("What was done to the records", level=3).items(describe_preparation(problem, fits))
 
 
 def all_curves(page: Report, fits: Sequence[Any], noises: Sequence[np.ndarray] = ()) -> None:
     """The charts of each event, with the noise of those fitted, the first; of many the later ones are folded away."""
     for fit, noise, k in itertools.zip_longest(fits, noises, range(len(fits))):
-        with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= SHOWN else nullcontext():
+        with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= MOST_OPEN_EVENTS else nullcontext():
             event_curves(page, fit, noise)
 
 
@@ -198,7 +198,7 @@ def parameters(fit: "Identification") -> Table:
     )
 
 
-def ended(fit: "Identification") -> Table:
+def tabulate_search_end(fit: "Identification") -> Table:
     """Where the search ended beside the estimate, and a word where they differ."""
     search, result, away = fit.result.search, fit.result, fit.astray
     keys = [("objective", "pu²"), ("epsilon_p", "1"), ("epsilon_q", "1")] if search else []
@@ -292,7 +292,7 @@ def _fitness(history: History, result: Any) -> Chart:
 def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty) -> None:
     """Where each descent to the estimate ended."""
     starts = estimated.starts
-    above = np.maximum([s.above for s in starts], SMALLEST)
+    above = np.maximum([s.above for s in starts], SAME_END_SHARE)
     chart = Chart("rank of the start", ["deviance above the best"], log_y=True, pixels=280)
     looks = {"search": ("x", style.PALETTE[1]), "box": ("circle", style.PALETTE[0]),
              "beside the best": ("diamond", style.PALETTE[2])}  # fmt: skip
@@ -316,14 +316,14 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
                    [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts])  # fmt: skip
 
 
-def _left(page: Report, uncertainty: Uncertainty) -> None:
+def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
     """Whitened residuals, their autocorrelation, and what the tests of them say."""
     likelihood, tests = uncertainty.of_noise, uncertainty.tests
     drive, events = likelihood.problem.drive, likelihood.problem.events
     white = uncertainty.whitened.reshape(drive.channels, -1)
     colored = [t for t in tests if t["p"] < REJECTED]
     page.text(_conclusion(colored, len(tests)))
-    for e, event in enumerate(events[:SHOWN]):
+    for e, event in enumerate(events[:MOST_OPEN_EVENTS]):
         part = drive.part(e)
         compared = [c for c in range(drive.channels) if likelihood.valid[c, part].any()]
         chart = Chart("t [s]", [f"{drive.names[c]} [σ]" for c in compared], pixels=320)

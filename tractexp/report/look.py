@@ -9,8 +9,8 @@ from typing import Any
 from tractexp.blocks import Report, Table
 from tractexp.recording.overview import Sight, View
 from tractexp.report import unfitted
-from tractexp.report.look_charts import charts, unassigned
-from tractexp.wording import as_sentence, change, counted, degrees, figure, share
+from tractexp.report.look_charts import add_unassigned_channels, charts
+from tractexp.wording import as_sentence, change, count_noun, degrees, figure, share
 
 OPEN = 2  # loads whose charts are drawn at once; those of the others when they are opened
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
@@ -42,7 +42,7 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
             page.heading("Channels").add(channels(entry))
-            unassigned(page, view)
+            add_unassigned_channels(page, view)
     return page
 
 
@@ -72,13 +72,13 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     loads = sum(len(f["feeders"]) for f in files)
     events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
     worth = sum(e["worth"] for e in events)
-    return f"{counted(loads, 'load')}, {counted(len(events), 'event')}, {worth} worth fitting."
+    return f"{count_noun(loads, 'load')}, {count_noun(len(events), 'event')}, {worth} worth fitting."
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
     commands = [(f["name"], f["command"]) for f in entry["feeders"] if f["command"]]
     if not entry["feeders"]:
-        page.verdict(f"{as_sentence(unnamed(entry))} The channels are listed below.")
+        page.verdict(f"{as_sentence(explain_unnamed(entry))} The channels are listed below.")
     elif not commands:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
         page.items([as_sentence(said) for said in unfitted.sentences([entry])])
@@ -129,7 +129,7 @@ def _summary(entry: Mapping[str, Any]) -> list[str]:
 def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], folded: bool) -> None:
     """One load: what it is, what happened, and charts to look into."""
     page.heading(entry["name"])
-    page.items([*_described(entry), *entry["why"], *entry["said"]])
+    page.items([*_describe_entry(entry), *entry["why"], *entry["said"]])
     if entry["events"]:
         page.add(events(entry))
     else:
@@ -138,7 +138,7 @@ def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], fold
         charts(page, view, shown)
 
 
-def _described(entry: Mapping[str, Any]) -> list[str]:
+def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
     sentences = []
     if entry["channels"]:
         numbers = [*entry["voltages"], *entry["currents"]]
@@ -163,7 +163,7 @@ def quiet(entry: Mapping[str, Any]) -> str:
     return NOTHING if entry["loaded"] else NO_LOAD
 
 
-def unnamed(entry: Mapping[str, Any]) -> str:
+def explain_unnamed(entry: Mapping[str, Any]) -> str:
     """Why a file shows no load, and what would help, if anything does."""
     if entry.get("lacks") and not entry["can_be_named"]:
         return f"no load can be fitted: {entry['lacks']}"

@@ -17,20 +17,20 @@ from tractexp.recording.overview import Sight, View
 from tractexp.recording.quality import spectrum
 from tractexp.recording.recording import unit_of
 from tractexp.recording.trace import half_cycle_rms
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
-MOST = 400_000  # samples of waveforms that a page holds: a megabyte
+MOST_PAGE_SAMPLES = 400_000  # samples of waveforms that a page holds: a megabyte
 MOST_PHASORS = 200_000  # values of phasors that a page holds
 MOST_OTHERS = 50_000  # samples of channels of no load
 MOST_ARROWS = 30_000  # values of phasors at the cursor that a chart holds
 LINES = 7  # that a load's phasors make
 DETAILED = 12  # events that have a chart of their own where the whole is thinned
 AROUND = (0.1, 0.3)  # s before and after an event in such a chart
-LONGEST = 3.0  # s of an event there
-CYCLES = 10  # of a spectrum
+LONGEST_SHOWN_EVENT = 3.0  # s of an event there
+SPECTRUM_CYCLES = 10  # of a spectrum
 HEIGHTS = (1.3, 1.3, 1, 1, 1, 1.2, 0.7)  # of the panels of a load
 TRACE, TRACES = 0.19, 24  # height of a status channel beside these; so many have room
-CYCLE = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
+FIRST_CURSOR_CYCLES = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
 PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
@@ -50,12 +50,12 @@ def charts(page: Report, view: View, shown: Sight) -> None:
         every, coarse = _every(view)
         page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
         with page.folded("Spectrum before anything happened"):
-            page.chart(_spectrum(view.recording, shown), f"{CYCLES} cycles, Hann window, of phase a.")
+            page.chart(_spectrum(view.recording, shown), f"{SPECTRUM_CYCLES} cycles, Hann window, of phase a.")
         if max(every, coarse) > 1:
             _details(page, view, shown)
 
 
-def unassigned(page: Report, view: View) -> None:
+def add_unassigned_channels(page: Report, view: View) -> None:
     """The channels of no load, a panel for each unit."""
     recording = view.recording
     assert recording is not None
@@ -74,13 +74,13 @@ def unassigned(page: Report, view: View) -> None:
     for panel, group in enumerate(panels.values()):
         for k, channel in enumerate(group):
             for segment in (s for s in recording.segments if s.stop > s.first + 1):
-                y = _thinned(functools.partial(_read, channel, segment), segment.stop - segment.first, every)
+                y = _thin_wave(functools.partial(_read, channel, segment), segment.stop - segment.first, every)
                 chart.samples(channel.name, segment.start, every / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
-    with page.folded(f"The {counted(count, 'channel')} of no load"):
+    with page.folded(f"The {count_noun(count, 'channel')} of no load"):
         page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
 
 
-def _marked(chart: Chart, shown: Sight) -> Chart:
+def _mark_events(chart: Chart, shown: Sight) -> Chart:
     """Events shaded over all panels, each with its number or kind at the top."""
     spans = [shown.record.t] if shown.record is not None else [p.t for p in shown.phasors]
     room = LABEL * float(spans[-1][-1] - spans[0][0])
@@ -109,7 +109,7 @@ def _of_record(shown: Sight) -> Chart:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
     first = float(record.t[0])
-    return _marked(chart, shown).cursor(next((event.what.start for event in shown.events), first))
+    return _mark_events(chart, shown).cursor(next((event.what.start for event in shown.events), first))
 
 
 def _every(view: View) -> tuple[int, int]:
@@ -118,7 +118,7 @@ def _every(view: View) -> tuple[int, int]:
     assert recording is not None
     lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
     phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
-    return max(1, -(-lines * recording.samples // MOST)), max(1, -(-phasors // MOST_PHASORS))
+    return max(1, -(-lines * recording.samples // MOST_PAGE_SAMPLES)), max(1, -(-phasors // MOST_PHASORS))
 
 
 def _of_waves(
@@ -148,7 +148,7 @@ def _of_waves(
     if recording.trigger is not None and first <= recording.trigger <= last:
         chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
     happened = (event.what.start for event in shown.events if first <= event.what.start <= last)
-    return _marked(chart, shown).cursor(next(happened, first) + CYCLE / recording.frequency)
+    return _mark_events(chart, shown).cursor(next(happened, first) + FIRST_CURSOR_CYCLES / recording.frequency)
 
 
 def _further(view: View) -> str:
@@ -167,9 +167,9 @@ def _waves(
     if waves.shape[1] < 2:
         return
     K = waves.shape[0] // 2
-    colors, names = _colors(K), _named(recording, shown.feeder, K)
+    colors, names = _colors(K), _name_waves(recording, shown.feeder, K)
     for k in range(2 * K):
-        y = _thinned(functools.partial(_row, waves, k), waves.shape[1], every)
+        y = _thin_wave(functools.partial(_row, waves, k), waves.shape[1], every)
         chart.samples(PHASES[K][k % K], start, every / rate, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
     t, rms = half_cycle_rms(waves, rate, recording.frequency)
     if len(t) > 1:
@@ -182,7 +182,7 @@ def _colors(phases: int) -> tuple[str, ...]:
     return COLORS if phases > 1 else (VOLTAGE,)
 
 
-def _named(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
+def _name_waves(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
     """What the waves of a load are called at the cursor: by phase, and by channel where they are its channels."""
     numbers = (*feeder.voltages, *feeder.currents)
     if len(numbers) != 2 * phases:  # line voltages, or two current transformers, of which phases are made
@@ -220,7 +220,7 @@ def _row(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
     return waves[k : k + 1, a:b][0]
 
 
-def _thinned(read: Callable[[int, int], np.ndarray], n: int, every: int) -> np.ndarray:
+def _thin_wave(read: Callable[[int, int], np.ndarray], n: int, every: int) -> np.ndarray:
     """A wave of n samples, or its `envelope`, of what `read(first, stop)` gives a block at a time."""
     block = max(BLOCK // (2 * every), 1) * 2 * every
     parts = (read(a, min(a + block, n)) for a in range(0, n, block))
@@ -242,7 +242,7 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
     assert shown.feeder is not None
     segment = recording.waveforms()[0]
     whole = FeederWaves.of(recording, shown.feeder, segment)
-    length = min(round(CYCLES * segment.rate / recording.frequency), whole.shape[1])
+    length = min(round(SPECTRUM_CYCLES * segment.rate / recording.frequency), whole.shape[1])
     first = shown.events[0].what.start - segment.start if shown.events else np.inf
     quiet = int(np.clip(first * segment.rate, length, whole.shape[1]))
     waves = whole[:, quiet - length : quiet]
@@ -259,7 +259,7 @@ def _details(page: Report, view: View, shown: Sight) -> None:
     """A chart with every sample for each event, where the chart of the whole has not all of them."""
     for event in shown.events[:DETAILED]:
         what = event.what
-        span = (what.start - AROUND[0], min(what.end, what.start + LONGEST) + AROUND[1])
+        span = (what.start - AROUND[0], min(what.end, what.start + LONGEST_SHOWN_EVENT) + AROUND[1])
         with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
             page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:

@@ -8,11 +8,11 @@ from tractexp.blocks import Report, Table
 from tractexp.recording.excursion import HYSTERESIS
 from tractexp.recording.happening import OF_LOADS
 from tractexp.report import unfitted
-from tractexp.report.look import NO_LOAD, SECONDARY, channels, events, frequency, quiet, size, starts, unnamed
-from tractexp.wording import counted, figure, joined
+from tractexp.report.look import NO_LOAD, SECONDARY, channels, events, explain_unnamed, frequency, quiet, size, starts
+from tractexp.wording import count_noun, figure, join_words
 
 NOTES = 3  # of a file that have room
-LISTED = 4  # events of a bus that its line has room for
+MOST_LINE_EVENTS = 4  # events of a bus that its line has room for
 Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
@@ -20,7 +20,7 @@ def summary(content: Entry) -> Report:
     """One screen: which load and which dip to fit by which command, then a line for each file, bus and load."""
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
-        held = [counted(len(entry["channels"]), "channel")] * bool(entry["channels"])
+        held = [count_noun(len(entry["channels"]), "channel")] * bool(entry["channels"])
         page.text("; ".join([_about(entry), *held]), *(f"  note: {note}" for note in entry["notes"][:NOTES]))
         page.text(*[f"  note: {len(entry['notes']) - NOTES} more"] * (len(entry["notes"]) > NOTES))
         buses = _buses(entry["feeders"])
@@ -31,11 +31,11 @@ def summary(content: Entry) -> Report:
         if unloaded and len(unloaded) < len(entry["feeders"]):
             page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
         page.items(list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"])))
-        page.text(*[f"  {unnamed(entry)}"] * (not buses and len(content["files"]) > 1))
+        page.text(*[f"  {explain_unnamed(entry)}"] * (not buses and len(content["files"]) > 1))
     return page
 
 
-def everything(content: Entry) -> Report:
+def build_full_report(content: Entry) -> Report:
     """What files hold: notes, channels, loads and why they are such, all events, all commands."""
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
@@ -49,7 +49,7 @@ def everything(content: Entry) -> Report:
             page.add(*[events(feeder)] * bool(feeder["events"])).items([quiet(feeder)] * (not feeder["events"]))
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
-        page.text(*([f"  {unnamed(entry)}"] * (not entry["feeders"])))
+        page.text(*([f"  {explain_unnamed(entry)}"] * (not entry["feeders"])))
     return page
 
 
@@ -58,7 +58,7 @@ def _answer(files: Sequence[Entry]) -> str:
     feeders = [feeder for entry in files for feeder in entry["feeders"]]
     promising = [feeder for feeder in feeders if _worth(feeder)]
     if promising:
-        best = max(promising, key=lambda feeder: _answered(_worth(feeder)[0]))
+        best = max(promising, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
         best = next(feeder for feeder in promising if feeder["command"] == best["command"])  # the one fitted by it
         first = _worth(best)[0]
         command = f"; to fit it: {best['command']}" if best["command"] else ""
@@ -70,12 +70,12 @@ def _answer(files: Sequence[Entry]) -> str:
     if not happened and unexamined:
         return unexamined[0]
     if not happened:
-        return f"nothing is worth fitting: {next(iter((*map(quiet, feeders), *map(unnamed, files))), '')}"
-    feeder, event = max(happened, key=lambda each: _answered(each[1]))
+        return f"nothing is worth fitting: {next(iter((*map(quiet, feeders), *map(explain_unnamed, files))), '')}"
+    feeder, event = max(happened, key=lambda each: _measure_answer(each[1]))
     return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
 
 
-def _answered(event: Entry) -> float:
+def _measure_answer(event: Entry) -> float:
     """How much of a load answers an event and stays: the depth times the active power after it.
 
     Not the apparent one: a line of 1 MW and -98 Mvar is no load.
@@ -165,8 +165,8 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
     happened = [_event(event) for event in _of_voltage(bus)]
-    more = [f"{len(happened) - LISTED} more"] * (len(happened) > LISTED)
-    events = joined([*happened[:LISTED], *more]) or (
+    more = [f"{len(happened) - MOST_LINE_EVENTS} more"] * (len(happened) > MOST_LINE_EVENTS)
+    events = join_words([*happened[:MOST_LINE_EVENTS], *more]) or (
         quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
     )
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])
@@ -199,6 +199,6 @@ def _fit(feeder: Entry) -> str:
     if worth := _worth(feeder):
         return f"yes: {', '.join(map(_label, worth))}{_reservation(worth[0]['why'])}"
     if feeder["events"]:
-        event = max(feeder["events"], key=_answered)
+        event = max(feeder["events"], key=_measure_answer)
         return f"no: {_clause(event['why'], ', but ') if event['kind'] == 'dip' else event['kind']}"
     return f"no: {_clause(quiet(feeder), ', but ')}" if feeder["U"] is not None else "no: see below"

@@ -8,7 +8,7 @@ from tractexp.blocks.style import PALETTE
 from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, NextEvent
 from tractexp.wording import as_sentence
 
-LISTED = 2  # events of each kind that a table has
+MOST_EVENTS_A_KIND = 2  # events of each kind that a table has
 KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
 
 
@@ -81,7 +81,7 @@ def _kind(tried: EventTrial) -> str:
 
 def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
     ranked = sorted((t for t in choice.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, t.event.burden))
-    return ranked[:LISTED]
+    return ranked[:MOST_EVENTS_A_KIND]
 
 
 def _row(tried: EventTrial) -> list[str]:

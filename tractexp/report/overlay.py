@@ -18,7 +18,7 @@ IN_PHASORS = (
     "The record's estimator run over the recorded and over the calculated currents, so that its window cancels; a dip"
     " of few cycles is smeared alike in both."
 )
-SHOWN = 4  # events of each role that are not folded
+MOST_OPEN_OVERLAYS = 4  # events of each role that are not folded
 
 
 def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
@@ -26,16 +26,16 @@ def overlaid(page: Report, overlays: Sequence[Overlay]) -> Report:
     page.text(WAVE_CAPTION if any(isinstance(o.event, WaveEvent) for o in overlays) else CAPTION)
     for role, held_out in (("fitted", False), ("held out", True)):
         group = [o for o in overlays if o.held_out == held_out]
-        for overlay in group[:SHOWN]:
-            _shown(page, overlay, role)
-        if more := group[SHOWN:]:
+        for overlay in group[:MOST_OPEN_OVERLAYS]:
+            _add_overlay(page, overlay, role)
+        if more := group[MOST_OPEN_OVERLAYS:]:
             with page.folded(f"{len(more)} more events, {role}"):
                 for overlay in more:
-                    _shown(page, overlay, role)
+                    _add_overlay(page, overlay, role)
     return page
 
 
-def _shown(page: Report, overlay: Overlay, role: str) -> None:
+def _add_overlay(page: Report, overlay: Overlay, role: str) -> None:
     event = overlay.event
     page.heading(f"{event.record.name}, {role}", level=3)
     if not isinstance(event, WaveEvent):

@@ -82,7 +82,7 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     page.verdict(as_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     page.chart(by_depth, _caption(needed))
-    _asked(page, planned)
+    _add_question_section(page, planned)
     page.heading("What another kind of dip would tell")
     page.text(
         "One property of the dip is varied at a time, the others stay as planned. Each curve is half of the 95 %"
@@ -141,7 +141,7 @@ def marks(low: float, high: float) -> list[float]:
     return [float(f"{digit}e{power}") for power in powers for digit in digits]
 
 
-def _asked(page: Report, planned: Planned) -> None:
+def _add_question_section(page: Report, planned: Planned) -> None:
     """The question, the dip and the parameters it is planned at."""
     needed, problem = planned.needed, planned.problem
     stands = ", which is known as well as M," * (needed.parameter == INERTIA)

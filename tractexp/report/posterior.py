@@ -8,10 +8,10 @@ from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.posterior import ENOUGH, PosteriorSample
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.record.identity import title_of
-from tractexp.report.profile import ALIKE, SCATTER, axis, declared, span
+from tractexp.report.profile import LARGEST_END_DIFFERENCE, SCATTER, axis, find_declared_parameter, span
 from tractexp.wording import as_sentence
 
-BINS = 60  # of a histogram
+HISTOGRAM_BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair
 CAPTION = (
     "Blue: how often the draws fall on each value. Dashed: the normal distribution that the curvature at the estimate"
@@ -29,7 +29,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     sentences = (
         [as_sentence(grade)] * bool(grade) + [_agreement(uncertainty, drawn)] + [SCATTER] * (not uncertainty.exact)
     )
-    page.verdict(*sentences, _settled(drawn), kind="good" if uncertainty.exact and drawn.converged else "plain")
+    page.verdict(*sentences, _describe_chain_length(drawn), kind="good" if uncertainty.exact and drawn.converged else "plain")
     page.charts([_chart(uncertainty, drawn, j) for j in range(len(drawn.names))])
     page.text(CAPTION)
     page.heading("Intervals")
@@ -40,7 +40,7 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
             for name, value, own, interval in zip(
                 drawn.names, uncertainty.values, uncertainty.intervals, drawn.intervals, strict=True
             )
-            for p in (declared(uncertainty, name),)
+            for p in (find_declared_parameter(uncertainty, name),)
         ],
         words=(1,),
     )
@@ -58,13 +58,13 @@ def _agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
     off = np.abs(drawn.intervals - uncertainty.intervals).max(axis=1) / np.maximum(
         np.ptp(uncertainty.intervals, axis=1) / 2, 1e-300
     )
-    moved = [name for name, far in zip(drawn.names, off, strict=True) if not far <= ALIKE]
+    moved = [name for name, far in zip(drawn.names, off, strict=True) if not far <= LARGEST_END_DIFFERENCE]
     if not moved:
         return "The posterior confirms the intervals of the fit."
     return f"The posterior confirms the intervals of the fit but those of {', '.join(moved)}: take the posterior's."
 
 
-def _settled(drawn: PosteriorSample) -> str:
+def _describe_chain_length(drawn: PosteriorSample) -> str:
     """Whether the chain is long enough, in a sentence."""
     lasts = f"The chain lasts {drawn.steps / drawn.autocorrelation:.0f} autocorrelation times"
     return f"{lasts}." if drawn.converged else f"{lasts}; {ENOUGH:.0f} are asked for: raise steps."
@@ -73,7 +73,7 @@ def _settled(drawn: PosteriorSample) -> str:
 def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
     draws, value, half = drawn.draws[:, j], uncertainty.values[j], uncertainty.half[j]
     low, high = drawn.intervals[j]
-    density, edges = np.histogram(draws, BINS, density=True)
+    density, edges = np.histogram(draws, HISTOGRAM_BINS, density=True)
     chart = Chart(axis(uncertainty, drawn.names[j]), ["density"], pixels=250, legend=False)
     chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):

@@ -13,21 +13,21 @@ from tractexp.discrepancy.precision import effect_sizes
 from tractexp.discrepancy.proposal.library import term
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.inference.model_error import in_percent
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 ADDED, TIED, OTHER, BASE = PALETTE[2], PALETTE[4], PALETTE[0], MEASURED
-MOST = 16  # sets that are shown beside those named
+MOST_SHOWN_SETS = 16  # sets that are shown beside those named
 BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the bars
 
 
-def predicted(page: Report, findings: Findings) -> None:
+def add_prediction_section(page: Report, findings: Findings) -> None:
     """The model's error on the held-out events with each set, and by what it divides that of the base model."""
     criteria, evidence = findings.context.criteria, findings.evidence
     best = [evidence.term] if evidence.term else []
     every = sorted((*evidence.every, *best), key=lambda row: row.predicted.left)
     every = [row for row in every if np.isfinite(row.predicted.error)]
     always = (evidence.base, *findings.verdict.kept, *best)
-    rows = [row for k, row in enumerate(every) if k < MOST or row in always]
+    rows = [row for k, row in enumerate(every) if k < MOST_SHOWN_SETS or row in always]
     page.heading("Candidates by what they predict")
     if not rows:
         page.text("No set has a steady state on the held-out events.")
@@ -57,7 +57,7 @@ def predicted(page: Report, findings: Findings) -> None:
 def _label(findings: Findings, row: SetEvidence) -> str:
     if row is findings.evidence.term:
         return term(row.names[0]).words
-    return joined(row.names) or "the base model"
+    return join_words(row.names) or "the base model"
 
 
 def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:

@@ -10,11 +10,11 @@ from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.profile import End, LikelihoodProfile, Profiles
 from tractexp.identification.uncertainty import Uncertainty
-from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, shown
+from tractexp.identification.verdict import IDENTIFIED, ParameterVerdict, format_half_width
 from tractexp.record.identity import title_of
 from tractexp.wording import as_sentence
 
-ALIKE = 0.2  # of the half interval by curvature: closer ends are the same interval
+LARGEST_END_DIFFERENCE = 0.2  # of the half interval by curvature: closer ends are the same interval
 ABOVE = 2.2  # thresholds that a chart shows
 BELOW = 0.12  # thresholds of room below the best fit
 ENOUGH = "is enough"
@@ -70,7 +70,7 @@ def report(scan: Profiles, grade: str = "") -> Report:
 
 def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
     value, half = _curvature(scan, profile.name)
-    about = declared(scan.uncertainty, profile.name)
+    about = find_declared_parameter(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
     return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
 
@@ -92,21 +92,21 @@ def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
     if profile.minima:
         said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
     if not said:
-        said.append(_compared(scan, profile))
+        said.append(_compare_half_widths(scan, profile))
     return as_sentence("; ".join(said))
 
 
-def _compared(scan: Profiles, profile: LikelihoodProfile) -> str:
+def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
     """Both sides closed, one minimum: whether ± half is enough."""
     (low, high), (value, half) = profile.interval, _curvature(scan, profile.name)
     if not np.isfinite(half):
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
-    if np.abs(off).max() <= ALIKE:
-        return f"{shown(value, half, *declared(scan.uncertainty, profile.name).bounds)} {ENOUGH}"
-    if off[0] > ALIKE and off[1] < -ALIKE:
+    if np.abs(off).max() <= LARGEST_END_DIFFERENCE:
+        return f"{format_half_width(value, half, *find_declared_parameter(scan.uncertainty, profile.name).bounds)} {ENOUGH}"
+    if off[0] > LARGEST_END_DIFFERENCE and off[1] < -LARGEST_END_DIFFERENCE:
         return "narrower than by curvature"
-    if off[0] < -ALIKE and off[1] > ALIKE:
+    if off[0] < -LARGEST_END_DIFFERENCE and off[1] > LARGEST_END_DIFFERENCE:
         return "wider than by curvature"
     up, down = high - value, value - low
     reach, side = (up / down, "up") if up > down else (down / up, "down")
@@ -170,14 +170,14 @@ def _smooth(profile: LikelihoodProfile) -> tuple[np.ndarray, np.ndarray]:
     return x, np.interp(x, profile.values, root) ** 2
 
 
-def declared(uncertainty: Uncertainty, name: str) -> Any:
+def find_declared_parameter(uncertainty: Uncertainty, name: str) -> Any:
     """The parameter (a `Parameter`) of a name, which may say its event."""
     return next(p for p in uncertainty.likelihood.problem.parameters if p.name == name.partition("[")[0])
 
 
 def axis(uncertainty: Uncertainty, name: str) -> str:
     """A parameter and its unit, as an axis says them."""
-    unit = declared(uncertainty, name).unit
+    unit = find_declared_parameter(uncertainty, name).unit
     return name if unit == "1" else f"{name} [{unit}]"
 
 

@@ -15,7 +15,7 @@ from tractexp.discrepancy.proposal.propose import Proposal, to_dict
 from tractexp.discrepancy.proposal.wording import chance, proposed_in_words
 from tractexp.inference.model_error import in_percent
 from tractexp.report.extended import interval
-from tractexp.wording import as_sentence, in_words, joined, percent, with_error
+from tractexp.wording import as_sentence, in_words, join_words, percent, with_error
 
 MISSED, TERM = "#9A9A9A", "#0072B2"
 EVENTS = 4  # whose charts are shown at once
@@ -26,28 +26,28 @@ def headlines(findings: Findings) -> list[str]:
     return [as_sentence(s) for s in proposed_in_words(to_dict(findings.proposed, PLUGIN), None)[:2]]
 
 
-def proposed(page: Report, findings: Findings) -> None:
+def add_proposal_section(page: Report, findings: Findings) -> None:
     """The term, its size, where and when it acts, what it explains, and what looks like it."""
     page.heading("Proposal")
     proposal = findings.proposed.proposal
     if proposal is None:
         page.text(f"No term is proposed: {findings.proposed.why}.")
-        _tried(page, findings.proposed.tried)
+        _add_tried_terms(page, findings.proposed.tried)
         return
     page.text(f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found by a screen.")
     page.equation(proposal.term.latex)
     if proposal.term.exogenous:
         page.text("It is not a function of the voltage: something happened by itself, and need not happen again.")
     _numbers(page, proposal)
-    _explained(page, proposal)
-    _drawn(page, proposal)
+    _add_explanation(page, proposal)
+    _plot_term(page, proposal)
     _rivals(page, proposal)
     page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
     command = f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
     page.code(f"cp {PLUGIN} <your package>/effects/ && {command}")
     with page.folded("The plugin file"):
         page.code(proposal.source)
-    _tried(page, findings.proposed.tried)
+    _add_tried_terms(page, findings.proposed.tried)
 
 
 def _numbers(page: Report, proposal: Proposal) -> None:
@@ -75,7 +75,7 @@ def _numbers(page: Report, proposal: Proposal) -> None:
     )  # fmt: skip
 
 
-def _explained(page: Report, proposal: Proposal) -> None:
+def _add_explanation(page: Report, proposal: Proposal) -> None:
     rows = [
         [role, *map(in_percent, (g.before.error.value, g.after.error.value)), percent(g.explained)]
         for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
@@ -88,14 +88,14 @@ def _explained(page: Report, proposal: Proposal) -> None:
     )  # fmt: skip
 
 
-def _drawn(page: Report, proposal: Proposal) -> None:
+def _plot_term(page: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
         page.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        page.charts([_missed(judged, e) for e in range(min(len(judged.by_event), EVENTS))])
+        page.charts([_plot_missed_part(judged, e) for e in range(min(len(judged.by_event), EVENTS))])
 
 
-def _missed(judged: GapTest, e: int) -> Chart:
+def _plot_missed_part(judged: GapTest, e: int) -> Chart:
     bench = judged.context
     assert bench is not None
     event = bench.events[e]
@@ -120,7 +120,7 @@ def _rivals(page: Report, proposal: Proposal) -> None:
             "These events cannot tell them from the term proposed.",
         )  # fmt: skip
     if proposal.alike:
-        names = joined([f"{name} ({share:.0%})" for name, share in proposal.alike])
+        names = join_words([f"{name} ({share:.0%})" for name, share in proposal.alike])
         page.text(
             f"Textbook effects that look like it, with the share of its change each could have made: {names}. None of"
             " them is adequate by itself."
@@ -129,7 +129,7 @@ def _rivals(page: Report, proposal: Proposal) -> None:
         page.text("No textbook effect of the catalogue could have made half of its change.")
 
 
-def _tried(page: Report, tried: Sequence[tuple[Term, TermAssessment]]) -> None:
+def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]]) -> None:
     """The best of the library as held-out events judged them."""
     if not tried:
         return

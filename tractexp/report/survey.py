@@ -7,10 +7,10 @@ from tractexp import quoting
 from tractexp.blocks import Report, Table
 from tractexp.blocks.block import Markup
 from tractexp.blocks.style import ACTIVE, VOLTAGE
-from tractexp.files import packaged
+from tractexp.files import read_packaged_text
 
 UNREAD, UNEXAMINED, QUIET = "not read", "not examined", "nothing"  # what stands as the kind of a file without events
-MOST = 10  # files that cannot be read, each with the reason
+MOST_UNREADABLE_FILES = 10  # files that cannot be read, each with the reason
 AT_ONCE = 200  # rows that are drawn; more where they are asked for
 COLUMNS = (  # key, heading, kind of cell, digits
     ("event", "event", "name", 0), ("U_picture", "U", "picture", 0), ("P_picture", "P", "picture", 0),
@@ -31,8 +31,8 @@ def summary(content: Mapping[str, Any]) -> Report:
     report.add(kinds(content))
     unread = [row for row in rows if row["kind"] == UNREAD]
     named = [row["why"] if row["file"] in row["why"] else f"{row['file']}: {row['why']}" for row in unread]
-    report.text(*(f"  not read: {sentence}" for sentence in named[:MOST]))
-    report.text(*[f"  and {len(unread) - MOST} more, in the table"] * (len(unread) > MOST))
+    report.text(*(f"  not read: {sentence}" for sentence in named[:MOST_UNREADABLE_FILES]))
+    report.text(*[f"  and {len(unread) - MOST_UNREADABLE_FILES} more, in the table"] * (len(unread) > MOST_UNREADABLE_FILES))
     return _best(report, content)
 
 
@@ -54,7 +54,7 @@ def report(content: Mapping[str, Any]) -> Report:
     data = {
         "columns": COLUMNS, "rows": rows, "atOnce": AT_ONCE, "colors": {"U_picture": VOLTAGE, "P_picture": ACTIVE},
     }  # fmt: skip
-    packed, looks, work = quoting.script(data), packaged("report/survey.css"), packaged("report/survey.js")
+    packed, looks, work = quoting.script(data), read_packaged_text("report/survey.css"), read_packaged_text("report/survey.js")
     worth = sum(row["worth"] for row in rows)
     lead = f"{content['files']} files, {len(rows)} rows, {worth} events worth fitting."
     page = _best(Report(f"Survey of {content['folder']}", lead), content)

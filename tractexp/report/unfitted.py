@@ -14,7 +14,7 @@ from typing import Any
 from tractexp.record.fall import SHALLOWEST
 
 LASTING = ("step", "ramp")  # kinds of events after which the voltage stays
-SMALLEST = 0.005  # of the voltage: a smaller step is less than what loads change by themselves
+SMALLEST_VOLTAGE_STEP = 0.005  # of the voltage: a smaller step is less than what loads change by themselves
 ITSELF = 0.01  # of the power, by which an error of the exponents is told
 DIPS = (
     f"a motor answers dips: have the recorder triggered by 3 to 10 % of the voltage ({SHALLOWEST:.0%} is the least that"
@@ -39,7 +39,7 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
     """The static exponents that each lasting change of the voltage tells of a load."""
     for event in feeder["events"]:
         ratio = 1 - event["depth"]
-        if event["kind"] not in LASTING or ratio <= 0 or abs(event["depth"]) < SMALLEST:
+        if event["kind"] not in LASTING or ratio <= 0 or abs(event["depth"]) < SMALLEST_VOLTAGE_STEP:
             continue
         exponents = {
             name: log(event[f"{power}_after"] / event[f"{power}_before"]) / log(ratio)

@@ -11,14 +11,14 @@ from tractexp.domain.playback import AFTER
 from tractexp.identification.result import Fit
 from tractexp.inference.problem import Problem
 from tractexp.record import WaveEvent
-from tractexp.report.events import EXCESS, WITHIN
+from tractexp.report.events import BAND_DEVIATIONS, EXCESS
 
 PHASES = ("a", "b", "c")
-CYCLES = 2.0  # shown at first before and after the dip
+SHOWN_CYCLES = 2.0  # shown at first before and after the dip
 HARMONICS = (1, 3, 5, 7, 9, 11, 13, 17, 19, 23, 25)
-FASTEST = 1300.0  # Hz: what a spectrum shows
+HIGHEST_SHOWN_FREQUENCY = 1300.0  # Hz: what a spectrum shows
 KILO = 1.0  # kA of a peak from which an axis is in kA
-FEW = 4  # events of which it is told how they were prepared
+MOST_PREPARED_EVENTS = 4  # events of which it is told how they were prepared
 SPECTRUM = (
     "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
     " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on ({after:.0f} ms), below before"
@@ -73,7 +73,7 @@ def wave_chart(
         chart.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
         _noise_bands(chart, event, one * deviation, one * around)
-    for first, last in _together(places):
+    for first, last in _merge_intervals(places):
         chart.shade(first, last, EXCESS, 1 + event.phases, "more than chance leaves", opacity=0.2)
     for k in range(event.phases):
         chart.samples("measured", start, step, one * measured[k], style.MEASURED, 1 + k, width=3)
@@ -91,14 +91,14 @@ def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: 
     """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
     t = event.record.t[event.lead :]
     compared = np.array(event.compared)[:, None]
-    half = WITHIN * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
-    middle, name = event.of_phases(around)[:, event.lead :], f"± {WITHIN:g} σ of the noise"
+    half = BAND_DEVIATIONS * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
+    middle, name = event.of_phases(around)[:, event.lead :], f"± {BAND_DEVIATIONS:g} σ of the noise"
     for k in range(event.phases):
         chart.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
     chart.band(name, t, -half.max(axis=0), half.max(axis=0), style.FAINT, 1 + event.phases)
 
 
-def _together(places: Sequence[Any]) -> list[tuple[float, float]]:
+def _merge_intervals(places: Sequence[Any]) -> list[tuple[float, float]]:
     """The stretches [s] that places of any channel cover, none of them twice."""
     covered: list[tuple[float, float]] = []
     for place in sorted(places, key=lambda p: p.start):
@@ -117,7 +117,7 @@ def _voltage(event: WaveEvent) -> np.ndarray:
 
 def _view(event: WaveEvent) -> tuple[float, float]:
     """From two cycles before the dip to two after it, or to where epsilon_i ends counting [s]."""
-    t, cycles = event.record.t, CYCLES / event.f0
+    t, cycles = event.record.t, SHOWN_CYCLES / event.f0
     to = max(event.t_end + cycles, event.t_start + AFTER)
     return max(float(t[event.lead]), event.t_start - cycles), min(float(t[-1]), to)
 
@@ -158,7 +158,7 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     after, before = spectra(event, currents)
     chart = Chart("frequency [Hz]", ["after [%]", "before [%]"], pixels=380)
     names = [f"phase {n}" for n in PHASES[: event.phases]] if event.phases > 1 else ["residual"]
-    highest = min(FASTEST, event.rate / 2)
+    highest = min(HIGHEST_SHOWN_FREQUENCY, event.rate / 2)
     for panel, (frequencies, amplitudes, _) in enumerate((after, before)):
         shown = frequencies <= highest
         for name, row, color in zip(names, amplitudes, style.PHASES, strict=False):
@@ -172,13 +172,13 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     return chart.ticks(None, marks).limits(None, 0.0, highest), notes
 
 
-def prepared(problem: Problem, fits: Sequence[Fit]) -> list[str]:
+def describe_preparation(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     """What was done to each record before it was fitted, and how it is simulated, in sentences."""
     steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
-    return [*(_prepared(fit) for fit in fits[:FEW] if fit.waves is not None), steps]
+    return [*(_describe_event_preparation(fit) for fit in fits[:MOST_PREPARED_EVENTS] if fit.waves is not None), steps]
 
 
-def _prepared(fit: Fit) -> str:
+def _describe_event_preparation(fit: Fit) -> str:
     """Frequency, cycles before the dip, offsets taken off and the periodic steady state of one event."""
     event: Any = fit.waves
     cycles = (event.start - event.lead) * event.f0 / event.rate

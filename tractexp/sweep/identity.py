@@ -10,7 +10,7 @@ from typing import Any
 from tractexp import files, provenance
 from tractexp.composition import texts
 from tractexp.errors import UserError
-from tractexp.files import located
+from tractexp.files import locate_file
 
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
@@ -33,7 +33,7 @@ def _digest(content: bytes) -> str:
 def _file(name: str) -> str:
     """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); "" for no file."""
     try:
-        path = located(name)
+        path = locate_file(name)
         if not path.is_file():
             return ""
         beside = sorted(path.parent.glob(glob.escape(path.stem) + ".*"))

@@ -10,12 +10,12 @@ from typing import Any
 
 from tractexp import credentials, files
 from tractexp.api.task import Job, variant
-from tractexp.cli.chosen import given
+from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.errors import UserError
 from tractexp.sweep import identity
 from tractexp.sweep.output import printing_to
-from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, returned
-from tractexp.sweep.surroundings import surrounded
+from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status, select_returned_metrics
+from tractexp.sweep.surroundings import surround_job
 from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
@@ -58,7 +58,7 @@ class SweepJob:
         groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
         return cls(
             config, groups, tuple(overrides), identity.configuration(config, groups), identity.inputs(config), folder,
-            given(overrides, choices), composed.subdir, hydra=composed.hydra,
+            collect_chosen_settings(overrides, choices), composed.subdir, hydra=composed.hydra,
         )  # fmt: skip
 
     @property
@@ -73,7 +73,7 @@ class SweepJob:
 
     def variant(self, common: Collection[str]) -> str:
         """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
-        own = given((text for text in self.overrides if text not in common), self.choices)
+        own = collect_chosen_settings((text for text in self.overrides if text not in common), self.choices)
         data = f" on {self.choices['data']}" if "data" in own else ""
         return variant(self.choices["optimizer"], own) + data
 
@@ -84,7 +84,7 @@ class SweepJob:
 
     def returned(self, end: Status) -> float | list[float] | None:
         """What it gives back, having ended so."""
-        return returned(end.metrics, self.returns) if end.status == FINISHED else None
+        return select_returned_metrics(end.metrics, self.returns) if end.status == FINISHED else None
 
     @property
     def status(self) -> Status:
@@ -92,7 +92,7 @@ class SweepJob:
         return Status(RUNNING, "", self.configuration, self.inputs, 0.0, self.choices, self.config["seed"])
 
 
-def shared(jobs: Sequence[SweepJob]) -> set[str]:
+def find_shared_overrides(jobs: Sequence[SweepJob]) -> set[str]:
     """The overrides that all jobs of a sweep have; none of a sweep of one."""
     return set.intersection(*(set(job.overrides) for job in jobs)) if len(jobs) > 1 else set()
 
@@ -109,7 +109,7 @@ def work(job: SweepJob, logs: bool = False) -> Status:
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
     measured: dict[str, float] = {}
-    with output, printing_to(output), surrounded(job) as conclude:
+    with output, printing_to(output), surround_job(job) as conclude:
         message = _run(job, measured, logs)
         status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
         ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
@@ -147,7 +147,7 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
         parent, of_many = parent_of(folder_of(job.folder)), not job.alone
         about: Any = {"in_sweep": True, "of_many": of_many, "logs": logs, "given": job.given, "measured": measured}
         perform(Job(job.config, job.choices, job.folder, parent, **about))
-        returned(measured, job.returns)
+        select_returned_metrics(measured, job.returns)
     except UserError as error:
         return str(error)
     except (Exception, SystemExit) as error:

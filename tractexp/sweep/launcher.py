@@ -17,7 +17,7 @@ from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.placing import finished, place
+from tractexp.sweep.placing import is_finished, place
 from tractexp.sweep.progress import progress
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
@@ -67,8 +67,8 @@ class Cores(Launcher):
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
         with parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder:
-            self.run([job for job in {job.folder: job for job in jobs}.values() if not finished(job)], recorder)
-        return [_returned(job, status.read(job.folder)) for job in jobs]
+            self.run([job for job in {job.folder: job for job in jobs}.values() if not is_finished(job)], recorder)
+        return [_build_job_return(job, status.read(job.folder)) for job in jobs]
 
     def run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> list[Status]:
         """Run all jobs, have each logged, and return how they ended, in their order."""
@@ -144,7 +144,7 @@ class Ended(JobReturn):
         self._return_value = value
 
 
-def _returned(job: SweepJob, end: Status | None) -> JobReturn:
+def _build_job_return(job: SweepJob, end: Status | None) -> JobReturn:
     """How a job ended, in Hydra's terms."""
     if end is not None and end.status != FAILED:
         return Ended(job.overrides, status=JobStatus.COMPLETED, _return_value=job.returned(end))

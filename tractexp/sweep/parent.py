@@ -32,7 +32,7 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
         yield Recorder(folder)
         return
 
-    uri, run = tracking.address(node["uri"]), _described(folder, jobs, overrides)
+    uri, run = tracking.address(node["uri"]), _describe_sweep(folder, jobs, overrides)
     content = {"uri": uri, "jobs": len(jobs), "overrides": overrides}
     with ThreadPoolExecutor(1) as thread:
         recorder = Recorder(folder, thread.submit(_begun, folder, run, uri, afresh, content))
@@ -45,19 +45,19 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
             status = "KILLED"
             raise
         finally:
-            _closed(folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri)
+            _close_parent_run(folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri)
             if status != "KILLED":
                 _send(folder, uri)
 
 
 def _begun(folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str, Any]) -> str | None:
     """Open the run and note its id, by which jobs find it; None where the store cannot be used."""
-    run_id = _opened(folder, run, uri, afresh)
+    run_id = _open_parent_run(folder, run, uri, afresh)
     write_json(folder / FILE, {"run": run_id, **content}, private=True)
     return run_id
 
 
-def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
+def _open_parent_run(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
     """The id of the parent run, opened or opened again; None, and a sentence, where the store cannot be used."""
     try:
         run_id = parent_of(folder)
@@ -69,7 +69,7 @@ def _opened(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
     return run_id
 
 
-def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
+def _close_parent_run(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
     try:
         entry = save(folder, run, uri, sweep=True)
         if run_id is not None:
@@ -81,9 +81,9 @@ def _closed(folder: Path, run: Any, run_id: str | None, uri: str) -> None:
 
 def _send(folder: Path, uri: str) -> None:
     """Send what could not be sent before; what still cannot be is kept."""
-    from tractexp.tracking.sync import NOT, sync, waiting
+    from tractexp.tracking.sync import NOT, count_unsynced, sync
 
-    left = waiting(folder)
+    left = count_unsynced(folder)
     if left and sync(folder, uri, tell=lambda line: None)[NOT]:
         say(f"{left} runs are not logged; they are kept in {folder}, and 'tractexp sync' logs them")
 
@@ -103,7 +103,7 @@ def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     return {key: value for key, value in settings[0].items() if all(flat.get(key) == value for flat in settings)}
 
 
-def _described(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
+def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
     first = Job(jobs[0].config, jobs[0].choices, folder)
     return tracking.TrackedRun(
         experiment=first.experiment,

@@ -58,7 +58,7 @@ def placement(job: SweepJob) -> list[str]:
     return [f"hydra.sweep.dir={quoting.hydra(str(job.sweep))}", f"hydra.sweep.subdir={quoting.hydra(job.name)}"]
 
 
-def finished(job: SweepJob) -> bool:
+def is_finished(job: SweepJob) -> bool:
     """Whether this job, with the same code and data, has been done in its folder."""
     state = status.read(job.folder)
     same = state is not None and (state.configuration, state.inputs) == (job.configuration, job.inputs)

@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from typing import Any
 
 from tractexp.progress import Pace, console, say
-from tractexp.sweep.job import SweepJob, shared
+from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.status import FAILED, SEARCHED, Status
 
-SHOWN = 3  # variants named in a line of a log file
+MOST_NAMED_VARIANTS = 3  # variants named in a line of a log file
 
 
 class Tally:
@@ -17,7 +17,7 @@ class Tally:
 
     def __init__(self, jobs: Sequence[SweepJob]):
         self.total, self.done, self.failed = len(jobs), 0, 0
-        self.common = shared(jobs)
+        self.common = find_shared_overrides(jobs)
         self.jobs: dict[str, int] = {}  # done, by variant
         self.best: dict[str, float] = {}
         self.first = time.perf_counter()
@@ -49,7 +49,7 @@ class Tally:
         if self.failed:
             parts.append(f"{self.failed} failed")
         if self.best:
-            parts.append("best objectives " + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:SHOWN]))
+            parts.append("best objectives " + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:MOST_NAMED_VARIANTS]))
         return f"  {', '.join(parts)}; {self.left}"
 
 

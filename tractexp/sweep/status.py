@@ -57,7 +57,7 @@ def objective(folder: Path, name: str = SEARCHED) -> float | None:
     return end.metric(name) if end is not None else None
 
 
-def returned(metrics: Mapping[str, float | None], names: Sequence[str] | None) -> float | list[float] | None:
+def select_returned_metrics(metrics: Mapping[str, float | None], names: Sequence[str] | None) -> float | list[float] | None:
     """What a job gives back to whoever optimizes over jobs: the metrics of these names, one or a list.
 
     Without names where its search ended; None where its task searches for nothing. What was never reached is infinite.

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def surrounded(job: "SweepJob") -> "Iterator[Callable[[Status], None]]":
+def surround_job(job: "SweepJob") -> "Iterator[Callable[[Status], None]]":
     """Set up loggers, begin the callbacks, and yield what is to be told how the job ended.
 
     Where nothing of the user's reads Hydra's configuration, nothing is done.
@@ -21,7 +21,7 @@ def surrounded(job: "SweepJob") -> "Iterator[Callable[[Status], None]]":
     if job.hydra is None:
         yield lambda end: None
         return
-    config = _placed(job)
+    config = _place_configuration(job)
     job.callbacks.on_job_start(config=config, task_function=None)
 
     def conclude(end: Status) -> None:
@@ -32,7 +32,7 @@ def surrounded(job: "SweepJob") -> "Iterator[Callable[[Status], None]]":
         handler.flush()
 
 
-def _placed(job: "SweepJob") -> Any:
+def _place_configuration(job: "SweepJob") -> Any:
     """Hydra's configuration of the job, which ${hydra:...} refers to; its loggers are at work."""
     from hydra.core.hydra_config import HydraConfig
     from hydra.core.utils import configure_log

@@ -28,10 +28,10 @@ from tractexp.progress import say
 from tractexp.run_folder import hold
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
-from tractexp.sweep.job import SweepJob, shared
+from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
 from tractexp.sweep.parent import parent_run
-from tractexp.sweep.placing import finished, place, placement, settle
+from tractexp.sweep.placing import is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, INTERRUPTED
 from tractexp.tracking.sweepfile import MULTIRUN, PAGES
@@ -82,7 +82,7 @@ class Grid(Sweeper):
             self._conclude(jobs, comparison)
 
     def _perform(self, jobs: list[SweepJob], folder: Path, arguments: list[str]) -> None:
-        remaining = [job for job in jobs if self.redo or not finished(job)]
+        remaining = [job for job in jobs if self.redo or not is_finished(job)]
         say(f"sweep: {len(jobs)} jobs in {folder}")
         if done := len(jobs) - len(remaining):
             say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
@@ -177,7 +177,7 @@ def values_of(override: Override) -> list[str]:
 
 def comparable(jobs: Sequence[SweepJob]) -> bool:
     """Whether a sweep holds several variants under several seeds, of which more than one job has ended well."""
-    common = shared(jobs)
+    common = find_shared_overrides(jobs)
     variants = {job.variant(common) for job in jobs}
     if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
         return False
@@ -194,7 +194,7 @@ def show(page: Path) -> None:
 
 def summary(jobs: Sequence[SweepJob]) -> None:
     """Print where the searches of a sweep ended, by variant and data."""
-    common = shared(jobs)
+    common = find_shared_overrides(jobs)
     objectives: dict[str, list[float]] = {}
     for job in jobs:
         value = status.objective(job.folder)
@@ -211,7 +211,7 @@ def summary(jobs: Sequence[SweepJob]) -> None:
 
 def failures(jobs: Sequence[SweepJob]) -> str:
     """Print which jobs failed and why; returns the sentence of the error, "" where none did."""
-    common, ends = shared(jobs), [(job, status.read(job.folder)) for job in jobs]
+    common, ends = find_shared_overrides(jobs), [(job, status.read(job.folder)) for job in jobs]
     failed = [(job, end.message) for job, end in ends if end is not None and end.status == FAILED]
     if not failed:
         return ""

@@ -8,7 +8,7 @@ from tractexp.record.phasor import fundamental
 from tractexp.recording import Connection, Estimator
 
 RATE, NOMINAL, F = 4000.0, 50.0, 48.7  # Hz: of the samples, of the grid, of the test
-EXACT = 1e-6
+ROUNDING_ERROR = 1e-6
 
 
 def makes_three_phases_or_one(cls: type[Connection]) -> None:
@@ -29,7 +29,7 @@ def is_exact_in_steady_state(cls: type[Estimator]) -> None:
     x = np.sqrt(2) * np.cos(2 * np.pi * F / RATE * np.arange(count) + 0.7)
     X = fundamental(x, RATE, F, np.arange(over.reach, count - over.reach), over.means)
     off = np.abs(X - np.exp(0.7j)).max()
-    assert off < EXACT, f"'{cls.name}' is {off:.2g} off a sinusoid of {F:g} Hz and magnitude 1"
+    assert off < ROUNDING_ERROR, f"'{cls.name}' is {off:.2g} off a sinusoid of {F:g} Hz and magnitude 1"
 
 
 def keeps_a_window_of_sum_one_about_its_center(cls: type[Estimator]) -> None:

@@ -16,9 +16,9 @@ from tractexp.parameter import Parameter
 from tractexp.plugin import discover
 from tractexp.testing import drives
 
-SAME = 1e-12  # pu: what rounding leaves between equal equations
-STILL = 1e-9  # pu: what a steady state solved to rounding drifts by
-SHOWN = 1e-5  # pu: what a record can show at all
+EQUATION_ROUNDING = 1e-12  # pu: what rounding leaves between equal equations
+LARGEST_STEADY_DRIFT = 1e-9  # pu: what a steady state solved to rounding drifts by
+LEAST_VISIBLE_CHANGE = 1e-5  # pu: what a record can show at all
 SCALED = 1e-8  # of the largest power: what two bases of power may differ by
 LARGEST = 30.0  # pu: no load draws more
 SUBSTEPS = 4
@@ -72,7 +72,7 @@ def with_part(cls: type[Part]) -> Model:
 
 
 @functools.cache
-def without(cls: type[Effect]) -> Model:
+def build_base_model(cls: type[Effect]) -> Model:
     """The base model of an effect, in its domain."""
     motor, static = _base(cls)
     return compose(motor(), static(), domain=with_part(cls).domain)
@@ -82,7 +82,7 @@ def without(cls: type[Effect]) -> Model:
 def _base(cls: type[Effect]) -> tuple[type[Motor], type[Static]]:
     """The parts of the base model of an effect: the usual partners, or the first pair that takes it."""
     for motor, static in _bases():
-        if _taken(motor, static, cls) is None:
+        if _explain_refused_base(motor, static, cls) is None:
             return motor, static
     raise AssertionError(f"no registered motor and static load take the effect '{cls.name}'")
 
@@ -95,7 +95,7 @@ def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
     yield from ((motor, other) for other in _all("model/static") if other is not static)
 
 
-def _taken(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
+def _explain_refused_base(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
     """Why a base model refuses an effect, None where it takes it. Anything but a sentence is raised."""
     return compose(motor(), static(), domain=_domain(motor, static, cls)).acceptance(cls()).refusal
 
@@ -106,7 +106,7 @@ def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, 
     return np.array([pick(p) if p in chosen else p.default for p in of.parameters])
 
 
-def on(p: Parameter) -> float:
+def choose_active_size(p: Parameter) -> float:
     """A size halfway to its farther bound; anything else at its default."""
     null = p.null
     return p.default if null is None else (null + max(p.bounds, key=lambda b: abs(b - null))) / 2
@@ -121,10 +121,10 @@ def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) 
         raise AssertionError(
             f"{of.title} has no steady state at {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
         )
-    return _shown(of, drive, response.outputs)
+    return _select_still_outputs(of, drive, response.outputs)
 
 
-def _shown(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
+def _select_still_outputs(of: Model, drive: Drive, outputs: np.ndarray) -> np.ndarray:
     """What stands still where the voltage turns steadily."""
     if not of.waves:
         return outputs
@@ -156,14 +156,14 @@ def prints_its_equations(cls: type[Part]) -> None:
 def rests(cls: type[Part]) -> None:
     """Under a steady voltage the load stays where it was before, whatever its parameters near their defaults."""
     of = with_part(cls)
-    chosen = values(of, on)
+    chosen = values(of, choose_active_size)
     near = np.random.default_rng(1).uniform(0.95, 1.05, (10, len(chosen))) * chosen
     low, high = np.array([p.bounds for p in of.parameters], dtype=float).reshape(-1, 2).T
     flat = drives.wave_flat() if of.waves else drives.flat()
     power = play(of, Drive.of([flat]), np.clip(near, low, high))
     assert np.isfinite(power).all(), f"{of.title} diverges under a steady voltage"
     off = np.abs(power - power[:, :, :1]).max()
-    assert off < STILL, f"{of.title} moves by {off:.2g} pu under a steady voltage"
+    assert off < LARGEST_STEADY_DRIFT, f"{of.title} moves by {off:.2g} pu under a steady voltage"
 
 
 def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
@@ -187,7 +187,7 @@ def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
 def scales_with_its_base(cls: type[Part]) -> None:
     """In another base of power the same load answers the same: each parameter goes as its `power_exponent` says."""
     of, per_unit = with_part(cls), 2.5
-    chosen = values(of, on)
+    chosen = values(of, choose_active_size)
     other = chosen * per_unit ** np.array([p.power_exponent for p in of.parameters], dtype=float)
     one = play(of, drives.drive(0.3, 0.5, domain=of.domain), chosen)
     scaled = play(of, drives.drive(0.3, 0.5, domain=of.domain, power=per_unit), other) / per_unit
@@ -210,7 +210,7 @@ def converges_in_order_four(cls: type[Part]) -> None:
     if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
         return  # a corner costs the order
     smooth = drives.wave_dip(0.3, edge=0.01) if of.waves else drives.dip(0.3, step=10e-3, edge=0.04)
-    drive, chosen = Drive.of([smooth]), values(of, on)
+    drive, chosen = Drive.of([smooth]), values(of, choose_active_size)
     fine = play(of, drive, chosen, 4 * COUNTS[-1])
     errors = np.array([np.abs(play(of, drive, chosen, n) - fine).max() for n in COUNTS])
     used = (errors > ASYMPTOTIC[0]) & (errors < ASYMPTOTIC[1])
@@ -287,17 +287,17 @@ def belongs_to_its_family(cls: type[Effect]) -> None:
     if not cls.nests_textbook:
         return
     of, book = with_part(cls), with_part(textbook)
-    sizes = {p.name: on(p) for p in textbook.parameters if p.null is not None}
+    sizes = {p.name: choose_active_size(p) for p in textbook.parameters if p.null is not None}
     chosen = {p.name: sizes.get(p.name, p.default) for p in textbook.parameters}
     drive = drives.drive(0.3, 0.5, domain=of.domain)
     mine = values(of, lambda p: chosen[cls.as_textbook[p.name]] if p.name in cls.as_textbook else p.default)
     off = np.abs(play(of, drive, mine) - play(book, drive, values(book, lambda p: chosen.get(p.name, p.default)))).max()
-    assert off < SAME, f"'{cls.name}' does not nest '{cls.family}': {off:.2g} pu apart where both should be one"
+    assert off < EQUATION_ROUNDING, f"'{cls.name}' does not nest '{cls.family}': {off:.2g} pu apart where both should be one"
 
 
 def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
     """With its sizes at their nulls the load is the base model, whatever its other parameters: the two are nested."""
-    of, bare = with_part(cls), without(cls)
+    of, bare = with_part(cls), build_base_model(cls)
     drive, rng, own = drives.drive(0.3, 0.5, 0.65, domain=of.domain), np.random.default_rng(2), cls()
     rows = [values(of, lambda p: rng.uniform(*p.bounds) if p.null is None else p.null, own) for _ in range(3)]
     plain = play(bare, drive, values(bare))
@@ -305,11 +305,11 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
         outputs = np.repeat(bare.simulate(drive, values(bare), SUBSTEPS).outputs, len(rows), axis=1)
         picked = dict(zip(of.names, np.transpose(rows), strict=True))
         columns = {p.name: np.tile(picked[p.name], (drive.events, 1)) for p in own.parameters}
-        played = _shown(of, drive, own.observe(outputs, drive, columns))
+        played = _select_still_outputs(of, drive, own.observe(outputs, drive, columns))
     else:
         played = play(of, drive, np.array(rows))
     off = np.abs(played - plain).max()
-    assert off < SAME, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
+    assert off < EQUATION_ROUNDING, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
 
 
 def shows_in_a_dip(cls: type[Effect]) -> None:
@@ -324,7 +324,7 @@ def shows_in_a_dip(cls: type[Effect]) -> None:
             rows = np.array([values(of, lambda q, p=p, end=end: end if q is p else q.default, own) for end in ends])
             slopes.append(np.diff(play(of, drive, rows), axis=1) / (ends[1] - ends[0]))
         largest = np.abs(slopes[0]).max()
-        assert largest * cls.relevant.get(p.name, 0.1 * (high - low)) > SHOWN, f"{p.name} shows nothing"
+        assert largest * cls.relevant.get(p.name, 0.1 * (high - low)) > LEAST_VISIBLE_CHANGE, f"{p.name} shows nothing"
         off = np.abs(slopes[1] - slopes[0]).max()
         assert off < 0.03 * largest, f"{p.name} of '{cls.name}' has no derivative at its null"
 
@@ -338,7 +338,7 @@ def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
 
 def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
     try:
-        return _taken(motor, static, cls)
+        return _explain_refused_base(motor, static, cls)
     except UserError as error:
         return str(error)
 
@@ -346,7 +346,7 @@ def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str 
 def sees_each_event_by_itself(cls: type[Measurement]) -> None:
     """The end of one event does not leak into the beginning of the next, and power keeps its shape."""
     of = with_part(cls)
-    chosen = values(of, on)
+    chosen = values(of, choose_active_size)
     together, alone = (play(of, drives.drive(*dips, domain=of.domain), chosen) for dips in ((0.3, 0.6), (0.6,)))
     assert np.array_equal(together[:, :, -alone.shape[2] :], alone), f"'{cls.name}' mixes events"
 

@@ -8,7 +8,7 @@ from tractexp.identification.optimizer import Box, Optimizer
 from tractexp.identification.search import Limits, SearchResult, search
 
 BUDGET = 1500  # simulations
-BETTER = 0.5  # of the best of the first batch: more than luck
+LEAST_SEARCH_GAIN = 0.5  # of the best of the first batch: more than luck
 MOST_ITERATIONS = 25
 
 
@@ -92,7 +92,7 @@ def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
         problem = Noted()
         result = _run(cls, problem, 11, space)
         first = Bowl().objective(problem.batches[0]).min()
-        assert result.objective <= BETTER * first, (
+        assert result.objective <= LEAST_SEARCH_GAIN * first, (
             f"'{cls.name}' ends at {result.objective:.3g} after a start of {first:.3g}"
         )
 

@@ -52,7 +52,7 @@ def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str
         names = {chosen[0]: experiment}
     with sentences(uri):
         runs = _search(client, list(names), filter)
-        return [_logged(client, run, names[run.info.experiment_id], curves) for run in runs]
+        return [_read_logged_run(client, run, names[run.info.experiment_id], curves) for run in runs]
 
 
 def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
@@ -70,7 +70,7 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
         ) from error
 
 
-def _logged(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
+def _read_logged_run(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
     read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
     return Logged(
         run.info.run_id, run.info.run_name, run.info.status, experiment,

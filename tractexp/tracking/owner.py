@@ -66,13 +66,13 @@ def gone(tag: str) -> bool | None:
 
 def close_stale(client: Any) -> list[str]:
     """Close runs as KILLED whose process has ended without a word, and return their ids."""
-    stale = [run.info.run_id for run in running(client) if gone(run.data.tags.get(TAG, ""))]
+    stale = [run.info.run_id for run in list_running(client) if gone(run.data.tags.get(TAG, ""))]
     for run_id in stale:
         client.set_terminated(run_id, "KILLED")
     return stale
 
 
-def running(client: Any) -> list[Any]:
+def list_running(client: Any) -> list[Any]:
     experiments = [experiment.experiment_id for experiment in client.search_experiments()]
     return search(client, experiments, "attributes.status = 'RUNNING'") if experiments else []
 

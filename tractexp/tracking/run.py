@@ -102,7 +102,7 @@ def metric_name(text: str) -> str:
     return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
 
 
-def thinned(count: int) -> "np.ndarray":
+def choose_curve_points(count: int) -> "np.ndarray":
     """The points of a curve of `count` points that are logged: `CURVE_POINTS` of them, evenly spread, or all."""
     import numpy as np
 
@@ -253,7 +253,7 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
     now = _milliseconds(run.ended)
     points = [(name, value, 0) for name, value in run.metrics.items() if not math.isinf(value)]
     for name, (steps, values) in run.curves.items():
-        points += [(name, values[i], steps[i]) for i in thinned(len(steps))]
+        points += [(name, values[i], steps[i]) for i in choose_curve_points(len(steps))]
     metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]
     parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
     chunks = zip_longest(_chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[])
@@ -302,7 +302,7 @@ def _experiment(client: Any, name: str, uri: str) -> str:
         folder = re.sub(r"[^\w.-]+|^\.+", "_", name)
         location = (database.parent / "mlartifacts" / folder).as_uri() if database else None
         try:
-            return _created(client, name, location)
+            return _create_experiment(client, name, location)
         except MlflowException:  # another process created it first; if not, the next line raises
             experiment = client.get_experiment_by_name(name)
             if experiment is None:
@@ -315,7 +315,7 @@ def _experiment(client: Any, name: str, uri: str) -> str:
     return experiment.experiment_id
 
 
-def _created(client: Any, name: str, location: str | None) -> str:
+def _create_experiment(client: Any, name: str, location: str | None) -> str:
     """The id of a new experiment, which opens on the columns that matter."""
     from tractexp.tracking.view import tags_of_new
 

@@ -16,7 +16,7 @@ from typing import Any
 from tractexp import files
 from tractexp.errors import UserError
 from tractexp.run_folder import settle
-from tractexp.tracking.run import Line, TrackedRun, flatten, thinned
+from tractexp.tracking.run import Line, TrackedRun, choose_curve_points, flatten
 
 FILE = "mlflow.json"
 MOST_CHILDREN = 1000  # runs below one: sets of effects, optimizers
@@ -98,7 +98,7 @@ def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
 
 def _thin(steps: Line, values: Line) -> list[list[float]]:
     """A curve with as many points as are logged."""
-    points = thinned(len(steps))
+    points = choose_curve_points(len(steps))
     return [[float(line[k]) for k in points] for line in (steps, values)]
 
 

@@ -22,7 +22,7 @@ from tractexp.tracking.owner import close_quietly
 
 PATIENCE = 15.0  # s to wait for a process that writes to the database
 VARIABLE = "MLFLOW_TRACKING_URI"  # by which MLflow's own tools choose the store
-HELD = 120.0  # s to wait for another process that makes the store or opens it
+LONGEST_STORE_WAIT = 120.0  # s to wait for another process that makes the store or opens it
 
 
 def default_uri(folder: Path) -> str:
@@ -74,7 +74,7 @@ def open_store(uri: str) -> Any:
             close_quietly(client)
             return client
         database.parent.mkdir(parents=True, exist_ok=True)
-        with files.held(database.with_name(database.name + ".lock"), HELD):
+        with files.lock_file(database.with_name(database.name + ".lock"), LONGEST_STORE_WAIT):
             if not database.exists():
                 _create_database(database)
             _check_database(database)

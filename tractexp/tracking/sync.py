@@ -46,7 +46,7 @@ def sync(
         try:
             where = address(where)
             if own is not None and uri is None and where != own:
-                raise UserError(f"the MLflow store {where} is named in {root} alone, not by you: {_named(where)}")
+                raise UserError(f"the MLflow store {where} is named in {root} alone, not by you: {_describe_store(where)}")
             if where in broken:
                 raise UserError(broken[where])
             counts[_sent(replace(one, run=_within(one.run, one.folder, tell)), where)] += 1
@@ -60,7 +60,7 @@ def sync(
     return counts
 
 
-def _named(uri: str) -> str:
+def _describe_store(uri: str) -> str:
     """How to say that a store is meant."""
     return f"where it is yours, {quoting.shell('tractexp', 'sync', '--uri', uri)} sends it there"
 
@@ -151,7 +151,7 @@ def _below(client: Any, uri: str, run_there: Any, parent: str | None) -> None:
             client.set_tag(run_there.info.run_id, "mlflow.parentRunId", parent)
 
 
-def waiting(root: Path) -> int:
+def count_unsynced(root: Path) -> int:
     """How many run files at `root` and below are in no store yet."""
     count = 0
     for folder in runfile.below(root):

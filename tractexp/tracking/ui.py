@@ -17,7 +17,7 @@ from tractexp import interpreter
 from tractexp.errors import UserError
 from tractexp.tracking.store import database_of
 
-USUAL = 10  # s until the server answers: 5 on two free cores, 20 on busy ones
+USUAL_START_SECONDS = 10  # s until the server answers: 5 on two free cores, 20 on busy ones
 
 
 def serve(
@@ -31,7 +31,7 @@ def serve(
     """
     check_servable(uri, host, port)
     address = f"http://{host}:{port}/"
-    print(f"starting the MLflow UI on {address}, which takes about {USUAL} s; it shows {uri}", flush=True)
+    print(f"starting the MLflow UI on {address}, which takes about {USUAL_START_SECONDS} s; it shows {uri}", flush=True)
     started = time.monotonic()
     command = interpreter.command("-m", "tractexp.compat.mlflow_own_origin", "server")
     command += ["--backend-store-uri", uri, "--registry-store-uri", uri]

@@ -41,7 +41,7 @@ AXES = {
 }  # fmt: skip
 
 
-def _compared(metric_x: str, metric_y: str) -> dict[str, Any]:
+def _plot_comparison(metric_x: str, metric_y: str) -> dict[str, Any]:
     """What one metric cost in terms of another, a point a run."""
     axes = {axis: {"key": key, "type": "METRIC"} for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))}
     return _chart("SCATTER", f"{metric_y} by {metric_x}", **axes)
@@ -72,7 +72,7 @@ def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
         for metric in ("search_objective", "objective", "epsilon_p", "epsilon_q")
     ]
     bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
-    bars.insert(0, _compared("search_simulations", "search_objective"))
+    bars.insert(0, _plot_comparison("search_simulations", "search_objective"))
     section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
     return STATE | {
         "groupBy": {
@@ -105,7 +105,7 @@ def tags_of_new(experiment_id: str) -> dict[str, str]:
     """The tags by which a new experiment has the view as a table, and its description leads there from any page."""
     table = STATE | {"groupBy": None, "compareRunsMode": "TABLE", "selectedColumns": COLUMNS}
     note = f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
-    return {TAG: _packed(table), "mlflow.note.content": note}
+    return {TAG: _pack_view(table), "mlflow.note.content": note}
 
 
 def comparison_view(uri: str) -> str:
@@ -122,10 +122,10 @@ def comparison_view(uri: str) -> str:
         experiment_id = newest[0].info.experiment_id
         runs = client.search_runs([experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"])
     state = _state([run.data.tags for run in runs])
-    tag_experiment(names[experiment_id], {TAG: _packed(state)}, uri)
+    tag_experiment(names[experiment_id], {TAG: _pack_view(state)}, uri)
     return page(experiment_id, state["compareRunsMode"])
 
 
-def _packed(state: Mapping[str, Any]) -> str:
+def _pack_view(state: Mapping[str, Any]) -> str:
     """A view as MLflow keeps it in a tag."""
     return "deflate;" + base64.b64encode(zlib.compress(json.dumps(state).encode())).decode()

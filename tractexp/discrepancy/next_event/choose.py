@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagined
+from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagine_dips
 from tractexp.discrepancy.next_event.same import Same, same
-from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, seen, sided
+from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, linearize_side, seen
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
@@ -20,7 +20,7 @@ from tractexp.noise import Noise
 
 DECIDED = 0.95  # probability with which a recommended dip must tell tied sets apart: one miss in twenty
 CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
-HOPELESS = 0.5  # chance below which no event is said to tell a pair apart
+LEAST_CHANCE = 0.5  # chance below which no event is said to tell a pair apart
 WORTH = 0.1  # chance below which no refit is worth its time
 REPEATED = (2, 3, 5, 10, 20)  # events of one kind together
 NEARLY = 0.02  # of the chance: of events as sure as this the mildest is the surest
@@ -106,10 +106,10 @@ class NextEvent:
         if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
         sure = f"no event that was tried is sure to tell {them}"
-        return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_together(self.best)}"
+        return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_describe_joint_events(self.best)}"
 
 
-def _together(tried: EventTrial) -> str:
+def _describe_joint_events(tried: EventTrial) -> str:
     """How many such events are sure to."""
     return f", {tried.repeated} of them are sure to" if tried.repeated else ""
 
@@ -122,24 +122,24 @@ def next_event(
     `bare` is the base model's fit, `noise` that under which all were fitted.
     """
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
-    sides = [sided(context, noise, fit) for fit in (bare, *rivals)]
+    sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
     separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
     reads = {channel for fit in rivals for name in fit.names for channel in context.catalogue[name].effect.reads}
     events, denied = [], []
-    by_rate = sorted(imagined(context, sorted(reads)), key=lambda e: e.rate)
+    by_rate = sorted(imagine_dips(context, sorted(reads)), key=lambda e: e.rate)
     for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):  # sampled alike
         for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths]))
     most = np.max([d.mean(axis=2) for d in denied], axis=0)  # (a, a)
     apart = [(a, b, float(min(most[a, b], most[b, a]))) for a, b in itertools.combinations(range(len(rivals)), 2)]
-    open_pairs = [pair for pair in apart if pair[2] < HOPELESS]
+    open_pairs = [pair for pair in apart if pair[2] < LEAST_CHANCE]
     ignored = np.zeros(most.shape, bool)
     if len(open_pairs) < len(apart):  # what can be told apart shall be
         for a, b, _ in open_pairs:
             ignored[a, b] = ignored[b, a] = True
     tried = [EventTrial(e, Chances.of(d, ignored)) for e, d in zip(events, denied, strict=True)]
-    best = _held(context, noise, sides, tried, ignored, seed)
+    best = _choose_mildest_event(context, noise, sides, tried, ignored, seed)
     pairs = [(a, b, same(context, rivals[a], rivals[b])) for a, b, _ in open_pairs]
     proved = tuple((a, b, s) for a, b, s in pairs if s is not None)
     hopeless = tuple(pair for pair, (*_, s) in zip(open_pairs, pairs, strict=True) if s is None)
@@ -152,7 +152,7 @@ def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
     return min(enough, key=lambda t: t.event.burden)
 
 
-def _held(
+def _choose_mildest_event(
     context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int
 ) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
@@ -160,16 +160,16 @@ def _held(
     while left and len(checked) < CHECKED:
         best = mildest(left, DECIDED)
         chance = best.chances.least
-        if checked and chance < min(HOPELESS, max(t.chances.least for t in checked)):
+        if checked and chance < min(LEAST_CHANCE, max(t.chances.least for t in checked)):
             break
         left.remove(best)
-        checked.append(_refitted(context, noise, sides, best, ignored, seed) if chance >= WORTH else best)
+        checked.append(_compute_refitted_chances(context, noise, sides, best, ignored, seed) if chance >= WORTH else best)
         if checked[-1].chances.least >= DECIDED:
             return checked[-1]
     return max(checked, key=lambda t: t.chances.least)
 
 
-def _refitted(
+def _compute_refitted_chances(
     context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int
 ) -> EventTrial:
     """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
@@ -182,7 +182,7 @@ def _refitted(
     places = []
     for a in range(1, len(sides)):
         moved = _fitted_to(context, noise, sides, sides[a], event) if plain else []
-        there = [side if k == a or not moved else sided(context, noise, moved[k]) for k, side in enumerate(sides)]
+        there = [side if k == a or not moved else linearize_side(context, noise, moved[k]) for k, side in enumerate(sides)]
         views = [seen(context, noise, side, [event])[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 

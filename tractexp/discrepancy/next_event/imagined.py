@@ -18,9 +18,9 @@ DEPTHS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7)
 SWITCHED, LASTING = (0.04, 0.06, 0.1), 1.0  # of the voltage; s until the bank or the tap is back
 JUMPS = (-20.0, 20.0)  # degrees, of dips; a bank that is switched turns the voltage by a few
 TURNED_BY_BANK = 3.0  # degrees
-UNBALANCED = 0.5  # of the depth: negative sequence in an unbalanced dip
+UNBALANCED_SHARE = 0.5  # of the depth: negative sequence in an unbalanced dip
 FASTER = 4  # times the record's rate
-FASTEST = 5000.0  # Hz, of phasors
+HIGHEST_PHASOR_RATE = 5000.0  # Hz, of phasors
 
 
 @dataclass(frozen=True)
@@ -74,21 +74,21 @@ class ImaginedDip:
         return bool(self.jump) + bool(self.unbalance) + (self.rate > 1), self.depth * self.duration
 
 
-def imagined(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
+def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
     """What is tried on this context; unbalanced dips that need the channel U2 where one of the rivals `reads` it."""
     domain, durations = context.domain, context.domain.dips.durations
     if not domain.further:
         turned = itertools.product(DEPTHS, durations, (0.0, *JUMPS))
         unbalanced = itertools.product(DEPTHS[::2], durations[::2])
         dips = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
-        return dips + [ImaginedDip(*pair, unbalance=UNBALANCED, domain=domain) for pair in unbalanced]
+        return dips + [ImaginedDip(*pair, unbalance=UNBALANCED_SHARE, domain=domain) for pair in unbalanced]
     dips = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
     dips += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
     dips += [ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
     dips += [ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
     if "U2" in reads:
-        dips += [ImaginedDip(*pair, unbalance=UNBALANCED) for pair in itertools.product(DEPTHS[::2], durations[::2])]
-    if FASTER / context.events[0].record.step <= FASTEST:
+        dips += [ImaginedDip(*pair, unbalance=UNBALANCED_SHARE) for pair in itertools.product(DEPTHS[::2], durations[::2])]
+    if FASTER / context.events[0].record.step <= HIGHEST_PHASOR_RATE:
         dips += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
     return dips
 

@@ -16,7 +16,7 @@ from tractexp.inference.fitting import Names, Start, refit
 from tractexp.inference.records import Records, check_events
 from tractexp.model.model import Model
 from tractexp.record import Event
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 
 def event_for(
@@ -50,7 +50,7 @@ def event_for(
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
             begin = [(fit.names, fit.unit) for fit in fits]
         bare, *fits = sorted(refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names))
-        return next_event(context, noise, bare, fits, [joined(list(fit.names)) for fit in fits], seed)
+        return next_event(context, noise, bare, fits, [join_words(list(fit.names)) for fit in fits], seed)
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:

@@ -17,7 +17,7 @@ from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
 from tractexp.model.drive import Drive
 
-FOLLOWS = 1e-6  # pu: how near one comes to the other
+LARGEST_FOLLOWED_DISTANCE = 1e-6  # pu: how near one comes to the other
 DONE = 1e-8  # of the sum of squares: a descent that gains less ends; where one follows, each step gains nearly all
 SETTLED = 0.1  # of the power before: an event that a load has survived by its end
 DIRECTION = 1e-4  # of the largest singular value of normalized columns: a direction of its own
@@ -37,7 +37,7 @@ class Same:
     def reason(self) -> str:
         return (
             f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the parameters of"
-            f" either make span the same {self.rank} directions, and each follows the other within {FOLLOWS:.0e} pu"
+            f" either make span the same {self.rank} directions, and each follows the other within {LARGEST_FOLLOWED_DISTANCE:.0e} pu"
         )
 
 
@@ -48,7 +48,7 @@ def same(context: Context, one: Refit, other: Refit) -> Same | None:
     pairs = []
     for truth, rival in ((one, other), (other, one)):
         for size in (1.0, 0.5):
-            pair = _followed(context, drive, _shrunk(context, truth, size), truth.names, rival)
+            pair = _follow_truth(context, drive, _shrunk(context, truth, size), truth.names, rival)
             if pair is None:
                 return None
             pairs.append(pair)
@@ -63,12 +63,12 @@ def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
     return unit
 
 
-def _followed(
+def _follow_truth(
     context: Context, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
 ) -> tuple[int, float] | None:  # fmt: skip
     """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
     answer = context.kernels.simulate(names, point[None], drive)[0]
-    valid = (drive.weights > 0) & _recovering(answer, drive)
+    valid = (drive.weights > 0) & _find_recovering_samples(answer, drive)
     truth = answer[valid]
     if not len(truth):
         return None
@@ -106,14 +106,14 @@ def _followed(
             continue
         ended = nearest(nearest_point, rows)
         nearest_point, off = ended.x, float(np.abs(ended.fun).max())
-        if off > FOLLOWS:
+        if off > LARGEST_FOLLOWED_DISTANCE:
             return None
     own = moved(point, names, _of_load(context, names)), moved(whole(nearest_point), rival.names, columns)
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None
 
 
-def _recovering(answer: np.ndarray, drive: Drive) -> np.ndarray:
+def _find_recovering_samples(answer: np.ndarray, drive: Drive) -> np.ndarray:
     """Which samples (C, N) are of events that the load survives: a motor that stalls amplifies what rounding does."""
     alive = np.zeros(answer.shape, bool)
     for e in range(drive.events):

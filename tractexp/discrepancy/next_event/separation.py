@@ -16,13 +16,13 @@ from tractexp.discrepancy.next_event.imagined import ImaginedDip, driven, noise_
 from tractexp.inference.context import Context
 from tractexp.inference.differences import slopes, two_sided
 from tractexp.inference.fitting import Refit
-from tractexp.inference.linearization import resting
+from tractexp.inference.linearization import find_active_bounds
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
 DRAWS, FEW = 2000, 200  # of the event chosen, and of each that is tried
 BOX = 12.0  # precision of a parameter of which nothing is known but its range
-MOVED = 1e-3  # of P0 and Q0, for their differences [pu]
+POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class Chances:
         return float(self.alone.min())
 
 
-def sided(context: Context, noise: Noise, fit: Refit) -> Side:
+def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     """Linearise an explanation at its fit."""
     at = context.coordinates
     faults = at.sizes(context.catalogue.of_measurement)
@@ -88,7 +88,7 @@ def sided(context: Context, noise: Noise, fit: Refit) -> Side:
     columns = [*at.base, *faults, *own, *at.before]
     _, rows = context.linearize(fit.unit, noise, columns, fit.names)
     shared = context.drive.measured.size + len(faults)
-    free = ~resting(context, fit.unit, columns, rows[1:] @ rows[0])
+    free = ~find_active_bounds(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]
     box = np.where(np.isin(columns, faults), 0.0, BOX)
     return Side(fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box)
@@ -104,9 +104,9 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     inside = list(side.columns[: len(side.columns) - len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
     points, width = two_sided(middle, inside)
-    moved = _simulated(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
+    moved = _simulate_drives(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
     before = [
-        _simulated(context, names, middle[None], [_drawing(d, channel, sign * MOVED) for d in drives])
+        _simulate_drives(context, names, middle[None], [_raise_initial_power(d, channel, sign * POWER_DIFFERENCE) for d in drives])
         for channel in ("P0", "Q0")
         for sign in (1, -1)
     ]
@@ -118,19 +118,19 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
         rows = white.whiten(np.where(one.weights > 0, rows, 0.0), one, one.weights > 0)
         K = np.zeros((len(side.columns) + 2, rows.shape[1]))
         K[:k] = slopes(rows[1 : 1 + 2 * k], width) * side.free[:k, None]
-        K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * MOVED)
+        K[-2:] = (rows[[-4, -2]] - rows[[-3, -1]]) / (2 * POWER_DIFFERENCE)
         chances.append(EventView(rows[0], K))
     return chances
 
 
-def _simulated(context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
+def _simulate_drives(context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
     """What is compared (E, n, C, N) of drives of equal length."""
     power = context.kernels.simulate(names, points, Drive.of(drives))
     context.effort.spend(len(points))
     return np.moveaxis(power.reshape(len(points), power.shape[1], len(drives), -1), 2, 0)
 
 
-def _drawing(drive, channel: str, more: float):
+def _raise_initial_power(drive, channel: str, more: float):
     """The same voltage, with a little more P0 or Q0."""
     return replace(drive, **{channel: getattr(drive, channel) + more})
 
@@ -140,7 +140,7 @@ class Separation:
 
     def __init__(self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0):
         self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
-        rows = _reduced([np.vstack([x.r, x.J]) for x in sides])
+        rows = _reduce_blocks([np.vstack([x.r, x.J]) for x in sides])
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
         self.precision = [x.precision for x in sides]
 
@@ -151,7 +151,7 @@ class Separation:
         """
         if not all(x.survives for x in seen):
             return np.zeros((len(self.sides) - 1, self.draws), bool)
-        rows = _reduced([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
+        rows = _reduce_blocks([np.sqrt(times) * np.vstack([x.f - seen[0].f, x.K]) for x in seen])
         f, K = [x[0] for x in rows], [x[1:] for x in rows]
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
@@ -178,7 +178,7 @@ class Separation:
         return (old**2).sum(axis=1) + (new**2).sum(axis=1) + (prior**2).sum(axis=1)
 
 
-def _reduced(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:
+def _reduce_blocks(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:
     """Blocks of rows (m_i, n) as rows (m_i, m) of the same inner products, m their number in all."""
     rows = np.concatenate(blocks)
     squares, vectors = np.linalg.eigh(rows @ rows.T)

@@ -54,7 +54,7 @@ def torque(eq, g, size):
     eq.edit(sites.load_torque, lambda T: T + size * g)
 
 
-def coupling(eq, g, size):
+def edit_coupling(eq, g, size):
     """c -> c (1 + k g)."""
     eq.edit(sites.coupling, lambda c: c * (1 + size * g))
 
@@ -66,7 +66,7 @@ def decay(eq, g, size):
     eq.edit(sites.time_constant, lambda tau: tau / sympy.Max(0.05, 1 + size * g))
 
 
-def magnetizing(eq, g, size):
+def edit_magnetization(eq, g, size):
     """c -> c/(1 + k g), tau' -> tau'/(1 + k g)."""
     import sympy
 

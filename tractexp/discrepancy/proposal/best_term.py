@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms
 from tractexp.discrepancy.proposal.library import terms
-from tractexp.discrepancy.proposal.refit import JUDGED, term_fits
+from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit
@@ -22,5 +22,5 @@ def best_terms(context: Context, bare: Refit, noise: Noise) -> tuple[Context, Se
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
     result = term_fits(screen(ground, terms(), seed=0, draws=0), [])
     there, at = result.context, result.context.coordinates
-    chosen = [(fit.names, at.without_faults(fit.unit, ())) for fit in result.fits[:JUDGED]]
+    chosen = [(fit.names, at.without_faults(fit.unit, ())) for fit in result.fits[:MOST_JUDGED_TERMS]]
     return there, refit(there, noise, chosen, faults=())

@@ -54,9 +54,9 @@ def parameters_of(term: Term) -> dict[str, str]:
 
 def source(term: Term, values: Mapping[str, float], records: str) -> str:
     """The text of a plugin file for a term with these sizes and this setting."""
-    functions = [_copied(term.signal.build, "signal"), _copied(term.balance.build, "balance")]
+    functions = [_copy_source(term.signal.build, "signal"), _copy_source(term.balance.build, "balance")]
     if term.clock is not None:
-        functions.insert(0, _copied(term.clock.build, "clock"))
+        functions.insert(0, _copy_source(term.clock.build, "clock"))
     helpers = [inspect.getsource(getattr(shapes, h)) for h in HELPERS if any(f"{h}(" in f for f in functions)]
     functions = [*helpers, *functions]
     constants = [
@@ -73,17 +73,17 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
     return text.replace("\n\n\n\n", "\n\n\n") + "\n" + CLASS.format(
         headline=headline, latex=quoting.python(term.latex), time=TIME * term.exogenous,
         records=quoting.python(records),
-        parameters="\n".join(_declared(term, values)), relevant=f"{{{relevant}}}",
+        parameters="\n".join(_declare_parameters(term, values)), relevant=f"{{{relevant}}}",
         arguments=", ".join(parameters_of(term)), body="\n".join(_body(term)),
     )  # fmt: skip
 
 
-def _copied(function: Callable[..., object], name: str) -> str:
+def _copy_source(function: Callable[..., object], name: str) -> str:
     """The text of a function under another name."""
     return re.sub(r"^def \w+", f"def {name}", inspect.getsource(function)).replace("  # noqa: N802", "")
 
 
-def _declared(term: Term, values: Mapping[str, float]) -> list[str]:
+def _declare_parameters(term: Term, values: Mapping[str, float]) -> list[str]:
     lines = []
     for p in term.parameters(values, PREFIX):
         null = "" if p.null is None else f", null={p.null}"

@@ -11,10 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.discrepancy.criteria import Criteria
-from tractexp.discrepancy.gap import GapTest, gap, pushed, share_gone
-from tractexp.discrepancy.held_out import carried
+from tractexp.discrepancy.gap import GapTest, compute_pushed_changes, gap, share_gone
+from tractexp.discrepancy.held_out import carry_fits
 from tractexp.discrepancy.proposal.bed import carried_over
-from tractexp.discrepancy.proposal.refit import JUDGED, TermFits
+from tractexp.discrepancy.proposal.refit import MOST_JUDGED_TERMS, TermFits
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit
 from tractexp.inference.records import Records
@@ -62,19 +62,19 @@ def term_assessments(
 
     `original` is the context of the investigation, by which the balances are pushed.
     """
-    fits = result.fits[:JUDGED]
-    other, units, noise = carried(result.context, events, [result.bare, *reversed(fits)])
+    fits = result.fits[:MOST_JUDGED_TERMS]
+    other, units, noise = carry_fits(result.context, events, [result.bare, *reversed(fits)])
     bare, held = units[0], list(reversed(units[1:]))
     fitted = [*result.context.coordinates.base, *result.context.coordinates.before]
-    train = _assessed(
+    train = _assess_models(
         original, result.context, result.noise, fitted, result.bare.unit, fits, [fit.unit for fit in fits]
     )
     there = original.on(Records.of(events, original.records.window))
-    validate = _assessed(there, other, noise, [*other.coordinates.before], bare, fits, held)
+    validate = _assess_models(there, other, noise, [*other.coordinates.before], bare, fits, held)
     return [TermAssessment(*each) for each in zip(fits, train, validate, p, strict=False)]
 
 
-def _assessed(
+def _assess_models(
     original: Context, context: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
     units: Sequence[np.ndarray],
 ) -> list[GapTest]:  # fmt: skip
@@ -90,14 +90,14 @@ def _assessed(
     terms = context.whiten(noise, np.array(apart))
 
     def assessed(fit: Refit, unit: np.ndarray) -> GapTest:
-        perturbations = pushed(original, carried_over(original, context, unit), (), noise)
+        perturbations = compute_pushed_changes(original, carried_over(original, context, unit), (), noise)
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
         return gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
 
     return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
-def tied(result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]) -> list[TermAssessment]:
+def list_tied_terms(result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]) -> list[TermAssessment]:
     """Those that neither held-out events nor, by its better fit, the chosen one denies."""
     criteria = result.context.criteria
     return [o for o in others if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)]

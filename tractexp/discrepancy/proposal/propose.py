@@ -10,7 +10,7 @@ from tractexp.discrepancy.gap import GapTest
 from tractexp.discrepancy.next_event.choose import NextEvent, next_event
 from tractexp.discrepancy.proposal import generate
 from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, sizes_of
-from tractexp.discrepancy.proposal.judge import TermAssessment, term_assessments, tied
+from tractexp.discrepancy.proposal.judge import TermAssessment, list_tied_terms, term_assessments
 from tractexp.discrepancy.proposal.library import Term, terms
 from tractexp.discrepancy.proposal.refit import TermFits, standard_errors, term_fits
 from tractexp.discrepancy.proposal.screen import Ground, screen
@@ -19,10 +19,10 @@ from tractexp.inference.fitting import Refit
 from tractexp.inference.interval import ParameterEstimate
 from tractexp.noise import Noise
 from tractexp.record import Event
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
-DRAWS = 99  # of noise, for the best of the whole library
-SEEN = 0.1  # of the largest change: from where a term is said to act
+LIBRARY_DRAWS = 99  # of noise, for the best of the whole library
+LEAST_ACTING_SHARE = 0.1  # of the largest change: from where a term is said to act
 LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
 
@@ -80,7 +80,7 @@ def propose(
     under = context_of_terms(context)
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
-    screened = screen(ground, among or terms(), seed, DRAWS)
+    screened = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
     context.effort.say("refitting the most promising terms")
     result = term_fits(screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]])
     context.effort.say("judging terms on the held-out events")
@@ -89,7 +89,7 @@ def propose(
     tried = tuple((result.term(w.fit), w) for w in ranked)
     standing = [w for w in ranked if w.stands(context.criteria)]
     if not standing:
-        objections = joined(ranked[0].objections(context.criteria))
+        objections = join_words(ranked[0].objections(context.criteria))
         return ProposalResult(
             None, f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}", tried
         )
@@ -101,11 +101,11 @@ def _proposal(result: TermFits, first: Disagreement, standing: Sequence[TermAsse
     term, values = result.term(chosen.fit), result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)
     estimates = tuple(ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values))
-    records = joined([e.record.name for e in result.context.events])
-    alternatives = tied(result, chosen, others)
+    records = join_words([e.record.name for e in result.context.events])
+    alternatives = list_tied_terms(result, chosen, others)
     return Proposal(
         term=term, estimates=estimates, train=chosen.train, validate=chosen.validate, p=chosen.p,
-        acting=tuple(_acting(result, chosen.fit)),
+        acting=tuple(_find_acting_places(result, chosen.fit)),
         ties=tuple((result.term(o.fit), o.train.explained, o.validate.explained) for o in alternatives),
         alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
@@ -127,13 +127,13 @@ def change(result: TermFits, fit: Refit) -> np.ndarray:
     return with_it - alone
 
 
-def _acting(result: TermFits, fit: Refit) -> list[Acting]:
+def _find_acting_places(result: TermFits, fit: Refit) -> list[Acting]:
     """Where in each event a term changes a channel by more than a tenth of the most it does."""
     context, added, terms = result.context, change(result, fit), []
     for e, event in enumerate(context.events):
         own = added[:, context.drive.part(e)]
         channel, _ = np.unravel_index(np.abs(own).argmax(), own.shape)
-        seen = np.flatnonzero((np.abs(own) > SEEN * np.abs(added).max()).any(axis=0))
+        seen = np.flatnonzero((np.abs(own) > LEAST_ACTING_SHARE * np.abs(added).max()).any(axis=0))
         if len(seen):
             t = event.record.t[event.record.samples - own.shape[1] :]
             most = float(own[channel][np.abs(own[channel]).argmax()])
@@ -168,7 +168,7 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
     judged = ("train", proposal.train), ("validate", proposal.validate)
     return {
         "terms": [
-            _named(proposal.term)
+            _name_term(proposal.term)
             | {
                 "function_of_voltage": not proposal.term.exogenous,
                 "parameters": {k.parameter.name: k.plain() for k in proposal.estimates},
@@ -178,13 +178,13 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
         "left": {role: gap.after.chi2_per_sample for role, gap in judged},
         "p": proposal.p,
         "when": [vars(a) for a in proposal.acting],
-        "ties": [_named(t) | {"explained": {"train": near, "validate": held}} for t, near, held in proposal.ties],
+        "ties": [_name_term(t) | {"explained": {"train": near, "validate": held}} for t, near, held in proposal.ties],
         "alike": dict(proposal.alike),
         "plugin": plugin,
     }
 
 
-def _named(term: Term) -> dict[str, object]:
+def _name_term(term: Term) -> dict[str, object]:
     """A term as machines and people call it."""
     clock = term.clock and term.clock.name
     names = {"balance": term.balance.name, "signal": term.signal.name, "clock": clock}

@@ -20,15 +20,15 @@ from tractexp.inference.information import free_standard_errors
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
-ALIKE = 4  # of one signal and clock at most, so that others are tried, too
+MOST_ALIKE_TERMS = 4  # of one signal and clock at most, so that others are tried, too
 ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the distance to the grid's neighbors
-CLOSE = 0.05  # of what the best explains: the terms that are fitted exactly
-EXACT = 6  # of them at most
-JUDGED = 5  # of the best, that held-out events are asked about
+EXACT_FIT_SHARE = 0.05  # of what the best explains: the terms that are fitted exactly
+MOST_EXACT_FITS = 6  # of them at most
+MOST_JUDGED_TERMS = 5  # of the best, that held-out events are asked about
 PEAKS, PROMISING = 3, 0.7  # settings of one term, and how good the further ones are of the best
 ROUND_ABOUT = 1  # how often the best term is begun anew around its fit
 REGRIDDED = 3  # terms whose grid is searched anew where the base model is that of their refit
-MOVED = 2  # terms whose signal is tried in the other balances, too
+MOST_MOVED_TERMS = 2  # terms whose signal is tried in the other balances, too
 MIDDLE = 0.5  # of its range: where what rests on a bound starts again
 AGAIN = 10  # terms that start from the other fits of the base model, too
 
@@ -61,7 +61,7 @@ def shortlist(screened: ScreenResult) -> list[TermScore]:
     for scored in best.values():
         key = scored.term.signal.name, scored.term.clock
         alike[key] = alike.get(key, 0) + 1
-        if alike[key] <= ALIKE:
+        if alike[key] <= MOST_ALIKE_TERMS:
             diverse.append(scored)
     answers = [f for f in diverse if f.term.signal.kind == ANSWER][:ANSWERS]
     rest = [f for f in diverse if f not in answers][: MOST - len(answers)]
@@ -88,7 +88,7 @@ def _far(a: TermScore, b: TermScore) -> bool:
     return any(places(s) >= 2 for s in a.term.signal.shapes if s.name != "phase")
 
 
-def zoomed(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore]:
+def zoom_settings(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore]:
     """The same terms at better settings, each parameter moved by itself on ever finer grids."""
     best = list(scored)
     for turn in range(ROUNDS):
@@ -118,7 +118,7 @@ def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> Ter
     """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms' coordinates."""
     ground = screened.ground
     listed = shortlist(screened)
-    chosen = zoomed(ground, [*listed, *further(screened, listed[:AGAIN])])
+    chosen = zoom_settings(ground, [*listed, *further(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]
     context, noise = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))]), ground.noise
     bare = refit(context, noise, [((), ground.unit)])[0]
@@ -128,11 +128,11 @@ def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> Ter
     again = _starts(context, [f for f in chosen if f.term.name in best], others)
     fits = best_of([*fits, *(rough_refit(context, noise, again) if again else [])])
     fits = _searched_anew(context, noise, fits, REGRIDDED)
-    moved = [start for f in fits[:MOVED] for start in elsewhere(context, noise, f)]
+    moved = [start for f in fits[:MOST_MOVED_TERMS] for start in elsewhere(context, noise, f)]
     fits = best_of([*fits, *(rough_refit(context, noise, moved) if moved else [])])
     fits = _searched_anew(context, noise, fits, 1, scattered=True)
-    near = fits[0].cost + max(CLOSE * (bare.deviance - fits[0].deviance), 20.0)
-    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in fits[:EXACT] if f.cost <= near])}
+    near = fits[0].cost + max(EXACT_FIT_SHARE * (bare.deviance - fits[0].deviance), 20.0)
+    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in fits[:MOST_EXACT_FITS] if f.cost <= near])}
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return TermFits(context, noise, bare, tuple(ranked))
 
@@ -144,7 +144,7 @@ def _searched_anew(
     again = ROUND_ABOUT if scattered else 0
 
     def anew(fit: Refit) -> list[Refit]:
-        return wide_refit(context, noise, [regridded(context, noise, fit), (fit.names, fit.unit)], again=again)
+        return wide_refit(context, noise, [choose_grid_start(context, noise, fit), (fit.names, fit.unit)], again=again)
 
     shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
     return best_of([*fits, *itertools.chain(*each_apart(anew, shaped, context.effort))])
@@ -160,23 +160,23 @@ def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
 
     At the first fit of the base model they may have ranked far behind, or at another setting.
     """
-    chosen, values, there = _without(context, noise, fit)
+    chosen, values, there = _fit_without_term(context, noise, fit)
     setting = {s.name: values[s.name] for s in chosen.signal.shapes}
     return _starts(context, scores(there, [(t, setting) for t in siblings(chosen)]), [there.unit])
 
 
-def regridded(context: Context, noise: Noise, fit: Refit) -> Start:
+def choose_grid_start(context: Context, noise: Noise, fit: Refit) -> Start:
     """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
 
     At the first fit of the base model, which something missing bends, another setting may have seemed the best.
     """
-    chosen, _, there = _without(context, noise, fit)
+    chosen, _, there = _fit_without_term(context, noise, fit)
     best = max(scores(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop)
-    (best,) = zoomed(there, [best])
+    (best,) = zoom_settings(there, [best])
     return fit.names, place(context.coordinates, fit.unit, chosen, best.setting, best.sizes)
 
 
-def _without(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str, float], Ground]:
+def _fit_without_term(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str, float], Ground]:
     """The term of a fit, its sizes and setting, and the ground of that fit without it."""
     chosen, at = term(fit.names[0]), context.coordinates
     values = values_of(at, fit.unit, chosen)

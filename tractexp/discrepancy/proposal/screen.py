@@ -17,10 +17,10 @@ from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
 from tractexp.noise import Noise
 
-STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
-TOGETHER = 384  # columns held at once
+TERM_STEP = 0.02  # of a size's relevant value: how large a term is whose column is taken
+COLUMNS_AT_ONCE = 384  # columns held at once
 QUARTER = float(np.pi / 2)
-LEAST = 1e-8  # of a column's square: what the nuisances leave of it at least
+LEAST_COLUMN_SHARE = 1e-8  # of a column's square: what the nuisances leave of it at least
 
 Members = list[tuple[Term, Setting]]  # at one setting of one signal, which share columns
 Batch = list[Members]
@@ -125,7 +125,7 @@ def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
         groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
     batches: list[Batch] = []
     for members in sorted(groups.values(), key=_kind):
-        full = batches and sum(map(len, batches[-1])) * 2 >= TOGETHER
+        full = batches and sum(map(len, batches[-1])) * 2 >= COLUMNS_AT_ONCE
         if not batches or full or _kind(batches[-1][0]) != _kind(members):
             batches.append([])
         batches[-1].append(members)
@@ -149,9 +149,9 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
                     key = (label, t.signal.name, t.clock, tuple(sorted(setting.items())))
                     if key not in index:
                         index[key] = len(points)
-                        sizes = [STEP * size.relevant if i == k else 0.0 for i in range(len(t.balance.sizes))]
+                        sizes = [TERM_STEP * size.relevant if i == k else 0.0 for i in range(len(t.balance.sizes))]
                         points.append(place(at, ground.unit, t, setting, sizes))
-                        spans.append(STEP * size.relevant)
+                        spans.append(TERM_STEP * size.relevant)
                     rows.append(index[key])
             blocks.append((t, s, rows))
     columns = ground.columns(np.array(points), np.array(spans), blocks[0][0].signal.kind)
@@ -164,20 +164,20 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes, chance = -inverse @ side[rows], drawn[rows]
         drops = (chance * (inverse @ chance)).sum(axis=0)
-        pairs.append((_scored(t, s, sizes, float(-sizes @ side[rows])), drops))
+        pairs.append((_build_term_score(t, s, sizes, float(-sizes @ side[rows])), drops))
     return pairs
 
 
 def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
     """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are none."""
     if len(gram) == 1:
-        return 1 / gram if gram[0, 0] > LEAST * whole + 1e-12 else np.zeros((1, 1))
+        return 1 / gram if gram[0, 0] > LEAST_COLUMN_SHARE * whole + 1e-12 else np.zeros((1, 1))
     values, vectors = np.linalg.eigh(gram)
-    large = values > max(LEAST * whole, 1e-12)
+    large = values > max(LEAST_COLUMN_SHARE * whole, 1e-12)
     return (vectors[:, large] / values[large]) @ vectors[:, large].T
 
 
-def _scored(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> TermScore:
+def _build_term_score(t: Term, setting: Setting, sizes: np.ndarray, drop: float) -> TermScore:
     """A score; of two phases the amplitude, and the phase of the larger balance."""
     if "phase" not in setting:
         return _within(TermScore(t, dict(setting), drop, tuple(sizes.tolist())))

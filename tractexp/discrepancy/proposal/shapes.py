@@ -7,21 +7,21 @@ Functions of time take the clock that they count by: 0 at the instant from which
 SHARP, FALLEN, RISEN = 1e4, 0.02, 0.1  # of decisions; a dip is this deep; it ends when this share of it is back
 
 
-def decided(x):
+def step_at_zero(x):
     """0 below x = 0, 1 above."""
     import sympy
 
     return sympy.Max(0, sympy.Min(1, SHARP * x))
 
 
-def rounded(x, width):
+def round_corner(x, width):
     """The larger of x and 0, rounded where x is smaller than `width`."""
     import sympy
 
     return (x + sympy.sqrt(x**2 + width**2)) / 2
 
 
-def reached(eq, clock, instant):
+def step_at_instant(eq, clock, instant):
     """0 until the clock has reached an instant, 1 one sample later."""
     import sympy
 
@@ -40,7 +40,7 @@ def of_dip(eq):
     """Time since the first sample at which a dip is 2 % deep."""
     import sympy
 
-    low = decided(1 - FALLEN - eq.U / eq.U0)
+    low = step_at_zero(1 - FALLEN - eq.U / eq.U0)
     fallen = eq.memory("time_since_dip", "t_d")
     eq.renews(fallen, (fallen + eq.step) * sympy.Max(low, sympy.Min(1, fallen / eq.step)), 0)
     return fallen - eq.step
@@ -53,7 +53,7 @@ def of_return(eq):
     u = eq.U / eq.U0
     lowest, back = eq.memory("voltage_lowest", r"\check u"), eq.memory("time_since_return", "t_b")
     eq.renews(lowest, sympy.Min(lowest, u), 1)
-    risen = decided(u - lowest - RISEN * (1 - lowest)) * decided(1 - FALLEN - lowest)
+    risen = step_at_zero(u - lowest - RISEN * (1 - lowest)) * step_at_zero(1 - FALLEN - lowest)
     eq.renews(back, (back + eq.step) * sympy.Max(risen, sympy.Min(1, back / eq.step)), 0)
     return back - eq.step
 
@@ -63,7 +63,7 @@ def of_return(eq):
 
 def step(eq, clock, instant):
     """A step at an instant."""
-    return reached(eq, clock, instant)
+    return step_at_instant(eq, clock, instant)
 
 
 def ramp(eq, clock, instant):
@@ -77,7 +77,7 @@ def decay(eq, clock, instant, time):
     """A step at an instant that decays."""
     import sympy
 
-    return reached(eq, clock, instant) * sympy.exp(-sympy.Max(0, clock - instant) / time)
+    return step_at_instant(eq, clock, instant) * sympy.exp(-sympy.Max(0, clock - instant) / time)
 
 
 def ring(eq, clock, instant, time, frequency, phase):
@@ -86,7 +86,7 @@ def ring(eq, clock, instant, time, frequency, phase):
 
     since = sympy.Max(0, clock - instant)
     turns = 2 * sympy.pi * frequency * since + phase
-    return reached(eq, clock, instant) * sympy.exp(-since / time) * sympy.cos(turns)
+    return step_at_instant(eq, clock, instant) * sympy.exp(-since / time) * sympy.cos(turns)
 
 
 # Functions of the voltage
@@ -99,12 +99,12 @@ def power(eq, exponent):
 
 def knee(eq, level):
     """What the voltage lacks to a level."""
-    return rounded(level - eq.U / eq.U0, 0.0025) - rounded(level - 1, 0.0025)
+    return round_corner(level - eq.U / eq.U0, 0.0025) - round_corner(level - 1, 0.0025)
 
 
 def knee_squared(eq, level):
     """What the voltage lacks to a level, squared."""
-    return rounded(level - eq.U / eq.U0, 0.0025) ** 2 - rounded(level - 1, 0.0025) ** 2
+    return round_corner(level - eq.U / eq.U0, 0.0025) ** 2 - round_corner(level - 1, 0.0025) ** 2
 
 
 def below(eq, level):
@@ -166,7 +166,7 @@ def field_knee(eq, level):
 
     E, E_0 = eq["E"], eq.before(eq["E"])
     square = re(E * conjugate(E)) / re(E_0 * conjugate(E_0))
-    return rounded(square - level, 0.01) - rounded(1 - level, 0.01)
+    return round_corner(square - level, 0.01) - round_corner(1 - level, 0.01)
 
 
 def slip(eq):

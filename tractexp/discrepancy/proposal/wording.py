@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from tractexp.wording import in_words, joined, percent, with_error
+from tractexp.wording import in_words, join_words, percent, with_error
 
 
 def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> list[str]:
@@ -19,10 +19,10 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
     if not term["function_of_voltage"]:
         sentences.append("it is not a function of the voltage: something happened by itself")
     if proposal["ties"]:
-        names = joined([t["words"] for t in proposal["ties"]], "or")
+        names = join_words([t["words"] for t in proposal["ties"]], "or")
         sentences.append(f"these events cannot tell it from {names}")
     if proposal["alike"]:
-        sentences.append(f"looks like it: {joined([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}")
+        sentences.append(f"looks like it: {join_words([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}")
     return sentences
 
 
@@ -36,4 +36,4 @@ def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
         f"{n} = {with_error(p['value'], float('nan') if p['standard_error'] is None else p['standard_error'])}"
         for n, p in parameters.items()
     ]
-    return joined(each)
+    return join_words(each)

@@ -15,7 +15,7 @@ from tractexp.blocks import Report, Table
 from tractexp.errors import UserError, check_distinct, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import build, get, plugin
-from tractexp.progress import counting
+from tractexp.progress import count_parts
 
 if TYPE_CHECKING:
     from tractexp.studies.bbob.runs import BbobRuns
@@ -124,7 +124,7 @@ def benchmark(
     package()
     ordered = tuple(sorted(targets, reverse=True))
     plan = BbobPlan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
-    with counting("runs", len(plan.cases) * len(built), progress) as count:
+    with count_parts("runs", len(plan.cases) * len(built), progress) as count:
         bbob = perform(built, plan, cores, count)
     return BenchmarkResult(bbob, {one.name: one.node for one in chosen})
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.task import Job, Task, listed
+from tractexp.api.task import Job, Task, print_paths
 from tractexp.blocks import Report, Table
 from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SWEEPS = Path("outputs", "sweeps")
 TARGETS = (10.0, 2.0, 1.01)
 APART = ("budget", "time_limit", "target")
-QUOTED = 8  # sentences on the terminal; the page has all
+MOST_TERMINAL_SENTENCES = 8  # sentences on the terminal; the page has all
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,7 +41,7 @@ class ComparisonResult(Written):
     @functools.cached_property
     def comparison(self) -> "Comparison | Several":
         """What stands behind the page. A loaded result reads the runs again."""
-        return self.computed or _compared(**self.call)[1]
+        return self.computed or _compare_gathered_runs(**self.call)[1]
 
     @property
     def comparisons(self) -> "Mapping[str, Comparison]":
@@ -83,7 +83,7 @@ class ComparisonResult(Written):
             target = min(self.content["targets"])
             terms = "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to"
             report.text(f"{terms} {target:g} x floor", self.answer)
-        shown = self.sentences if several else self.sentences[:QUOTED]
+        shown = self.sentences if several else self.sentences[:MOST_TERMINAL_SENTENCES]
         report.text(*(f"- {sentence}" for sentence in [*shown, *self.content["notes"]]))
         if (more := len(self.sentences) - len(shown)) > 0:
             report.text(f"- and {more} more sentences in {self.page}")
@@ -92,7 +92,7 @@ class ComparisonResult(Written):
     def _over_all(self) -> Iterator[Table]:
         """What several problems come to under each of the terms, the best variants first."""
         for overall in getattr(self.comparison, "overall", ()):
-            best = list(overall.figures.items())[:QUOTED]
+            best = list(overall.figures.items())[:MOST_TERMINAL_SENTENCES]
             cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
             yield Table(["variant", *overall.columns], cells, f"{overall.terms}, {overall.where}: {overall.measure}")
 
@@ -146,7 +146,7 @@ def compare(
         "targets": list(targets), "ties": ties, "floor": floor, "reference": reference, "apart": list(apart),
         "bbob": bbob,
     }  # fmt: skip
-    source, comparison = _compared(**call, cores=cores, progress=progress)
+    source, comparison = _compare_gathered_runs(**call, cores=cores, progress=progress)
     return ComparisonResult(call, source, _report(comparison).content(comparison, source), comparison)
 
 
@@ -180,20 +180,20 @@ def _hardest(targets: Sequence[float]) -> int:
     return targets.index(min(targets))
 
 
-def _compared(
+def _compare_gathered_runs(
     *, sweep: str | None, filter: str | None, uri: str | None, experiment: str | None, data: str | None,
     apart: Sequence[str] = (), bbob: int = 0, cores: int | None = None, progress: Any = False, **judging: Any,
 ) -> "tuple[str, Comparison | Several]":  # fmt: skip
     """Where the runs are from, and their comparison: of several problems each by itself and all together."""
     from tractexp.studies.comparison import runs as gathering
-    from tractexp.studies.comparison.judging import compared, several
+    from tractexp.studies.comparison.judging import compare_runs, several
 
     runs, source = _runs(sweep, filter, uri, experiment)
     if data is not None:
-        runs = gathering.on(runs, source, data)
-    groups = gathering.parted(runs, apart)
+        runs = gathering.select_runs_on(runs, source, data)
+    groups = gathering.part_runs(runs, apart)
     if len(groups) == 1 and not bbob:
-        return source, compared(gathering.gather(runs, source), progress, judging)
+        return source, compare_runs(gathering.gather(runs, source), progress, judging)
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
             f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
@@ -246,7 +246,7 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
     def log(self, job: Job, result: ComparisonResult, paths: list[Path]) -> None:
         """Put what was written into the sweep's folder, too, and the page on the sweep's run, where there is one."""
         if result.folder is not None and result.folder != job.folder:
-            listed(files.copy(path, result.folder / path.name) for path in paths)
+            print_paths(files.copy(path, result.folder / path.name) for path in paths)
         if job.config["tracking"]["enabled"]:
             _track(job, result, paths)
 

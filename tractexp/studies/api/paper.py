@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Self
 
 from tractexp import files
 from tractexp.api.arguments import public
-from tractexp.api.setup import Setup, recorded
-from tractexp.api.task import Job, Task, listed
+from tractexp.api.setup import Setup, describe_records
+from tractexp.api.task import Job, Task, print_paths
 from tractexp.blocks import Report, Table
 from tractexp.errors import check_choice, check_range
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
-from tractexp.progress import NEXT_LINES, Pace, say, telling
+from tractexp.progress import NEXT_LINES, Pace, say, tell_stages
 
 if TYPE_CHECKING:
     from tractexp.studies.paper.claims import Claim
@@ -55,10 +55,10 @@ class PaperResult(Written):
         return Counter(claim.word for claim in self.claims)
 
     def table(self) -> Table:
-        from tractexp.studies.paper.claims import counted
+        from tractexp.studies.paper.claims import count_verdicts
 
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
-        return Table(["where", "the paper's claim", "verdict", "measured"], rows, counted(self.claims), words=(1, 2, 3))
+        return Table(["where", "the paper's claim", "verdict", "measured"], rows, count_verdicts(self.claims), words=(1, 2, 3))
 
     def summary(self) -> Report:
         return Report().add(self.table()).text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
@@ -130,8 +130,8 @@ def paper(
         seed=seed, budget=budget, time_limit=time_limit, target=target,
     )  # fmt: skip
     settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
-    with telling(progress) as tell:
-        study = _study(setup, **settings, tell=tell, count=_counted(tell))
+    with tell_stages(progress) as tell:
+        study = _study(setup, **settings, tell=tell, count=_count_searches(tell))
         from tractexp.studies.paper.claims import claims
 
         for kind, needing in HELD_OUT.items():
@@ -160,7 +160,7 @@ def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "
     )  # fmt: skip
 
 
-def _counted(tell: Callable[[str], None]) -> Callable[[int, int], None]:
+def _count_searches(tell: Callable[[str], None]) -> Callable[[int, int], None]:
     """A counter of the searches that have ended, which reports now and then."""
     pace = Pace(NEXT_LINES)
 
@@ -188,12 +188,12 @@ class Paper(Task, call=paper):
 
     def perform(self, job: Job, **instead: Any) -> PaperResult:
         job = job.holding_out(self.held_out)
-        for line in recorded(*job.events_of_fit, held_out="hold out"):
+        for line in describe_records(*job.events_of_fit, held_out="hold out"):
             say(line)
         return super().perform(job, progress=lambda line: say(f"  {line}"), **instead)
 
     def log(self, job: Job, result: PaperResult, paths: list[Path]) -> None:
         if self.docs is not None:
-            listed(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
+            print_paths(files.copy(path, Path(self.docs)) for path in paths if path.suffix == ".md")
         metrics = {verdict.replace(" ", "_"): float(n) for verdict, n in result.counts.items()}
         job.log(name="the paper", metrics=metrics, artifacts=paths)

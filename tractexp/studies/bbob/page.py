@@ -9,15 +9,15 @@ from tractexp.blocks import Report
 from tractexp.blocks.chart import Chart
 from tractexp.studies.bbob.runs import BbobRuns
 from tractexp.studies.comparison.charts import runtime_curves
-from tractexp.wording import counted
+from tractexp.wording import count_noun
 
 
 def scale(benchmark: BbobRuns) -> str:
     plan = benchmark.plan
     functions, dimensions = len(plan.functions), " and ".join(map(str, plan.dimensions))
     return (
-        f"{counted(functions, 'BBOB function')} in dimension {dimensions},"
-        f" {counted(len(plan.instances), 'instance')} each,"
+        f"{count_noun(functions, 'BBOB function')} in dimension {dimensions},"
+        f" {count_noun(len(plan.instances), 'instance')} each,"
         f" {plan.multiplier:,} evaluations per dimension and run"
     )
 

@@ -13,11 +13,11 @@ from tractexp.studies.comparison.statistics import Ranks
 from tractexp.studies.comparison.summary import ECDF_TARGETS, Band, band, runtimes
 
 TOGETHER = len(style.PALETTE)  # more curves than colors are not told apart in one panel
-SMALL = 230  # pixels, the height of a chart beside others
+SMALL_CHART_HEIGHT = 230  # pixels, the height of a chart beside others
 ROW = 20, 34  # pixels of a variant in a chart with a row for each, where there are many and few
 PANEL = 135  # pixels of a parameter
 ROUND = (1, 2, 3, 5), (1, 1.5, 2, 3, 4, 5, 6, 8)  # times a power of ten
-JITTER = 0.3  # of a row: dots of equal height hide each other
+DOT_JITTER = 0.3  # of a row: dots of equal height hide each other
 INSIDE, OUTSIDE = style.PALETTE[0], style.PALETTE[1]
 Curves = Sequence[tuple[np.ndarray, np.ndarray]]
 Blank = Callable[[str, int | None], Chart]  # title and height -> a chart without curves, its axes as the others'
@@ -44,8 +44,8 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
         return chart.limits(None, first, last)
 
     curves = [(b.x, b.median) for b in bands]
-    whole = _together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
-    return whole, _apart(blank, names, curves, bands) if len(names) > TOGETHER else []
+    whole = _draw_curves_together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
+    return whole, _draw_curves_apart(blank, names, curves, bands) if len(names) > TOGETHER else []
 
 
 def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
@@ -64,8 +64,8 @@ def runtime_curves(names: Sequence[str], costs: Sequence[np.ndarray], label: str
         return chart.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
     curves = [_shares(cost, first, 1.1 * last) for cost in costs]
-    whole = _together(blank("", _height(names)), names, curves, [])
-    return whole, _apart(blank, names, curves, []) if len(names) > TOGETHER else []
+    whole = _draw_curves_together(blank("", _height(names)), names, curves, [])
+    return whole, _draw_curves_apart(blank, names, curves, []) if len(names) > TOGETHER else []
 
 
 def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np.ndarray]:
@@ -78,7 +78,7 @@ def targets_in_words() -> str:
     return f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times the floor"
 
 
-def _together(chart: Chart, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> Chart:
+def _draw_curves_together(chart: Chart, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> Chart:
     """All curves in one chart, the first ones in color and on top; bands where they are given."""
     for name, (x, y) in list(zip(names, curves, strict=True))[TOGETHER:]:
         chart.line(name, x, y, style.BEHIND, step=True, legend=False)
@@ -95,11 +95,11 @@ def _height(names: Sequence[str]) -> int:
     return 310 + 22 * (letters // 36)
 
 
-def _apart(blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> list[Chart]:
+def _draw_curves_apart(blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> list[Chart]:
     """One small chart for each curve, the first curve behind it."""
     charts = []
     for k, (name, (x, y)) in enumerate(zip(names, curves, strict=True)):
-        chart = blank(name, SMALL)
+        chart = blank(name, SMALL_CHART_HEIGHT)
         chart.line(names[0], *curves[0], style.BEHIND, step=True, legend=False)
         for b in bands[k : k + 1]:
             chart.band("", b.x, b.lower, b.upper, style.PALETTE[0], step=True)
@@ -111,7 +111,7 @@ def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
     """Where every finished run ended, one row for each variant, with the median and the quartiles of each."""
     variants = [variant for variant in variants if variant.finished]
     chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
-    dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _scattered(v)]
+    dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _spread_runs(v)]
     labels = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
     ends = np.array([run.objective for run, _ in dots])
     chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, hover=labels)
@@ -135,10 +135,10 @@ def round_numbers(low: float, high: float) -> list[float]:
     return few if len(few) > 2 else more
 
 
-def _scattered(variant: Variant) -> list[tuple[SearchRun, float]]:
+def _spread_runs(variant: Variant) -> list[tuple[SearchRun, float]]:
     """The finished runs with a share of a row by which each is moved, so that equal ones are seen."""
     done = variant.finished
-    return list(zip(done, JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
+    return list(zip(done, DOT_JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
 
 
 def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
@@ -174,7 +174,7 @@ def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     turned = sum(4 + len(v.name) for v in variants) > 40  # characters side by side on a phone
     room = 6 * max(len(v.name) for v in variants) if turned else 0
     chart = Chart("", labels, pixels=100 + PANEL * len(names) + room, hover="closest")
-    dots = [(run, k + shift) for k, v in enumerate(variants) for run, shift in _scattered(v) if run in polished.reached]
+    dots = [(run, k + shift) for k, v in enumerate(variants) for run, shift in _spread_runs(v) if run in polished.reached]
     for panel, name in enumerate(names):
         for inside, label, color in ((False, "elsewhere", OUTSIDE), (True, "in the floor's valley", INSIDE)):
             some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]

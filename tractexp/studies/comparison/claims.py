@@ -4,12 +4,12 @@ import numpy as np
 
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.comparison import Comparison, VariantPair, seeds_needed
-from tractexp.studies.comparison.floor import AT_FLOOR
-from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.studies.comparison.floor import FLOOR_SHARE
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 from tractexp.studies.comparison.summary import Spread
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
-MORE = 1.2  # times the simulations of another variant are worth a word
+LEAST_TOLD_RATIO = 1.2  # times the simulations of another variant are worth a word
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -33,7 +33,7 @@ def answer(comparison: Comparison) -> str:
     if len(comparison.summaries) < 2:
         return f"There is one variant only, {best}: nothing to choose from."
     if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
-        lowest = f"{_listed([best, *others])} have" if others else f"{best} has"
+        lowest = f"{_list_names([best, *others])} have" if others else f"{best} has"
         return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
     if (tested := _best_tested(comparison)) != best:
         advice = _advice(comparison, tested, [])
@@ -51,14 +51,14 @@ def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
     """Whether to take the variant whose median is lowest, or as low as those of others and reached sooner."""
     beaten, worse, alike = _verdicts(comparison, best)
     if worse:
-        return f"Not settled: {best} has the lowest median objective, but {_listed(worse)} did better seed by seed."
+        return f"Not settled: {best} has the lowest median objective, but {_list_names(worse)} did better seed by seed."
     rivals = [name for name in alike if name not in others]
     if rivals:
         return (
-            f"Take {best}, or as well {_listed(rivals)}: these runs do not tell them apart.{_spent(comparison, best)}"
+            f"Take {best}, or as well {_list_names(rivals)}: these runs do not tell them apart.{_spent(comparison, best)}"
         )
-    why = [f"it ends as low as {_listed(others)}, sooner"] if others else []
-    why += [f"it ends lower than {_listed(beaten)}"] if beaten else []
+    why = [f"it ends as low as {_list_names(others)}, sooner"] if others else []
+    why += [f"it ends lower than {_list_names(beaten)}"] if beaten else []
     return f"Take {best}: {', and '.join(why)}.{_spent(comparison, best)}"
 
 
@@ -66,7 +66,7 @@ def _spent(comparison: Comparison, best: str) -> str:
     """What the best variant spent, where that is more than another did."""
     (first,) = (summary for summary in comparison.summaries if summary.name == best)
     least = min(comparison.summaries, key=lambda summary: summary.simulations.median)
-    if not first.simulations.median > MORE * least.simulations.median:
+    if not first.simulations.median > LEAST_TOLD_RATIO * least.simulations.median:
         return ""
     spent = (f"{number(float(round(s.simulations.median)))} simulations" for s in (first, least))
     return f" It spent {next(spent)}, where {least.name} spent {next(spent)}."
@@ -87,13 +87,13 @@ def headline(comparison: Comparison) -> str:
     best, *others = comparison.leaders
     if others:
         within = f"equal within {comparison.ties:.2%} of the floor"
-        said = f"{_listed([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
+        said = f"{_list_names([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
     else:
         said = f"{best} has the lowest median objective; it"
     beaten, worse, alike = _verdicts(comparison, best)
-    verdicts = [f"is significantly better than {_listed(beaten)}"] if beaten else []
-    verdicts += [f"is significantly worse than {_listed(worse)} over paired seeds"] if worse else []
-    verdicts += [f"shows no significant difference to {_listed(alike)}"] if alike else []
+    verdicts = [f"is significantly better than {_list_names(beaten)}"] if beaten else []
+    verdicts += [f"is significantly worse than {_list_names(worse)} over paired seeds"] if worse else []
+    verdicts += [f"shows no significant difference to {_list_names(alike)}"] if alike else []
     return f"{said} {' and '.join(verdicts) or 'was not tested'}."
 
 
@@ -104,8 +104,8 @@ def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[Varian
     return near, [pair for pair in comparison.pairs if pair not in near]
 
 
-def _listed(names: list[str]) -> str:
-    return joined(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
+def _list_names(names: list[str]) -> str:
+    return join_words(sorted(names)) if len(names) <= 6 else f"{len(names)} other variants"
 
 
 def of_pair(comparison: Comparison, pair: VariantPair) -> str:
@@ -138,13 +138,13 @@ def of_ranks(comparison: Comparison) -> str:
     order = np.argsort(ranks.mean, kind="stable")
     listed = ", ".join(f"{ranks.names[i]} {ranks.mean[i]:.2f}" for i in order[:5])
     more = f" and {len(order) - 5} more up to {max(ranks.mean):.2f}" if len(order) > 5 else ""
-    differ = "differ" if ranks.p < ALPHA else "do not differ significantly"
+    differ = "differ" if ranks.p < SIGNIFICANCE_LEVEL else "do not differ significantly"
     text = (
         f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f}, {len(order) - 1} "
         f"degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
     )
-    if ranks.p < ALPHA:
-        text += f"; two ranks differ significantly at {ALPHA:.0%} when {ranks.critical_difference:.2f} or more apart"
+    if ranks.p < SIGNIFICANCE_LEVEL:
+        text += f"; two ranks differ significantly at {SIGNIFICANCE_LEVEL:.0%} when {ranks.critical_difference:.2f} or more apart"
         text += " (Nemenyi)"
     return text + "."
 
@@ -159,13 +159,13 @@ def of_speed(comparison: Comparison) -> str:
     said = [f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)]
     text = f"To reach {goal}, {', '.join(said)} simulations in expectation (ERT)"
     never = [name for ert, name in rows if np.isinf(ert)]
-    return text + (f"; {_listed(never)} never did." if never else ".")
+    return text + (f"; {_list_names(never)} never did." if never else ".")
 
 
 def of_floor(comparison: Comparison) -> str:
-    shares = _ranked([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
+    shares = _describe_shares([(s.at_floor, s.runs, s.name) for s in comparison.summaries])
     value, source = number(comparison.floor.value, 5), comparison.floor.source
-    return f"Runs within {AT_FLOOR:.0%} of the floor of {value} pu² ({source}): {shares}."
+    return f"Runs within {FLOOR_SHARE:.0%} of the floor of {value} pu² ({source}): {shares}."
 
 
 def of_valley(comparison: Comparison) -> str:
@@ -173,10 +173,10 @@ def of_valley(comparison: Comparison) -> str:
     rows = [(s.in_valley, s.runs - s.failures, s.name) for s in comparison.summaries if s.in_valley is not None]
     if not rows:
         return ""
-    return f"Runs that ended in the floor's valley, from where least squares reach it: {_ranked(rows)}."
+    return f"Runs that ended in the floor's valley, from where least squares reach it: {_describe_shares(rows)}."
 
 
-def _ranked(rows: list[tuple[float, int, str]]) -> str:
+def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
     """Shares of runs in words, the largest first: (share, runs, variant)."""
     rows = sorted(rows, key=lambda row: (-row[0], row[2]))
     more = f" (the best six of {len(rows)})" if len(rows) > 6 else ""

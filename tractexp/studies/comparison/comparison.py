@@ -10,8 +10,8 @@ from tractexp.studies.comparison.ablation import Ablation, ablate
 from tractexp.studies.comparison.floor import Floor, Polished, floor_of
 from tractexp.studies.comparison.runs import Gathered, Variant
 from tractexp.studies.comparison.statistics import (
-    ALPHA,
     LEAST_SEEDS,
+    SIGNIFICANCE_LEVEL,
     Ranks,
     friedman,
     holm,
@@ -35,7 +35,7 @@ class VariantPair:
 
     @property
     def significant(self) -> bool:
-        return self.corrected < ALPHA
+        return self.corrected < SIGNIFICANCE_LEVEL
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +88,7 @@ def compare(
     least = (1 + ties) * low.value
     summaries = [summarize(variant, low, targets, polished) for variant in gathered.variants]
     hardest = int(np.argmin(targets))
-    summaries.sort(key=lambda s: (*_standing(s.objective.median, least), s.ert["simulations"][hardest], s.name))
+    summaries.sort(key=lambda s: (*_measure_standing(s.objective.median, least), s.ert["simulations"][hardest], s.name))
     pairs, notes = _pairs(gathered.variants, least, reference)
     ranks, more = _ranks(gathered.variants, least)
     ablation = ablate(gathered.variants, plain or {}, least)
@@ -104,10 +104,10 @@ def compare(
 
 def seeds_needed(pairs: int) -> int:
     """The fewest seeds by which a difference can pass Wilcoxon's test where so many pairs are corrected for."""
-    return int(np.floor(np.log2(2 * pairs / ALPHA))) + 1 if pairs else LEAST_SEEDS
+    return int(np.floor(np.log2(2 * pairs / SIGNIFICANCE_LEVEL))) + 1 if pairs else LEAST_SEEDS
 
 
-def _standing(median: float, least: float) -> tuple[bool, float]:
+def _measure_standing(median: float, least: float) -> tuple[bool, float]:
     return bool(np.isnan(median)), max(median, least)
 
 
@@ -127,7 +127,7 @@ def _pairs(
         notes.append(
             f"{len(chosen) - len(enough)} of {len(chosen)} pairs were not tested, for want of seeds: {names} have "
             f"{len(short[0])} in common, and the Wilcoxon signed-rank test needs at least {LEAST_SEEDS} to reach "
-            f"{ALPHA:.0%}; run more, such as 'seed=range(0,30)'."
+            f"{SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
         )
     tested = [_pair(*row, least) for row in enough]
     corrected = holm([pair.p for pair in tested])
@@ -135,7 +135,7 @@ def _pairs(
     needed = seeds_needed(len(tested))
     if tested and max(pair.seeds for pair in tested) < needed:
         notes.append(
-            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no difference at {ALPHA:.0%}, "
+            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no difference at {SIGNIFICANCE_LEVEL:.0%}, "
             "however large: run more seeds, or test against one variant by task.reference=NAME."
         )
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes

@@ -14,13 +14,13 @@ from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
 from tractexp.studies.comparison.runs import SearchRun
 
-AT_FLOOR = 0.01  # what ends within this share of the floor has reached it
+FLOOR_SHARE = 0.01  # what ends within this share of the floor has reached it
 SCATTER, STARTS, APART = 400, 60, 0.3  # starts: the best of a scatter that differ by so much of a range somewhere
 BRIEF, ROUGH = 60, 1e-3  # iterations of a descent, and the share of the objective that a step must gain
 WHOLE, FINE = 200, 1e-9  # of the last descent, from the lowest
-TOGETHER = 64  # descents at once, where their residuals are no more than MOST_NUMBERS
+DESCENTS_AT_ONCE = 64  # descents at once, where their residuals are no more than MOST_NUMBERS
 TINY = 1e-300  # pu²: a fit without any error is scaled by it
-SAME = 1e-2  # relative: objectives this close are those of the same problem
+SAME_PROBLEM_TOLERANCE = 1e-2  # relative: objectives this close are those of the same problem
 
 
 @dataclass(frozen=True)
@@ -44,7 +44,7 @@ class Polished:
 
     def in_valley(self, run: SearchRun) -> bool | None:
         """Whether the run ended in the valley of the lowest point; None where that is not known."""
-        return self.reached[run] <= (1 + AT_FLOOR) * self.objective if run in self.reached else None
+        return self.reached[run] <= (1 + FLOOR_SHARE) * self.objective if run in self.reached else None
 
 
 def polish(
@@ -62,7 +62,7 @@ def polish(
         return None
     units = np.concatenate([space.to_unit(ends), _spread(problem)])
     best = max(min(run.objective for run in runs if run.finished), TINY)
-    groups = np.array_split(units, -(-len(units) // _together(problem)))
+    groups = np.array_split(units, -(-len(units) // _count_parallel_descents(problem)))
     ended, values, count = [], [], counting(len(groups))
     for group in groups:
         unit, objectives = _descend(problem, group, best, BRIEF, ROUGH)
@@ -98,7 +98,7 @@ def floor_of(runs: Sequence[SearchRun], value: float | None, polished: Polished 
 
 def _same(problem: Problem, ends: np.ndarray, runs: Sequence[SearchRun]) -> bool:
     recorded = np.array([run.objective for run in runs])
-    return bool(np.allclose(problem.objective(ends), recorded, rtol=SAME, atol=0)) if len(runs) else True
+    return bool(np.allclose(problem.objective(ends), recorded, rtol=SAME_PROBLEM_TOLERANCE, atol=0)) if len(runs) else True
 
 
 def _spread(problem: Problem) -> np.ndarray:
@@ -109,9 +109,9 @@ def _spread(problem: Problem) -> np.ndarray:
     return unit[able][best_distinct(unit[able], objectives[able], APART, STARTS)]
 
 
-def _together(problem: Problem) -> int:
+def _count_parallel_descents(problem: Problem) -> int:
     """How many descents are held at once: each tries several steps, with a residual for P and Q of every sample."""
-    return int(np.clip(MOST_NUMBERS // (8 * problem.drive.samples), 1, TOGETHER))
+    return int(np.clip(MOST_NUMBERS // (8 * problem.drive.samples), 1, DESCENTS_AT_ONCE))
 
 
 def _descend(

@@ -11,24 +11,24 @@ from tractexp.api.setup import Setup
 from tractexp.errors import UserError
 from tractexp.inference.problem import Problem
 from tractexp.plugin import build, discover, get
-from tractexp.progress import counting
+from tractexp.progress import count_parts
 from tractexp.record import detect
 from tractexp.studies.api.benchmark import BenchmarkResult, benchmark
 from tractexp.studies.comparison.ablation import family
 from tractexp.studies.comparison.comparison import Comparison, compare
 from tractexp.studies.comparison.floor import Polished, polish
-from tractexp.studies.comparison.load import nested
+from tractexp.studies.comparison.load import nest_keys
 from tractexp.studies.comparison.overall import Overall, Several, on_functions, on_records, terms_of
 from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
 BBOB = "bbob.json"
 
 
-def compared(gathered: Gathered, progress: Any, judging: Mapping[str, Any]) -> Comparison:
+def compare_runs(gathered: Gathered, progress: Any, judging: Mapping[str, Any]) -> Comparison:
     """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
-    polished, why_not = _polished(gathered, progress)
+    polished, why_not = _polish_described_problem(gathered, progress)
     return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
 
 
@@ -42,11 +42,11 @@ def several(
     for (data, *_), runs in groups.items():
         terms = terms_of(runs)
         label = f"{data}, {terms}" if terms else data
-        comparisons[label] = compared(gather(runs, f"{source} on {label}"), progress, judging)
+        comparisons[label] = compare_runs(gather(runs, f"{source} on {label}"), progress, judging)
         by_terms.setdefault(terms, {})[label] = comparisons[label]
     without = plain()
     overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
-    notes = _noted(comparisons)
+    notes = _collect_notes(comparisons)
     if bbob:
         try:
             overall.append(_on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress))
@@ -55,23 +55,23 @@ def several(
     return Several(comparisons, tuple(overall), tuple(notes))
 
 
-def _noted(comparisons: Mapping[str, Comparison]) -> list[str]:
+def _collect_notes(comparisons: Mapping[str, Comparison]) -> list[str]:
     """What a reader must know, once, with the problems that it is true of unless that is all of them."""
     of: dict[str, list[str]] = {}
     for label, comparison in comparisons.items():
         for note in comparison.notes:
             of.setdefault(note, []).append(label)
-    return [n if len(labels) == len(comparisons) else f"{joined(labels)}: {n}" for n, labels in of.items()]
+    return [n if len(labels) == len(comparisons) else f"{join_words(labels)}: {n}" for n, labels in of.items()]
 
 
 def _on_bbob(comparison: Comparison, instances: int, folder: Path | None, cores: int | None, progress: Any) -> Overall:
     """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what they depend on."""
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
-    optimizers = {v.name: nested(v.runs[0].config)["optimizer"] for v in variants}
+    optimizers = {v.name: nest_keys(v.runs[0].config)["optimizer"] for v in variants}
     budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
     settings = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
-    result = _stored(folder, settings) if folder else None
+    result = _load_stored_runs(folder, settings) if folder else None
     if result is None:
         chosen = {"instances": range(1, instances + 1), "dimensions": [DIMENSION], "multiplier": multiplier}
         result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
@@ -80,7 +80,7 @@ def _on_bbob(comparison: Comparison, instances: int, folder: Path | None, cores:
     return on_functions(result.bbob, family(variants, plain()))
 
 
-def _stored(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
+def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None:
     """The runs on BBOB that were made before with the same code and settings."""
     with contextlib.suppress(OSError, ValueError, KeyError, TypeError, AttributeError, UserError):
         content = files.read_json(folder / BBOB)
@@ -89,7 +89,7 @@ def _stored(folder: Path, settings: Mapping[str, Any]) -> BenchmarkResult | None
     return None
 
 
-def _polished(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
+def _polish_described_problem(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
     """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
@@ -99,14 +99,14 @@ def _polished(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
     except (KeyError, TypeError, ValueError) as error:
         return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
     with contextlib.ExitStack() as stack:
-        polished = polish(problem, runs, lambda n: stack.enter_context(counting("groups of descents", n, progress)))
+        polished = polish(problem, runs, lambda n: stack.enter_context(count_parts("groups of descents", n, progress)))
     why = "the records or the model have changed since: these parameters fit otherwise now"
     return polished, "" if polished else why
 
 
 def _problem(run: SearchRun) -> Problem:
     """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
-    config = nested(run.config)
+    config = nest_keys(run.config)
     home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
         records = build("data", config["data"]).read()

@@ -62,7 +62,7 @@ def _read_job(folder: Path) -> SearchRun | None:
     if config["task"]["name"] != FITTING:
         return None
     status = _status(folder)
-    unfinished = _unfinished(folder, status)
+    unfinished = _explain_missing_result(folder, status)
     runtime: Mapping[str, Any] = {"choices": status.get("choices")}
     if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
         runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]  # of a job ended at once it is missing
@@ -128,7 +128,7 @@ def _status(folder: Path) -> Mapping[str, Any]:
         return {"message": "", **content, "status": str(content["status"])}
 
 
-def _unfinished(folder: Path, status: Mapping[str, Any]) -> dict[str, Any]:
+def _explain_missing_result(folder: Path, status: Mapping[str, Any]) -> dict[str, Any]:
     """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
     if INTERRUPTED in (status.get("status"), status.get("message")):  # early sweeps: "failed", with this message
         return {"interruption": "its sweep was interrupted"}
@@ -149,7 +149,7 @@ def flat(node: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in leaves(node) if not isinstance(value, dict)}
 
 
-def nested(flattened: Mapping[str, Any]) -> dict[str, Any]:
+def nest_keys(flattened: Mapping[str, Any]) -> dict[str, Any]:
     """The reverse of `flat`; a mapping that was empty is not there."""
     config: dict[str, Any] = {}
     for key, value in flattened.items():
@@ -167,7 +167,7 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
     and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
     """
-    runs = [_logged(one) for one in logged if one.tags.get("task") == FITTING and "optimizer" in one.tags]
+    runs = [_read_logged_run(one) for one in logged if one.tags.get("task") == FITTING and "optimizer" in one.tags]
     if not runs:
         raise UserError(
             f"{source} matches no run of task={FITTING}; the tags to filter by are task, model, optimizer, data and "
@@ -176,7 +176,7 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
     return runs
 
 
-def _logged(one: Any) -> SearchRun:
+def _read_logged_run(one: Any) -> SearchRun:
     fields: dict[str, Any] = {
         "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
         "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,

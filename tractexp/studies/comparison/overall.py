@@ -60,7 +60,7 @@ def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping
     logs = {label: _logs(comparison, names) for label, comparison in comparisons.items()}
     seeds = sorted(set.intersection(*(set(by_seed) for by_seed in logs.values())))
     table = np.array([by_seed[seed] for by_seed in logs.values() for seed in sorted(by_seed)])
-    ranks = _ranked(names, table)
+    ranks = _rank_optimizers(names, table)
     chosen = family(variants, plain)
     whole = None
     if chosen and seeds:
@@ -69,7 +69,7 @@ def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping
     medians = {
         name: tuple(float(np.median([run.objective for run in c.gathered[name].runs]) / c.floor.value)
                     for c in comparisons.values())
-        for name in _ordered(names, ranks)
+        for name in _order_names(names, ranks)
     }  # fmt: skip
     several = f"{len(comparisons)} records, " if len(comparisons) > 1 else ""
     data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
@@ -90,11 +90,11 @@ def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall
         [np.mean([np.log10(max(run.distance, SOLVED)) for run in benchmark.of(name, dimension, [f])]) for name in names]
         for f in plan.functions
     ])  # fmt: skip
-    ranks = _ranked(names, table)
+    ranks = _rank_optimizers(names, table)
     groups = {"all": plan.functions, **benchmark.groups()}
     shares = {
         name: tuple(benchmark.share(name, dimension, functions) for functions in groups.values())
-        for name in _ordered(names, ranks)
+        for name in _order_names(names, ranks)
     }
     whole = chosen.ablation(dict(zip(names, table.T, strict=True))) if chosen else None
     return Overall(
@@ -119,11 +119,11 @@ def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]
     }
 
 
-def _ranked(names: Sequence[str], table: np.ndarray) -> Ranks | None:
+def _rank_optimizers(names: Sequence[str], table: np.ndarray) -> Ranks | None:
     return friedman(names, table) if len(names) > 2 and len(table) >= LEAST_SEEDS else None
 
 
-def _ordered(names: Sequence[str], ranks: Ranks | None) -> list[str]:
+def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
     return sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__) if ranks else list(names)
 
 

@@ -5,8 +5,8 @@ import numpy as np
 from tractexp.studies.comparison.ablation import SwitchEffect
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
-from tractexp.studies.comparison.statistics import ALPHA
-from tractexp.wording import in_words, joined, percent
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
+from tractexp.wording import in_words, join_words, percent
 
 
 def answer(several: Several) -> str:
@@ -23,9 +23,9 @@ def of_ranks(overall: Overall) -> str:
     best, *others = sorted(zip(ranks.mean, ranks.names, strict=True))
     alike = [name for mean, name in others if mean - best[0] < ranks.critical_difference]
     said = f"{where}: {best[1]} has the best mean rank, {best[0]:.2f} of {len(ranks.names)}"
-    if ranks.p >= ALPHA:
+    if ranks.p >= SIGNIFICANCE_LEVEL:
         return f"{said}, but the variants do not differ significantly (Friedman, p = {in_words(ranks.p)})."
-    close = joined(alike) if len(alike) < 6 else f"{len(alike)} others"
+    close = join_words(alike) if len(alike) < 6 else f"{len(alike)} others"
     verdict = f"; not told from it: {close}" if alike else ", significantly before all others"
     return f"{said}{verdict} (critical difference {ranks.critical_difference:.2f})."
 
@@ -72,7 +72,7 @@ def of_agreement(several: Several) -> str:
 
 
 def _help(names: list[str]) -> str:
-    return f"{joined(names)} help{'s' * (len(names) == 1)}"
+    return f"{join_words(names)} help{'s' * (len(names) == 1)}"
 
 
 def sentences(several: Several) -> list[str]:

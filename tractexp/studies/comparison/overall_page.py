@@ -13,7 +13,7 @@ from tractexp.studies.comparison import page as one
 from tractexp.studies.comparison.ablation import Ablation
 from tractexp.studies.comparison.claims import number
 from tractexp.studies.comparison.overall import Overall, Several
-from tractexp.studies.comparison.statistics import ALPHA
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL
 
 ROW = 26  # pixels of an effect in a chart
 ALL = "all together"
@@ -57,7 +57,7 @@ def _overall(page: Report, overall: Overall) -> None:
             charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
             f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half of Nemenyi's"
             f" critical difference to either side: variants whose bars do not overlap differ significantly at"
-            f" {ALPHA:.0%}.",
+            f" {SIGNIFICANCE_LEVEL:.0%}.",
         )
     tell = (lambda x: f"{x:.0%}") if overall.share else (lambda x: number(x, 3))
     ranks = dict(zip(overall.ranks.names, overall.ranks.mean, strict=True)) if overall.ranks else {}

@@ -11,15 +11,15 @@ from tractexp.studies.comparison import charts, claims
 from tractexp.studies.comparison.ablation import Ablation, SwitchEffect
 from tractexp.studies.comparison.claims import number, p_value
 from tractexp.studies.comparison.comparison import Comparison, VariantPair
-from tractexp.studies.comparison.floor import AT_FLOOR
+from tractexp.studies.comparison.floor import FLOOR_SHARE
 from tractexp.studies.comparison.runs import SearchRun, Variant
-from tractexp.studies.comparison.statistics import ALPHA, size_of
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, size_of
 from tractexp.studies.comparison.summary import Spread
 
 AT_END = "at the end of the search"
 COMPANY = "With most other switches on against with fewest: the factor by which the effect changes."
 INTERACTIONS = "Interactions: the factor by which one switch's effect changes when the other is on."
-QUOTED = 12  # more sentences than these about pairs are folded away
+MOST_OPEN_SENTENCES = 12  # more sentences than these about pairs are folded away
 
 
 def report(comparison: Comparison, source: str) -> Report:
@@ -59,7 +59,7 @@ def quality(page: Report, comparison: Comparison) -> None:
     page.table(
         [*columns, "in its valley"],
         rows,
-        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {AT_FLOOR:.0%} of {floor}. In its "
+        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {FLOOR_SHARE:.0%} of {floor}. In its "
         "valley: share of the finished runs from whose end least squares reach it.",
     )
     for name in ("epsilon_p", "epsilon_q"):
@@ -136,7 +136,7 @@ def _differences(page: Report, comparison: Comparison) -> None:
         page.chart(
             charts.mean_ranks(comparison.ranks),
             f"Mean ranks over seeds, with half of Nemenyi's critical difference to either side: variants whose bars "
-            f"do not overlap differ significantly at {ALPHA:.0%}.",
+            f"do not overlap differ significantly at {SIGNIFICANCE_LEVEL:.0%}.",
         )
     if not comparison.pairs:
         return
@@ -146,10 +146,10 @@ def _differences(page: Report, comparison: Comparison) -> None:
         with page.folded(f"the other {len(rest)} pairs" if len(rest) > 1 else "the other pair"):
             _pairs(page, rest)
     sentences = [claims.of_pair(comparison, pair) for pair in (*main, *rest)]
-    page.heading("To quote", 3).items(sentences[:QUOTED])
-    if sentences[QUOTED:]:
-        with page.folded(f"{len(sentences) - QUOTED} more sentences"):
-            page.items(sentences[QUOTED:])
+    page.heading("To quote", 3).items(sentences[:MOST_OPEN_SENTENCES])
+    if sentences[MOST_OPEN_SENTENCES:]:
+        with page.folded(f"{len(sentences) - MOST_OPEN_SENTENCES} more sentences"):
+            page.items(sentences[MOST_OPEN_SENTENCES:])
 
 
 def _pairs(page: Report, pairs: list[VariantPair]) -> None:

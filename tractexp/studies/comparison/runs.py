@@ -89,7 +89,7 @@ class Gathered:
         return variants[0]
 
 
-def on(runs: Sequence[SearchRun], source: str, data: str) -> list[SearchRun]:
+def select_runs_on(runs: Sequence[SearchRun], source: str, data: str) -> list[SearchRun]:
     """The runs on one choice of data. Raises `UserError` where there is none."""
     chosen = [run for run in runs if run.data == data]
     if not chosen:
@@ -98,7 +98,7 @@ def on(runs: Sequence[SearchRun], source: str, data: str) -> list[SearchRun]:
     return chosen
 
 
-def parted(runs: Sequence[SearchRun], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[SearchRun]]:
+def part_runs(runs: Sequence[SearchRun], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[SearchRun]]:
     """Runs by their data and by the limits named in `apart`, which make comparisons of their own, as they come."""
     groups: dict[tuple[str, ...], list[SearchRun]] = defaultdict(list)
     for run in runs:

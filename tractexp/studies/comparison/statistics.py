@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-ALPHA = 0.05
+SIGNIFICANCE_LEVEL = 0.05
 LEAST_SEEDS = 6  # two-sided, Wilcoxon's smallest p is 2 / 2^n: below 0.05 from 6 pairs up
 
 
@@ -71,7 +71,7 @@ class Ranks:
     groups: tuple[tuple[str, ...], ...]  # largest sets whose mean ranks differ by less than the critical difference
 
 
-def friedman(names: Sequence[str], table: np.ndarray, alpha: float = ALPHA) -> Ranks:
+def friedman(names: Sequence[str], table: np.ndarray, alpha: float = SIGNIFICANCE_LEVEL) -> Ranks:
     """Rank k >= 3 variants within each of N seeds; `table` is (N, k). The chi-square is corrected for ties.
 
     Source: Demsar 2006, section 3.2.
@@ -89,7 +89,7 @@ def friedman(names: Sequence[str], table: np.ndarray, alpha: float = ALPHA) -> R
     return Ranks(tuple(names), tuple(map(float, mean)), len(table), chi2, p, difference, groups)
 
 
-def critical_difference(variants: int, seeds: int, alpha: float = ALPHA) -> float:
+def critical_difference(variants: int, seeds: int, alpha: float = SIGNIFICANCE_LEVEL) -> float:
     """Nemenyi's critical difference of mean ranks. Source: Demsar 2006, section 3.2."""
     from scipy import stats
 

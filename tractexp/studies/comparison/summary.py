@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tractexp.studies.comparison.floor import AT_FLOOR, Floor, Polished
+from tractexp.studies.comparison.floor import FLOOR_SHARE, Floor, Polished
 from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.comparison.statistics import expected_running_time
 
@@ -50,7 +50,7 @@ def summarize(variant: Variant, floor: Floor, targets: Sequence[float], polished
     """`targets` are multiples of the floor."""
     done = variant.finished
     spreads = {key: Spread.of([getattr(run, key) for run in done]) for key in ("objective", "epsilon_p", "epsilon_q")}
-    reached = [run.objective <= (1 + AT_FLOOR) * floor.value for run in variant.runs]
+    reached = [run.objective <= (1 + FLOOR_SHARE) * floor.value for run in variant.runs]
     ert = {cost: [running_time(variant, target * floor.value, cost) for target in targets] for cost in COSTS}
     simulations = Spread.of([run.simulations[-1] for run in done])
     failures = len(variant.runs) - len(done)

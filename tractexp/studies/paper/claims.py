@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.identification.result import ACCEPTED
-from tractexp.studies.comparison.statistics import ALPHA, LEAST_SEEDS, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import LEAST_SEEDS, SIGNIFICANCE_LEVEL, holm, vargha_delaney, wilcoxon
 from tractexp.studies.paper import equations, maps, printed, why
 from tractexp.studies.paper.printed import LABELS
 from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
-from tractexp.wording import joined
+from tractexp.wording import join_words
 
 CONFIRMED, REFUTED = "confirmed", "not confirmed"
 IMPOSSIBLE = "cannot be reproduced"
@@ -38,7 +38,7 @@ class Claim:
         return self.verdict.partition(":")[0]
 
 
-def counted(claims: Sequence[Claim]) -> str:
+def count_verdicts(claims: Sequence[Claim]) -> str:
     """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not confirmed"."""
     counts = Counter(claim.word for claim in claims)
     phrases = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
@@ -67,13 +67,13 @@ def percent(value: float) -> str:
     return f"{100 * value:.2f} %"
 
 
-def ranked(study: Study, first: str, second: str, by: str) -> tuple[str, str]:
+def compare_ends(study: Study, first: str, second: str, by: str) -> tuple[str, str]:
     """Whether `first` ends lower than `second`, by every reading of both: the verdict and the numbers behind it."""
     verdicts, phrases = {}, []
     for how, names in readings_of(first, second).items():
         verdicts[how], numbers = better(study, names, (first, second), by)
         phrases.append(f"{how} {numbers}")
-    return together(verdicts), "; ".join(phrases)
+    return merge_verdicts(verdicts), "; ".join(phrases)
 
 
 def readings_of(first: str, second: str) -> dict[str, dict[str, str]]:
@@ -87,12 +87,12 @@ def readings_of(first: str, second: str) -> dict[str, dict[str, str]]:
     return readings
 
 
-def together(verdicts: Mapping[str, str]) -> str:
+def merge_verdicts(verdicts: Mapping[str, str]) -> str:
     """One verdict for all readings, or that it depends on them and which confirm it."""
     different = set(verdicts.values())
     if len(different) == 1 or OPEN in different:
         return OPEN if OPEN in different else different.pop()
-    return f"{DEPENDS}: {CONFIRMED} only {joined([how for how, v in verdicts.items() if v == CONFIRMED])}"
+    return f"{DEPENDS}: {CONFIRMED} only {join_words([how for how, v in verdicts.items() if v == CONFIRMED])}"
 
 
 def better(study: Study, names: Mapping[str, str], pair: tuple[str, str], by: str) -> tuple[str, str]:
@@ -102,7 +102,7 @@ def better(study: Study, names: Mapping[str, str], pair: tuple[str, str], by: st
     p, A = corrected[pair], three[PAIRS.index(pair)].A
     medians = [float(np.median(study.objectives(names[name], by))) for name in pair]
     numbers = f"medians {number(medians[0])} and {number(medians[1])} pu², p = {p:.2g}, A = {A:.2f}"
-    return _sure(study, p < ALPHA and A > 0.5), numbers
+    return _sure(study, p < SIGNIFICANCE_LEVEL and A > 0.5), numbers
 
 
 def table1(study: Study) -> list[Claim]:
@@ -150,7 +150,7 @@ def table2(study: Study) -> list[Claim]:
         Claim("table2", "all identified parameters are within reasonable ranges",
               "C lies outside (0, 1), where its definition puts it", REFUTED),
         Claim("table2", "the errors of P and Q are below 5 %: the model is acceptable",
-              f"epsilon_p and epsilon_q: {'; '.join(phrases)}", together(accepted)),
+              f"epsilon_p and epsilon_q: {'; '.join(phrases)}", merge_verdicts(accepted)),
     ]  # fmt: skip
 
 
@@ -163,7 +163,7 @@ def table3(study: Study) -> list[Claim]:
     claims = []
     for first, second in PAIRS:
         for by in BUDGETS:
-            verdict, measured = ranked(study, first, second, by)
+            verdict, measured = compare_ends(study, first, second, by)
             at = "300 iterations" if by == "iterations" else f"{study.equal:,} simulations each"
             text = f"{LABELS[first]} is more accurate than {LABELS[second]}, after {at}"
             claims.append(Claim("table3", text, measured, verdict))
@@ -203,7 +203,7 @@ def figure9(study: Study) -> list[Claim]:
                 phrases.append(f"{how} {LABELS[first]} {numbers[0]}, {LABELS[second]} {numbers[1]}")
             text = f"{LABELS[first]} converges faster than {LABELS[second]}, by {by}"
             measured = f"expected {by} to {targets} times the floor: {'; '.join(phrases)}"
-            claims.append(Claim("figure9", text, measured, together(verdicts)))
+            claims.append(Claim("figure9", text, measured, merge_verdicts(verdicts)))
     claims.append(_jumps(study))
     return claims
 
@@ -212,14 +212,14 @@ def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[st
     """Whether `first` reaches every target with less, over paired seeds, and the expected running times of both."""
     p, A = [], []
     for target in TARGETS:
-        a, b = (np.where(*_reached(study.spent(name, target, by))) for name in (first, second))
+        a, b = (np.where(*_mark_reached_cost(study.spent(name, target, by))) for name in (first, second))
         p.append(wilcoxon(a, b)[0])
         A.append(vargha_delaney(a, b))
     times = [", ".join(number(study.running_time(name, t, by)) for t in TARGETS) for name in (first, second)]
-    return _sure(study, max(holm(p)) < ALPHA and min(A) > 0.5), times
+    return _sure(study, max(holm(p)) < SIGNIFICANCE_LEVEL and min(A) > 0.5), times
 
 
-def _reached(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
+def _mark_reached_cost(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
     """What `numpy.where` takes: the cost where the target was reached, else without end."""
     return spent[1], spent[0], np.inf
 
@@ -231,14 +231,14 @@ def _jumps(study: Study) -> Claim:
         shares = {name: study.shares(names[name]) for name in printed.COMPARED}
         tests = [why.fisher(shares["issa"], shares[name], "valley") for name in ("ssa", "pso")]
         more = all(shares["issa"].valley > shares[name].valley for name in ("ssa", "pso"))
-        verdicts[how] = _sure(study, more and max(holm(tests)) < ALPHA)
+        verdicts[how] = _sure(study, more and max(holm(tests)) < SIGNIFICANCE_LEVEL)
         phrases.append(f"{how} " + ", ".join(f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
                                           for n, s in shares.items()))  # fmt: skip
     control = study.control_shares
     phrases.append(f"of random points {control.valley} of {control.n} descend there")
     return Claim(
         "figure9", "SSA and PSO are caught in local optima, ISSA jumps out of them",
-        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}", together(verdicts),
+        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}", merge_verdicts(verdicts),
     )  # fmt: skip
 
 
@@ -246,7 +246,7 @@ def _sure(study: Study, holds: bool) -> str:
     return OPEN if study.seeds < LEAST_SEEDS else CONFIRMED if holds else REFUTED
 
 
-def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[[Study], list[Claim]]:
+def claim_generalization(part: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[[Study], list[Claim]]:
 
     def claims(study: Study) -> list[Claim]:
         residuals = study.residuals(kind)
@@ -264,10 +264,10 @@ def generalized(part: str, kind: str, table: dict[str, tuple[float, float]]) -> 
         return [
             Claim(part, f"ISSA's model has good {kind} ability",
                   f"epsilon_p and epsilon_q of the held-out dip, worst of all seeds: {'; '.join(worst)}",
-                  together(good)),
+                  merge_verdicts(good)),
             Claim(part, f"ISSA's model has the best {kind} overall",
                   f"median residuals of P, Q [pu]: {'; '.join(phrases)}. The paper's own table has {LABELS[own[0]]}"
-                  " lowest in P", together(verdicts)),
+                  " lowest in P", merge_verdicts(verdicts)),
         ]  # fmt: skip
 
     return claims
@@ -284,7 +284,7 @@ def figure3(study: Study) -> list[Claim]:
     flock, *_ = study.uniformity.values()
     middle = {name: float(np.median(values)) for name, values in flock.items()}
     tent = {name: value for name, value in middle.items() if name.startswith("tent")}
-    own = f"tent, alpha = {printed.ALPHA:g}"
+    own = f"tent, alpha = {printed.TENT_ALPHA:g}"
     best = min(tent, key=lambda name: tent[name])
     measured = f"median centered discrepancy of {next(iter(study.uniformity))}: "
     far = np.median(flock[own]) / np.median(flock["uniform"])
@@ -319,7 +319,7 @@ def figure4(study: Study) -> list[Claim]:
 def lower(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[bool]:
     """Whether the first values (seeds,) of each pair are lower than the second, corrected for all pairs."""
     corrected = holm([wilcoxon(a, b)[0] for a, b in pairs])
-    return [p < ALPHA and vargha_delaney(a, b) > 0.5 for p, (a, b) in zip(corrected, pairs, strict=True)]
+    return [p < SIGNIFICANCE_LEVEL and vargha_delaney(a, b) > 0.5 for p, (a, b) in zip(corrected, pairs, strict=True)]
 
 
 def readings(study: Study) -> list[Claim]:
@@ -366,8 +366,8 @@ BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {
     "table1": table1,
     "table2": table2,
     "table3": table3,
-    "table4": generalized("table4", "interpolation", printed.INTERPOLATION),
-    "table5": generalized("table5", "extrapolation", printed.EXTRAPOLATION),
+    "table4": claim_generalization("table4", "interpolation", printed.INTERPOLATION),
+    "table5": claim_generalization("table5", "extrapolation", printed.EXTRAPOLATION),
     "figure3": figure3,
     "figure4": figure4,
     "figure9": figure9,

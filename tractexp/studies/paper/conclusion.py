@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from tractexp.studies.paper import equations, why
-from tractexp.studies.paper.claims import CONFIRMED, DEPENDS, PAIRS, Claim, number, ranked
+from tractexp.studies.paper.claims import CONFIRMED, DEPENDS, PAIRS, Claim, compare_ends, number
 from tractexp.studies.paper.printed import COMPARED, LABELS
-from tractexp.studies.paper.study import AT_FLOOR, NARROW, TRADED, WIDE, Study
-from tractexp.wording import joined
+from tractexp.studies.paper.study import FLOOR_FACTOR, NARROW, TRADED, WIDE, Study
+from tractexp.wording import join_words
 
-NEAR = 2.0  # times the lowest objective: a valley that a search might take for the right one
+LARGEST_NEAR_RATIO = 2.0  # times the lowest objective: a valley that a search might take for the right one
 
 
 def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
@@ -22,7 +22,7 @@ def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     if "equations" in parts or "table3" in parts:
         paragraphs.append(_values())
     if "table3" in parts:
-        paragraphs.append(_ranking(study))
+        paragraphs.append(_describe_ranking(study))
     if "figure9" in parts:
         paragraphs.append(f"{_lack(study)} {_random(study)}")
     if "readings" in parts:
@@ -35,7 +35,7 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
     verdicts = {dip: parts[part][k].verdict for part, (dip, k) in where.items() if part in parts}
     good = [dip for dip, verdict in verdicts.items() if verdict == CONFIRMED]
-    said = [f"describes {joined(good)} dip with errors below 5 %, with every seed and reading tried"] * bool(good)
+    said = [f"describes {join_words(good)} dip with errors below 5 %, with every seed and reading tried"] * bool(good)
     said += [f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
              for dip, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
     return f"The load model that ISSA identifies {'; '.join(said)}."
@@ -50,7 +50,7 @@ def _values() -> str:
     )
 
 
-def _ranking(study: Study) -> str:
+def _describe_ranking(study: Study) -> str:
     parts = []
     for by, budget in (
         ("iterations", "After 300 iterations"),
@@ -59,9 +59,9 @@ def _ranking(study: Study) -> str:
         order = sorted(COMPARED, key=lambda name: np.median(study.objectives(name, by)))
         medians = ", ".join(f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order)
         apart = [f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)]
-        rest = f" (no significant difference {joined(apart)})" if apart else " (all differences significant)"
+        rest = f" (no significant difference {join_words(apart)})" if apart else " (all differences significant)"
         parts.append(f"{budget} the median objectives are {medians} pu²{rest}")
-    verdict, _ = ranked(study, "issa", "ssa", "iterations")
+    verdict, _ = compare_ends(study, "issa", "ssa", "iterations")
     reading = f" Whether ISSA ends lower than SSA {verdict}." if verdict.startswith(DEPENDS) else ""
     return "; ".join(parts) + "." + reading
 
@@ -101,11 +101,11 @@ def reasons(study: Study) -> list[str]:
     paragraphs = [
         f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)} {_random(study)}"
     ]
-    paragraphs += [_lacking(lack) for lack in why.lacks(study)]
+    paragraphs += [_describe_lack(lack) for lack in why.lacks(study)]
     rival, limited, control = study.shares(why.RIVAL), study.shares("pso_limited"), study.control_shares
     p = why.fisher(rival, control, "valley")
     word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
-    word = word if p < why.ALPHA else f"not significantly {word}"
+    word = word if p < why.SIGNIFICANCE_LEVEL else f"not significantly {word}"
     paragraphs.append(
         f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its velocity limited to 0.2 in"
         f" {limited.valley} of {limited.n} searches."
@@ -113,13 +113,13 @@ def reasons(study: Study) -> list[str]:
     return paragraphs
 
 
-def _lacking(lack: why.Lack) -> str:
+def _describe_lack(lack: why.Lack) -> str:
     farther = "" if lack.convergence.lacks else "not "
     others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
     lost = [name for name, test in others.items() if test.lacks]
-    often, than = ("", joined(lost)) if lost else ("not ", joined(list(others), "or"))
+    often, than = ("", join_words(lost)) if lost else ("not ", join_words(list(others), "or"))
     ended = "not significantly different from"
-    if lack.polished.p < why.ALPHA:
+    if lack.polished.p < why.SIGNIFICANCE_LEVEL:
         ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
     return (
         f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO, and is"
@@ -146,7 +146,7 @@ def valley(study: Study) -> list[str]:
     column = names.index(TRADED)
     low, high = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
     at_bound = other[column] - low < 0.01 * (high - low)
-    ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < AT_FLOOR - 1)) for n in COMPARED}
+    ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < FLOOR_FACTOR - 1)) for n in COMPARED}
     where = f"on the lower bound of {TRADED}, {low:g}" if at_bound else f"at {TRADED} = {other[column]:.3g}"
     each = ", ".join(f"{LABELS[n]} {k}" for n, k in ended.items())
     paragraphs = [
@@ -154,7 +154,7 @@ def valley(study: Study) -> list[str]:
         f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} = {right[column]:.3g};"
         f" {count} of {len(study.control.objective)} random points of the bounds descend there."
     ]
-    if at_bound and second < NEAR * lowest and right[column] > other[column]:
+    if at_bound and second < LARGEST_NEAR_RATIO * lowest and right[column] > other[column]:
         paragraphs += _attraction(study, lowest, right, other)
     return [*paragraphs, _bounds(study, (low, high), lowest)]
 
@@ -176,13 +176,13 @@ def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarra
         f"Between the two lies a ridge: at {TRADED} = {grid[ridge]:.2f} the best fit has"
         f" {path.objective[ridge] / lowest:.1f} times the lowest objective.{remark}"
     ]
-    along = np.flatnonzero((grid < grid[ridge]) & (path.objective < NEAR * lowest))
+    along = np.flatnonzero((grid < grid[ridge]) & (path.objective < LARGEST_NEAR_RATIO * lowest))
     if len(along) > 1 and (np.diff(path.objective[along]) > 0).all():
-        paragraphs.append(_traded(study, along, int(np.abs(grid - other[column]).argmin()), lowest))
+        paragraphs.append(_describe_trade(study, along, int(np.abs(grid - other[column]).argmin()), lowest))
     return paragraphs
 
 
-def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
+def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
     """What trades along the valley, which `along` are points of the path; its bottom within the bounds is `here`."""
     grid, path = study.path
     names = study.problem.space.names
@@ -190,8 +190,8 @@ def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
     far, near = along[[0, -1]]
     places = [near, here, far]
     sentence += (
-        f", {joined([f'{path.objective[k] / lowest:.2f}' for k in places])} times the lowest at"
-        f" {joined([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever the bound, it attracts."
+        f", {join_words([f'{path.objective[k] / lowest:.2f}' for k in places])} times the lowest at"
+        f" {join_words([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever the bound, it attracts."
     )
     if "X_prime" in names:
         ratio = path.values[along, names.index("X_prime")] / path.values[along, names.index(TRADED)]
@@ -203,13 +203,13 @@ def _traded(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
         q_v = path.values[:, names.index("q_v")]
         sentence += (
             " As the U²/X' of its reactive power grows, the static load takes it off again, with its exponent"
-            f" approaching that of the motor's term, 2: q_v is {joined([f'{q_v[k]:.2f}' for k in places])} there."
+            f" approaching that of the motor's term, 2: q_v is {join_words([f'{q_v[k]:.2f}' for k in places])} there."
         )
     return sentence
 
 
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
-    shares = {bounds: np.mean(ends.objective <= AT_FLOOR * lowest) for bounds, ends in study.rebounded.items()}
+    shares = {bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest) for bounds, ends in study.rebounded.items()}
     listed = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]
     return (

@@ -14,7 +14,7 @@ from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.paper import conclusion, figures, maps, why
 from tractexp.studies.paper.claims import middle, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, label
-from tractexp.studies.paper.study import AT_FLOOR, BUDGETS, LEVEL, RANDOM, TARGETS, TRADED, Study
+from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, RANDOM, TARGETS, TRADED, Study
 from tractexp.wording import as_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
@@ -111,7 +111,7 @@ def _reasons(sheet: Report, study: Study) -> None:
         ["300 iterations", "in the valley of the lowest objective", "at the floor", "at the bottom of its own valley",
          "objective over that of the bottom"], rows,
         f"In a valley is a search from whose end least squares reach its bottom; at a bottom or at the floor means"
-        f" within {AT_FLOOR:g} times of it. The control: {RANDOM} random points of the bounds, and the best of"
+        f" within {FLOOR_FACTOR:g} times of it. The control: {RANDOM} random points of the bounds, and the best of"
         f" {study.equal:,} of them.",
     )  # fmt: skip
     sheet.table(
@@ -154,7 +154,7 @@ def _valleys(sheet: Report, study: Study) -> None:
     )
     rows = []
     for (low, high), ends in study.rebounded.items():
-        right = ends.objective <= AT_FLOOR * study.floor
+        right = ends.objective <= FLOOR_FACTOR * study.floor
         second = ends.grouped()[1:2]
         at = f"{number(second[0][0])} at {TRADED} = {number(float(second[0][2][index[TRADED]]))}" if second else "-"
         rows.append([f"{low:g} .. {high:g}", f"{np.mean(right):.0%}", at, str(second[0][1]) if second else "0"])

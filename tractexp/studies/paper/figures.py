@@ -7,15 +7,15 @@ import numpy as np
 from tractexp.blocks.chart import Chart
 from tractexp.blocks.style import ACTIVE, FAINT, PALETTE, REACTIVE, VOLTAGE
 
-ITERATIONS = 150  # shown of an orbit
-POINTS = 400  # of a survival curve
+ORBIT_ITERATIONS = 150  # shown of an orbit
+SURVIVAL_POINTS = 400  # of a survival curve
 
 
 def orbits(values: Mapping[str, np.ndarray]) -> Chart:
     """Figure 3: orbits {label: (n,)} in [0, 1], one below the other."""
     chart = Chart("iteration", [f"z, {label}" for label in values], legend=False, pixels=90 + 130 * len(values))
     for k, (label, orbit) in enumerate(values.items()):
-        shown = orbit[:ITERATIONS]
+        shown = orbit[:ORBIT_ITERATIONS]
         chart.line(label, np.arange(len(shown)), shown, PALETTE[k], k, width=0.8).limits(k, -0.03, 1.03)
     return chart
 
@@ -48,7 +48,7 @@ def tails(drawn: Mapping[str, np.ndarray]) -> Chart:
     for k, (formula, steps) in enumerate(drawn.items()):
         size = np.sort(np.abs(steps))
         share = 1 - np.arange(len(size)) / len(size)
-        points = np.unique(len(size) - np.geomspace(1, len(size), POINTS).astype(int))
+        points = np.unique(len(size) - np.geomspace(1, len(size), SURVIVAL_POINTS).astype(int))
         chart.line(names[formula], size[points], share[points], PALETTE[k])
     return chart.limits(None, 0.1, 1e6).limits(0, 1e-5, 1.2)
 

@@ -12,9 +12,9 @@ import numpy as np
 from tractexp.identification.optimizer import Box
 from tractexp.plugin import build
 
-DRAWS = 200  # flocks of each kind whose discrepancy is taken
-STEPS = 200_000  # Lévy steps whose tail is measured
-TAIL = 0.005  # share of the steps that count as the tail
+FLOCK_DRAWS = 200  # flocks of each kind whose discrepancy is taken
+LEVY_STEPS = 200_000  # Lévy steps whose tail is measured
+LEVY_TAIL_SHARE = 0.005  # share of the steps that count as the tail
 
 
 def issa(**settings: Any) -> Any:
@@ -54,7 +54,7 @@ def flocks(n: int, d: int, alphas: tuple[float, ...]) -> dict[str, Callable[[np.
 
 
 def discrepancies(
-    n: int, d: int, alphas: tuple[float, ...], draws: int = DRAWS, seed: int = 0
+    n: int, d: int, alphas: tuple[float, ...], draws: int = FLOCK_DRAWS, seed: int = 0
 ) -> Mapping[str, np.ndarray]:
     """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source: Hickernell 1998."""
     from scipy.stats import qmc
@@ -73,10 +73,10 @@ def flights(formula: str, n: int, d: int, seed: int = 0) -> np.ndarray:
 
 def tails() -> dict[str, np.ndarray]:
     """Steps of Eq. (15), {formula: (STEPS,)}."""
-    return {formula: flights(formula, STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
+    return {formula: flights(formula, LEVY_STEPS, 1)[:, 0] for formula in ("mantegna", "printed")}
 
 
-def tail_exponent(steps: np.ndarray, share: float = TAIL) -> float:
+def tail_exponent(steps: np.ndarray, share: float = LEVY_TAIL_SHARE) -> float:
     """a in P(|s| > x) ~ x^-a, from the largest `share` of the steps (n,). Source: Hill 1975."""
     size = np.sort(np.abs(steps.ravel()))
     k = max(2, round(share * len(size)))

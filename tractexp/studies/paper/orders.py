@@ -18,8 +18,8 @@ from tractexp.model.operations import Cost, Operations, count
 from tractexp.plugin import build
 from tractexp.record import Event
 
-CANDIDATES = 256  # simulated together when the time is taken: some milliseconds, less than a turn of a busy core
-REPEATS = 60  # of which the fastest counts
+TIMED_CANDIDATES = 256  # simulated together when the time is taken: some milliseconds, less than a turn of a busy core
+TIMED_REPEATS = 60  # of which the fastest counts
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +89,10 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
 def duration(problem: Problem) -> float:
     """Nanoseconds per sample of one candidate's simulation, objective included: the fastest of some repeats."""
     rng = np.random.default_rng(0)
-    values = problem.space.from_unit(rng.random((CANDIDATES, problem.space.dimension)))
+    values = problem.space.from_unit(rng.random((TIMED_CANDIDATES, problem.space.dimension)))
     spent = []
-    for _ in range(REPEATS):
+    for _ in range(TIMED_REPEATS):
         started = time.perf_counter()
         problem.objective(values)
         spent.append(time.perf_counter() - started)
-    return 1e9 * min(spent) / CANDIDATES / problem.drive.samples
+    return 1e9 * min(spent) / TIMED_CANDIDATES / problem.drive.samples

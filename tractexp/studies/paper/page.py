@@ -6,11 +6,11 @@ import numpy as np
 
 from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
-from tractexp.studies.paper.claims import BOTH, Claim, counted, middle
+from tractexp.studies.paper.claims import BOTH, Claim, count_verdicts, middle
 from tractexp.studies.paper.figure_sections import figure3, figure4, figure6, figure8, figure9, held_out
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study
-from tractexp.studies.paper.table_sections import TO_THE_LETTER, generalized, table1, table2, table3
+from tractexp.studies.paper.table_sections import TO_THE_LETTER, add_generalization_table, table1, table2, table3
 
 TITLE = "The paper, table by table"
 
@@ -33,7 +33,7 @@ def report(study: Study, parts: Sequence[str], claims: Sequence[Claim]) -> Repor
 def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     """What the reader must know first, and the verdicts."""
     sheet.verdict(
-        f"Of {counted(claims)}." if claims else "The parts chosen hold no claim.",
+        f"Of {count_verdicts(claims)}." if claims else "The parts chosen hold no claim.",
         *conclusion.sentences(study, claims),
     )
     events = (*study.train, *study.held_out)
@@ -127,8 +127,8 @@ SECTIONS: dict[str, Callable[[Report, Study], None]] = {
     "table1": table1,
     "table2": table2,
     "table3": table3,
-    "table4": generalized("4", "interpolation", printed.INTERPOLATION),
-    "table5": generalized("5", "extrapolation", printed.EXTRAPOLATION),
+    "table4": add_generalization_table("4", "interpolation", printed.INTERPOLATION),
+    "table5": add_generalization_table("5", "extrapolation", printed.EXTRAPOLATION),
     "figure3": figure3,
     "figure4": figure4,
     "figure6": figure6,

@@ -34,7 +34,7 @@ COMPARED = ("issa", "ssa", "pso")
 LABELS = {"issa": "ISSA", "ssa": "SSA", "pso": "PSO", "random_search": "the best of random points"}
 ITERATIONS, POPULATION = 300, 50  # sections 4.2 and 4.3; the optimizers' defaults
 EQUAL = POPULATION * (ITERATIONS + 1)  # simulations of the thriftiest of the three, PSO, in so many iterations
-ALPHA = 0.3  # of Eq. (14), section 3.2.1
+TENT_ALPHA = 0.3  # of Eq. (14), section 3.2.1
 INGREDIENTS = {  # as the optimizers without it are called: the switch, and what it is
     "tent_init": ("tent_initialization", "tent initialization"),
     "levy": ("levy", "Lévy flight"),

@@ -28,7 +28,7 @@ class SearchStore:
     """
 
     def __init__(self, problem: Problem, limits: Limits, on: bool = True):
-        stored = on and limits.seconds is None and all(map(store.installed, (*_parts(problem), problem.loss)))
+        stored = on and limits.seconds is None and all(map(store.is_installed, (*_parts(problem), problem.loss)))
         self.problem = _key(problem, limits) if stored else ""
 
     def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
@@ -52,7 +52,7 @@ class SearchStore:
 
     def _key(self, settings: Mapping[str, Any], seed: int) -> str:
         optimizer = build("optimizer", dict(settings))
-        return store.key(self.problem, repr(optimizer), seed) if self.problem and store.installed(optimizer) else ""
+        return store.key(self.problem, repr(optimizer), seed) if self.problem and store.is_installed(optimizer) else ""
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:

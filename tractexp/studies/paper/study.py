@@ -21,7 +21,7 @@ from tractexp.studies.paper.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
-AT_FLOOR = 1.1  # a search within so many times the floor has found it; one so near the bottom of its valley is done
+FLOOR_FACTOR = 1.1  # a search within so many times the floor has found it; one so near the bottom of its valley is done
 RANDOM = 200  # points from which the control descends
 TRADED = "C"  # the parameter along which the valleys lie
 WIDE, NARROW = (0.06, 0.99), (0.75, 0.99)  # other bounds of it; below the first X' meets its own bound
@@ -181,14 +181,14 @@ class Study:
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
         starts = np.array([search.values for name in names for search in self.searched(name)])
-        ends = self._descents(self.problem, starts, lambda: valleys.descended(self.problem, starts, self.floor))
+        ends = self._descents(self.problem, starts, lambda: valleys.run_descents(self.problem, starts, self.floor))
         parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
         return {name: valleys.Ends(ends.objective[part], ends.values[part]) for name, part in parts.items()}
 
     def random_ends(self, problem: Problem) -> valleys.Ends:
         """The control: where least squares lead from random points of the bounds."""
-        points = valleys.scattered(problem, RANDOM, self.seed)
-        return self._descents(problem, points, lambda: valleys.descended(problem, points, self.floor))
+        points = valleys.draw_uniform_points(problem, RANDOM, self.seed)
+        return self._descents(problem, points, lambda: valleys.run_descents(problem, points, self.floor))
 
     def _descents(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
         """Where descents from these starts (n, free) end, read back where the same code made them before."""
@@ -210,12 +210,12 @@ class Study:
 
     def shares(self, name: str) -> Shares:
         at, bottom = self.objectives(name), self.ends[name].objective
-        counts = (bottom <= AT_FLOOR * self.floor, at <= AT_FLOOR * self.floor, at <= AT_FLOOR * bottom)
+        counts = (bottom <= FLOOR_FACTOR * self.floor, at <= FLOOR_FACTOR * self.floor, at <= FLOOR_FACTOR * bottom)
         return Shares(self.seeds, *(int(np.count_nonzero(count)) for count in counts))
 
     @property
     def control_shares(self) -> Shares:
-        there = int(np.count_nonzero(self.control.objective <= AT_FLOOR * self.floor))
+        there = int(np.count_nonzero(self.control.objective <= FLOOR_FACTOR * self.floor))
         return Shares(RANDOM, there, 0, 0)
 
     @property

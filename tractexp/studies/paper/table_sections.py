@@ -9,7 +9,7 @@ from tractexp.blocks import Report
 from tractexp.studies.paper import printed
 from tractexp.studies.paper.claims import PAIRS, middle, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, TEN, label
-from tractexp.studies.paper.study import AT_FLOOR, BUDGETS, LEVEL, Study
+from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, Study
 
 TO_THE_LETTER = (
     "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD = 20, one step per"
@@ -113,7 +113,7 @@ def table3(sheet: Report, study: Study) -> None:
          f"objective after {study.equal:,} simulations", "s per search"],
         [_spent(study, name) for name in (*LEVEL, *LITERAL.values())],
         f"Median (best .. worst) of {study.seeds} seeds. The floor is {number(study.floor)} pu²; at the floor means"
-        f" within {AT_FLOOR:g} times. ISSA simulates its flock about twice in an iteration: by iterations it has twice"
+        f" within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in an iteration: by iterations it has twice"
         f" the means. Searches of {study.equal:,} simulations are laid out for them, so that every schedule runs"
         " whole.",
     )  # fmt: skip
@@ -132,13 +132,13 @@ def _spent(study: Study, name: str) -> list[str]:
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
         label(name), middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
-        "-" if literal else f"{np.mean(ends <= AT_FLOOR * study.floor):.0%}",
+        "-" if literal else f"{np.mean(ends <= FLOOR_FACTOR * study.floor):.0%}",
         "-" if literal else middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
     ]  # fmt: skip
 
 
-def generalized(number_: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[..., None]:
+def add_generalization_table(number_: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[..., None]:
     def section(sheet: Report, study: Study) -> None:
         residuals = study.residuals(kind)
         names = ", ".join((*study.train, *study.held_out)[e].record.name for e in study.held(kind))

@@ -8,9 +8,9 @@ from tractexp.identification.search import REFUSED
 from tractexp.inference.least_squares import descend
 from tractexp.inference.problem import Problem
 
-SAME = 1.02  # descents that end within so many times of each other are in one valley
+SAME_VALLEY_RATIO = 1.02  # descents that end within so many times of each other are in one valley
 GAIN = 1e-6  # of the lowest objective: a descent's step that gains less ends it
-STEPS = 200  # of a descent, at most
+MOST_DESCENT_STEPS = 200  # of a descent, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +25,13 @@ class Ends:
         rest, groups = np.argsort(self.objective), []
         while len(rest):
             lowest = rest[0]
-            same = self.objective[rest] <= SAME * self.objective[lowest]
+            same = self.objective[rest] <= SAME_VALLEY_RATIO * self.objective[lowest]
             groups.append((float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest]))
             rest = rest[~same]
         return groups
 
 
-def descended(problem: Problem, values: np.ndarray, floor: float, held: str = "") -> Ends:
+def run_descents(problem: Problem, values: np.ndarray, floor: float, held: str = "") -> Ends:
     """Least squares from each of the values (n, free), all at once, with one parameter `held` where it is."""
     space, scale = problem.space, 1 / np.sqrt(GAIN * floor)
 
@@ -40,11 +40,11 @@ def descended(problem: Problem, values: np.ndarray, floor: float, held: str = ""
 
     unit = np.array([space.to_unit(v) for v in values])
     frozen = np.tile([name == held for name in space.names], (len(unit), 1))
-    ends = descend(rows, unit, frozen, iterations=STEPS, tolerance=1.0)
+    ends = descend(rows, unit, frozen, iterations=MOST_DESCENT_STEPS, tolerance=1.0)
     return Ends(ends.deviance / scale**2, space.from_unit(ends.unit))
 
 
-def scattered(problem: Problem, n: int, seed: int) -> np.ndarray:
+def draw_uniform_points(problem: Problem, n: int, seed: int) -> np.ndarray:
     """n points (n, free), uniform among those of the bounds that have a steady state."""
     rng, points = np.random.default_rng(seed), np.empty((0, problem.space.dimension))
     while len(points) < n:
@@ -70,7 +70,7 @@ def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, flo
             at = start
             for k in way:
                 moved = np.where(np.arange(len(at)) == column, grid[k], at)
-                fit = descended(problem, moved[None], floor, held=name)
+                fit = run_descents(problem, moved[None], floor, held=name)
                 if not np.isfinite(fit.objective[0]):
                     break
                 at = fit.values[0]

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.studies.comparison.statistics import ALPHA, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, holm, vargha_delaney, wilcoxon
 from tractexp.studies.paper.study import OptimizerPair, Shares, Study
 
 SPARROWS, RIVAL = ("issa", "ssa"), "pso"
@@ -19,7 +19,7 @@ def fisher(a: Shares, b: Shares, of: str) -> float:
 
 def significant(pairs: Sequence[OptimizerPair], k: int) -> bool:
     """Whether the first of pair k ends lower, corrected for all pairs."""
-    return bool(holm([pair.p for pair in pairs])[k] < ALPHA and pairs[k].A > 0.5)
+    return bool(holm([pair.p for pair in pairs])[k] < SIGNIFICANCE_LEVEL and pairs[k].A > 0.5)
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Test:
 
     @property
     def lacks(self) -> bool:
-        return self.less and self.p < ALPHA
+        return self.less and self.p < SIGNIFICANCE_LEVEL
 
 
 @dataclass(frozen=True)
