@@ -1,6 +1,8 @@
-"""What pyproject.toml cannot say: sdist and wheel of the same files are the same to the byte, wherever they are built.
+"""What pyproject.toml cannot say: sdist and wheel of the same files are the same to the byte,
+wherever they are built.
 
-No time, owner or mode of the building machine goes in; SOURCE_DATE_EPOCH, where it is set, is the time of all files.
+No time, owner or mode of the building machine goes in; SOURCE_DATE_EPOCH, where it is set, is the
+time of all files.
 """
 
 import gzip
@@ -12,7 +14,8 @@ from setuptools import setup
 from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.sdist import sdist
 
-EPOCH = int(os.environ.setdefault("SOURCE_DATE_EPOCH", "1577836800"))  # 2020; zip files know no time before 1980
+# 2020; zip files know no time before 1980
+EPOCH = int(os.environ.setdefault("SOURCE_DATE_EPOCH", "1577836800"))
 
 
 def anonymous(member: tarfile.TarInfo) -> tarfile.TarInfo:

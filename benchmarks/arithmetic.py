@@ -1,8 +1,10 @@
-"""How fast a kernel could be: its operations, counted in the machine code, at the rate this processor is seen to do.
+"""How fast a kernel could be: its operations, counted in the machine code, at the rate this
+processor is seen to do.
 
-Counted are the packed floating-point instructions of the loop over groups of candidates: what is run once a sample
-(power, its squared errors) and what is run once a step. A fused multiply-add is one operation; what a load, a store, a
-move or an integer shift costs is not counted, so the limit is one that no code with these operations can pass.
+Counted are the packed floating-point instructions of the loop over groups of candidates: what is
+run once a sample (power, its squared errors) and what is run once a step. A fused multiply-add is
+one operation; what a load, a store, a move or an integer shift costs is not counted, so the limit
+is one that no code with these operations can pass.
 """
 
 import ctypes
@@ -22,7 +24,8 @@ from tractexp.kernel.numbers import Numbers
 PACKED = re.compile(r"v(fn?m|mul|div|sqrt|add|sub|max|min|rndscale|round)\w*pd\b|vcvt")
 MULTIPLIES = re.compile(r"vfn?m|vmul")
 DIVIDES = re.compile(r"vdiv|vsqrt")
-CHAINS, DEPTH, TIMES = 12, 20, 400  # of the loop that shows the rate: enough to hide that an operation takes 4 cycles
+# of the loop that shows the rate: enough to hide that an operation takes 4 cycles
+CHAINS, DEPTH, TIMES = 12, 20, 400
 
 
 @dataclass(frozen=True)
@@ -57,15 +60,20 @@ def limit(text: str, substeps: int, rounds: int) -> Limit:
     """Of a kernel by its IR."""
     width = Room.of(text).width
     sample, step = counts(objects.assembly(text), Room.of(text).outputs)
-    mix = (step.multiplications * substeps + sample.multiplications, step.others * substeps + sample.others)
+    mix = (
+        step.multiplications * substeps + sample.multiplications,
+        step.others * substeps + sample.others,
+    )
     measured = rate(Count(*mix), width)
     return Limit(sample, step, substeps, width, max(measured() for _ in range(rounds)))
 
 
 def counts(assembly: str, outputs: int) -> tuple[Count, Count]:
-    """Operations once a sample and once a step, of a kernel without memories. Raises `ValueError` for other code.
+    """Operations once a sample and once a step, of a kernel without memories. Raises `ValueError`
+    for other code.
 
-    A step is the run of instructions with most operations; outputs and sums are stored by one of their own.
+    A step is the run of instructions with most operations; outputs and sums are stored by one of
+    their own.
     """
     blocks = [_operations(body) for body in _blocks(assembly)]
     samples = [operations for stores, operations in blocks if stores == 2 * outputs]
@@ -74,7 +82,10 @@ def counts(assembly: str, outputs: int) -> tuple[Count, Count]:
     if not sample or not step:
         raise ValueError("the loop over candidates is not that of a kernel on x86 with AVX")
     if sample["divides"] or step["divides"]:
-        raise ValueError("a division takes many times as long as other operations; its kernel has no limit stated here")
+        raise ValueError(
+            "a division takes many times as long as other operations; its kernel has no limit"
+            " stated here"
+        )
     return tuple(Count(o["multiplies"], o["other"]) for o in (sample, step))
 
 
@@ -96,13 +107,21 @@ def _operations(body: list[str]) -> tuple[int, Counter]:
     operations = Counter()
     for line in packed:
         if PACKED.match(line) and re.search(r"%[yz]mm", line):
-            kind = "divides" if DIVIDES.match(line) else "multiplies" if MULTIPLIES.match(line) else "other"
+            kind = (
+                "divides"
+                if DIVIDES.match(line)
+                else "multiplies"
+                if MULTIPLIES.match(line)
+                else "other"
+            )
             operations[kind] += 1
     return stores, operations
 
 
 def rate(mix: Count, width: int) -> Callable[[], float]:
-    """A call that does such a mix of operations in registers only, and returns vector operations per nanosecond."""
+    """A call that does such a mix of operations in registers only, and returns vector operations
+    per nanosecond.
+    """
     fused = round(CHAINS * mix.multiplications / mix.all)
     f = Function()
     n = Numbers(f, width)
@@ -110,10 +129,15 @@ def rate(mix: Count, width: int) -> Callable[[], float]:
     with f.loop(0, TIMES):
         values = [n.load(f.at("%work", c * width)) for c in range(CHAINS)]
         for _ in range(DEPTH):
-            values = [n.fused(a, x, x, "contract") if c < fused else n.add(a, x, "") for c, a in enumerate(values)]
+            values = [
+                n.fused(a, x, x, "contract") if c < fused else n.add(a, x, "")
+                for c, a in enumerate(values)
+            ]
         for c, a in enumerate(values):
             n.store(a, f.at("%work", c * width))
-    loaded = objects.load("\n".join([*f.intrinsics.values(), f.text("define void @run(ptr %work)")]))
+    loaded = objects.load(
+        "\n".join([*f.intrinsics.values(), f.text("define void @run(ptr %work)")])
+    )
     call = ctypes.CFUNCTYPE(None, ctypes.c_void_p)(loaded.address)
     work = np.full(CHAINS * width + 8, 0.5)
     address = -(-work.ctypes.data // 64) * 64

@@ -1,12 +1,14 @@
-"""Where an optimizer is drawn to: its error with the optimum at the center of the box and with it shifted.
+"""Where an optimizer is drawn to: its error with the optimum at the center of the box and with it
+shifted.
 
     python benchmarks/bias_audit.py [--json] [--evaluations 10000] [--repeats 7]
 
-Three functions in ten dimensions on the box [-5, 5], searched in its own units ("raw") and rescaled to the unit
-cube ("unit"); the shift is a tenth of the box's width in each coordinate, with fixed signs, so that each function
-stays what it is around its optimum. An optimizer without a bias has the same error in both columns; one drawn to
-zero is far better at the center of the raw box, where the optimum of a textbook function lies, than beside it.
-Kudela 2023 (arXiv 2301.01984) calls a ratio beyond ten a bias. The median of the repeats is given.
+Three functions in ten dimensions on the box [-5, 5], searched in its own units ("raw") and rescaled
+to the unit cube ("unit"); the shift is a tenth of the box's width in each coordinate, with fixed
+signs, so that each function stays what it is around its optimum. An optimizer without a bias has
+the same error in both columns; one drawn to zero is far better at the center of the raw box, where
+the optimum of a textbook function lies, than beside it. Kudela 2023 (arXiv 2301.01984) calls a
+ratio beyond ten a bias. The median of the repeats is given.
 """
 
 import argparse
@@ -19,7 +21,8 @@ from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover
 
 DIMENSION, HALF_WIDTH, SHIFT = 10, 5.0, 1.0
-SIGNS = np.array([1, -1, -1, 1, 1, 1, -1, 1, -1, -1])  # of the shift: no diagonal of the box is favored
+# of the shift: no diagonal of the box is favored
+SIGNS = np.array([1, -1, -1, 1, 1, 1, -1, 1, -1, -1])
 SLOW = ("cobyqa",)  # a millisecond per evaluation: half an hour for its two rows
 LITERAL = {"space": "raw", "step": "scalar"}  # as printed, better-only
 
@@ -64,7 +67,9 @@ def error(settings: dict, function: str, shift: float, evaluations: int, repeats
     """The median error of an optimizer on one function."""
     optimizer = build("optimizer", settings)
     problem, limits = Shifted(function, shift), Limits(simulations=evaluations)
-    return float(np.median([search(problem, optimizer, seed, limits).objective for seed in range(repeats)]))
+    return float(
+        np.median([search(problem, optimizer, seed, limits).objective for seed in range(repeats)])
+    )
 
 
 def cases() -> Iterator[tuple[str, dict]]:
@@ -92,18 +97,27 @@ def audit(evaluations: int, repeats: int) -> dict[str, dict[str, dict[str, float
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", action="store_true", help="print JSON instead of the Markdown table")
+    parser.add_argument(
+        "--json", action="store_true", help="print JSON instead of the Markdown table"
+    )
     parser.add_argument("--evaluations", type=int, default=10_000)
     parser.add_argument("--repeats", type=int, default=7)
     given = parser.parse_args()
     rows = audit(given.evaluations, given.repeats)
     if given.json:
-        print(json.dumps({"evaluations": given.evaluations, "repeats": given.repeats, "errors": rows}, indent=2))
+        print(
+            json.dumps(
+                {"evaluations": given.evaluations, "repeats": given.repeats, "errors": rows},
+                indent=2,
+            )
+        )
         return
     print("| optimizer | " + " | ".join(f"{f} centered | shifted" for f in FUNCTIONS) + " |")
     print("|---|" + "---|" * (2 * len(FUNCTIONS)))
     for title, errors in rows.items():
-        cells = [f"{value:.0e}" if value else "0" for pair in errors.values() for value in pair.values()]
+        cells = [
+            f"{value:.0e}" if value else "0" for pair in errors.values() for value in pair.values()
+        ]
         print(f"| {title} | " + " | ".join(cells) + " |")
 
 

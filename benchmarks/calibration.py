@@ -1,13 +1,16 @@
-"""Are intervals as wide as they should be? python benchmarks/calibration.py [--phasors 440] [--waves 60]
+"""Are intervals as wide as they should be? python benchmarks/calibration.py [--phasors 440]
+[--waves 60]
 
-Simulation-based calibration (Talts et al. 2018): a truth is drawn from the prior of a generator that is not ours, with
-its own equations, frame and solver; the product identifies what that load draws, and the truth gets its rank in what
-the product reports of a parameter. Ranks of true intervals are uniform: they crowd at both ends where intervals are too
-narrow, in the middle where they are too wide, at one end where estimates are biased. The rank is that of the normal
-distribution whose 95 % are the reported interval, each side of the estimate by itself. `phasors` are sets of
-`hidden_effects` with nothing missing, two dips under 13 kinds of noise in turn; `waves` are those of `wave_records`.
-Rows are appended to calibration.jsonl, so that a study goes on where it stopped; `--tables` prints what is stored. A
-row may say which `commit` made it. The seeds are no other study's.
+Simulation-based calibration (Talts et al. 2018): a truth is drawn from the prior of a generator
+that is not ours, with its own equations, frame and solver; the product identifies what that load
+draws, and the truth gets its rank in what the product reports of a parameter. Ranks of true
+intervals are uniform: they crowd at both ends where intervals are too narrow, in the middle where
+they are too wide, at one end where estimates are biased. The rank is that of the normal
+distribution whose 95 % are the reported interval, each side of the estimate by itself. `phasors`
+are sets of `hidden_effects` with nothing missing, two dips under 13 kinds of noise in turn; `waves`
+are those of `wave_records`. Rows are appended to calibration.jsonl, so that a study goes on where
+it stopped; `--tables` prints what is stored. A row may say which `commit` made it. The seeds are no
+other study's.
 """
 
 import argparse
@@ -34,7 +37,8 @@ STORED = Path(__file__).with_suffix(".jsonl")
 SERIES = 48  # of the seeds of waves: `waves.SERIES` are others
 BINS = 10  # of the ranks
 LEVEL = 0.01  # of the test that ranks are uniform
-HALF = 1.959964  # standard deviations from the middle of a normal distribution to the end of its 95 %
+# standard deviations from the middle of a normal distribution to the end of its 95 %
+HALF = 1.959964
 
 
 def rank(truth: float, value: float, interval: Sequence[float]) -> float:
@@ -48,10 +52,18 @@ def rank(truth: float, value: float, interval: Sequence[float]) -> float:
 
 
 def ranked(fit: Any, truth: Mapping[str, float]) -> dict[str, Any]:
-    """What a row holds of an identification: the rank of each true value, and whether its interval holds it."""
+    """What a row holds of an identification: the rank of each true value, and whether its interval
+    holds it.
+    """
     result = fit.result
-    inside = {name: bool(low <= truth[name] <= high) for name, (low, high) in result.intervals.items() if name in truth}
-    ranks = {name: rank(truth[name], result.parameters[name], result.intervals[name]) for name in inside}
+    inside = {
+        name: bool(low <= truth[name] <= high)
+        for name, (low, high) in result.intervals.items()
+        if name in truth
+    }
+    ranks = {
+        name: rank(truth[name], result.parameters[name], result.intervals[name]) for name in inside
+    }
     identified = [name for name in inside if result.verdicts[name].startswith("identified")]
     return {"grade": str(fit.grade), "ranks": ranks, "inside": inside, "identified": identified}
 
@@ -61,7 +73,9 @@ def phasors(number: int) -> dict[str, Any]:
     noise = list(cases.NOISES)[number % len(cases.NOISES)]
     seed = nth(cases.seeds(f"calibration of ranks {noise}"), number // len(cases.NOISES))
     data = model_error.data_of(model_error.Task("null", noise, model_error.EXPONENTIAL, seed))
-    fit, _, _ = model_error.identification(model_error.Task("null", noise, model_error.EXPONENTIAL, seed), data)
+    fit, _, _ = model_error.identification(
+        model_error.Task("null", noise, model_error.EXPONENTIAL, seed), data
+    )
     return {"noise": noise} | ranked(fit, data.truth)
 
 
@@ -97,17 +111,29 @@ def study(domain: str, count: int, path: Path) -> Iterator[dict[str, Any]]:
         row, started = {"domain": domain, "number": number}, time.process_time()
         try:
             row |= DOMAINS[domain](number)
-        except (UserError, ValueError, ArithmeticError, RuntimeError, np.linalg.LinAlgError) as error:
+        except (
+            UserError,
+            ValueError,
+            ArithmeticError,
+            RuntimeError,
+            np.linalg.LinAlgError,
+        ) as error:
             row |= {"failed": f"{type(error).__name__}: {error}"}
         row["cpu"] = time.process_time() - started
         with path.open("a", encoding="utf-8") as out:
-            out.write(json.dumps(model_error.six_digits(row), ensure_ascii=False, separators=(",", ":")) + "\n")
+            out.write(
+                json.dumps(model_error.six_digits(row), ensure_ascii=False, separators=(",", ":"))
+                + "\n"
+            )
         yield row
 
 
-def summary(rows: Sequence[Mapping[str, Any]], *, identified: bool = False) -> dict[str, dict[str, Any]]:
-    """Of each parameter, in all sets or in those that identify it: ranks by tenths, p that they are uniform, and the
-    share of intervals that hold the truth."""
+def summary(
+    rows: Sequence[Mapping[str, Any]], *, identified: bool = False
+) -> dict[str, dict[str, Any]]:
+    """Of each parameter, in all sets or in those that identify it: ranks by tenths, p that they are
+    uniform, and the share of intervals that hold the truth.
+    """
     good = [row for row in rows if "failed" not in row]
     content = {}
     for name in good[0]["ranks"]:
@@ -123,12 +149,21 @@ def summary(rows: Sequence[Mapping[str, Any]], *, identified: bool = False) -> d
 
 def tables(rows: Sequence[Mapping[str, Any]]) -> str:
     """What is stored, for people: every parameter, in all sets and in those that identify it."""
-    lines = ["| domain | parameter | sets | ranks by tenths | p, uniform | hold the truth |", f"|{6 * '---|'}"]
+    lines = [
+        "| domain | parameter | sets | ranks by tenths | p, uniform | hold the truth |",
+        f"|{6 * '---|'}",
+    ]
     for domain, identified in itertools.product(DOMAINS, (False, True)):
         of = [row for row in rows if row["domain"] == domain]
         for name, found in summary(of, identified=identified).items() if of else ():
-            tenths, sets = " ".join(map(str, found["tenths"])), f"{sum(found['tenths'])}{', identified' * identified}"
-            lines.append(f"| {domain} | {name} | {sets} | {tenths} | {found['p']:.2g} | {found['inside']:.0%} |")
+            tenths, sets = (
+                " ".join(map(str, found["tenths"])),
+                f"{sum(found['tenths'])}{', identified' * identified}",
+            )
+            lines.append(
+                f"| {domain} | {name} | {sets} | {tenths} | {found['p']:.2g} |"
+                f" {found['inside']:.0%} |"
+            )
     return "\n".join(lines)
 
 
@@ -140,8 +175,10 @@ def in_words(rows: Sequence[Mapping[str, Any]]) -> str:
         every, identified = summary(of), summary(of, identified=True)
         held = sorted(found["inside"] for found in every.values())
         sentences.append(
-            f"in {len(of)} sets of {domain} {held[0]:.0%} to {held[-1]:.0%} of the intervals hold the truth. Ranks are"
-            f" uniform (chi-square p > {LEVEL}) of all parameters{_but(every)}, and where they are identified of all"
+            f"in {len(of)} sets of {domain} {held[0]:.0%} to {held[-1]:.0%} of the intervals hold"
+            " the truth. Ranks are"
+            f" uniform (chi-square p > {LEVEL}) of all parameters{_but(every)}, and where they are"
+            " identified of all"
             f"{_but(identified)}"
         )
     return "; ".join(sentences)
@@ -158,12 +195,16 @@ def main() -> int:
     parser.add_argument("--phasors", type=int, default=440, help="sets")
     parser.add_argument("--waves", type=int, default=60, help="records")
     parser.add_argument("--out", type=Path, default=STORED)
-    parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
+    parser.add_argument(
+        "--tables", action="store_true", help="print what is stored, and run nothing"
+    )
     chosen = parser.parse_args()
     for domain in () if chosen.tables else DOMAINS:
         count = getattr(chosen, domain)
         for row in study(domain, count, chosen.out):
-            print(f"\r{domain}: {row['number'] + 1} of {count}", end="", file=sys.stderr, flush=True)
+            print(
+                f"\r{domain}: {row['number'] + 1} of {count}", end="", file=sys.stderr, flush=True
+            )
     print(tables(model_error.rows_of(chosen.out)))
     return 0
 

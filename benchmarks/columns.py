@@ -1,7 +1,9 @@
-"""What a column costs that a test asks for, by a kernel with everything and by those in use: python columns.py
+"""What a column costs that a test asks for, by a kernel with everything and by those in use: python
+columns.py
 
-A column is what one effect, or one push, changes beside a fit. Printed are microseconds of each simulation of three
-dips of 1,000 samples, the best of three runs, and instructions of each kernel's text.
+A column is what one effect, or one push, changes beside a fit. Printed are microseconds of each
+simulation of three dips of 1,000 samples, the best of three runs, and instructions of each kernel's
+text.
 """
 
 import os
@@ -33,14 +35,18 @@ def drive_of(depths: tuple[float, ...]) -> Drive:
     """Dips of a quarter of a second."""
     t, flat = np.arange(SAMPLES) * STEP, np.ones(SAMPLES)
     shape = np.clip((t - 0.4) / 0.02, 0, 1) - np.clip((t - 0.65) / 0.02, 0, 1)
-    return Drive.of([Excitation(STEP, 1 - d * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6) for d in depths])
+    return Drive.of(
+        [Excitation(STEP, 1 - d * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6) for d in depths]
+    )
 
 
 def tested() -> Catalogue:
     """What an investigation of such dips tests."""
     load, drive = base(), drive_of((0.5,))
     P, Q = load.simulate(drive, np.array([p.default for p in load.parameters]), 8).outputs[:, 0]
-    record = Record("dip", t=np.arange(SAMPLES) * STEP, U=drive.inputs[0], P=P, Q=Q, source="made").check()
+    record = Record(
+        "dip", t=np.arange(SAMPLES) * STEP, U=drive.inputs[0], P=P, Q=Q, source="made"
+    ).check()
     return catalogue(load, [detect(record)])
 
 
@@ -60,12 +66,15 @@ def main() -> None:
     kernels = {"the base model": family.model, "everything": family.whole}
     for name in (*family.catalogue.of_load, PUSHES):
         _, beside = family.key((), name)
-        kernels.setdefault("effects that are cheap" if len(beside) > 1 else name, family.of(family.key((), name)))
+        kernels.setdefault(
+            "effects that are cheap" if len(beside) > 1 else name, family.of(family.key((), name))
+        )
     whole = cost(family.whole, drive)
     for name, model in kernels.items():
         each = cost(model, drive)
         print(
-            f"{name:24s} {1e6 * each:7.0f} us  {whole / each:5.1f} times less  {model.source.count(chr(10)):6d} lines"
+            f"{name:24s} {1e6 * each:7.0f} us  {whole / each:5.1f} times less "
+            f" {model.source.count(chr(10)):6d} lines"
         )
 
 

@@ -1,8 +1,10 @@
-"""Records of random loads in random dips, by the simulator in `independent`: what optimizers are compared on.
+"""Records of random loads in random dips, by the simulator in `independent`: what optimizers are
+compared on.
 
-Machine, rating, torque, static load, dip and noise are drawn; a draw is taken again where the load has no steady
-state or what the fitted model calls its parameters lies outside that model's default bounds. The stator has a
-resistance, which the model does not know, so its lowest objective is above the noise, as with a record from the field.
+Machine, rating, torque, static load, dip and noise are drawn; a draw is taken again where the load
+has no steady state or what the fitted model calls its parameters lies outside that model's default
+bounds. The stator has a resistance, which the model does not know, so its lowest objective is above
+the noise, as with a record from the field.
 """
 
 from collections.abc import Sequence
@@ -28,26 +30,42 @@ def model() -> Model:
 
 
 def load(rng: np.random.Generator) -> Load:
-    """A machine that takes between a tenth and eight tenths of the active power, and a static load for the rest."""
+    """A machine that takes between a tenth and eight tenths of the active power, and a static load
+    for the rest.
+    """
 
     def log(low: float, high: float) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
     machine = Machine(
-        Rs=rng.uniform(0.0, 0.02), Xs=rng.uniform(0.08, 0.2), Xm=rng.uniform(1.8, 3.5), Rr=log(0.008, 0.035),
-        Xr=rng.uniform(0.1, 0.25), H=log(0.2, 1.5),
-    )  # fmt: skip
+        Rs=rng.uniform(0.0, 0.02),
+        Xs=rng.uniform(0.08, 0.2),
+        Xm=rng.uniform(1.8, 3.5),
+        Rr=log(0.008, 0.035),
+        Xr=rng.uniform(0.1, 0.25),
+        H=log(0.2, 1.5),
+    )
     rating, torque = rng.uniform(0.2, 0.9), rng.uniform(0.5, 0.9)
-    static = Static(P=1 - rating * torque, Q=rng.uniform(0.1, 0.5), p_v=rng.uniform(0.5, 2.5), q_v=rng.uniform(1.5, 6))
+    static = Static(
+        P=1 - rating * torque,
+        Q=rng.uniform(0.1, 0.5),
+        p_v=rng.uniform(0.5, 2.5),
+        q_v=rng.uniform(1.5, 6),
+    )
     return Load(machine, rating, torque, static)
 
 
 def dip(rng: np.random.Generator) -> Dip:
     """From shallow to deep enough to stall some machines."""
     return Dip(
-        depth=rng.uniform(0.12, 0.75), start=0.3, duration=rng.uniform(0.08, 0.4), fall=rng.uniform(0.03, 0.06),
-        rise=rng.uniform(0.04, 0.1), sag=rng.uniform(0.0, 0.5), settle=rng.uniform(0.1, 0.3),
-    )  # fmt: skip
+        depth=rng.uniform(0.12, 0.75),
+        start=0.3,
+        duration=rng.uniform(0.08, 0.4),
+        fall=rng.uniform(0.03, 0.06),
+        rise=rng.uniform(0.04, 0.1),
+        sag=rng.uniform(0.0, 0.5),
+        settle=rng.uniform(0.1, 0.3),
+    )
 
 
 def recorder(rng: np.random.Generator) -> Recorder:

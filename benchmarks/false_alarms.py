@@ -2,10 +2,11 @@
 
     python false_alarms.py [--count 24] [--jobs 2]        (from the folder benchmarks)
 
-Were chance's draws all there is to it, the share of data sets whose best effect is as rare as a level of the draws says
-would be that level. What the search does beyond one linear step, and the noise's own estimate, make small p more
-frequent. `NAMING_SHARE` is chosen by it, so that with the doubts by what is left all false alarms are at most
-`false_alarms`. Rows go to false_alarms.json; no rate is ever reported of these seeds.
+Were chance's draws all there is to it, the share of data sets whose best effect is as rare as a
+level of the draws says would be that level. What the search does beyond one linear step, and the
+noise's own estimate, make small p more frequent. `NAMING_SHARE` is chosen by it, so that with the
+doubts by what is left all false alarms are at most `false_alarms`. Rows go to false_alarms.json; no
+rate is ever reported of these seeds.
 """
 
 import argparse
@@ -29,7 +30,9 @@ LEVELS = (0.01, 0.02, 0.03, 0.04, 0.05, 0.1, 0.2, 0.5)
 
 
 def ranked(noise: str, planned: cases.Planned) -> dict:
-    """The rank of the best effect among chance's draws, from 0 to 1, and p of what the base model leaves."""
+    """The rank of the best effect among chance's draws, from 0 to 1, and p of what the base model
+    leaves.
+    """
     from tractexp.discrepancy.criteria import Criteria
     from tractexp.discrepancy.disagreement import disagreement
     from tractexp.inference.base_fit import base_fit
@@ -42,21 +45,35 @@ def ranked(noise: str, planned: cases.Planned) -> dict:
     from tractexp.record import Record, detect
 
     made = make(planned.make().case, planned.seed)[:FITTED]
-    events = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(made)]
+    events = [
+        detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(made)
+    ]
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     missing = catalogue(model, events)
-    first = disagreement(base_fit(Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0)
+    first = disagreement(
+        base_fit(Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort())), 0
+    )
     drawn, best = first.chance.least_p, first.scores[0]
     rank = (np.count_nonzero(drawn < best.p) + 1) / (len(drawn) + 1)
-    return {"noise": noise, "seed": planned.seed, "best": best.name, "rank": round(rank, 4), "p_left": first.p_left}
+    return {
+        "noise": noise,
+        "seed": planned.seed,
+        "best": best.name,
+        "rank": round(rank, 4),
+        "p_left": first.p_left,
+    }
 
 
 def shares(rows: list[dict]) -> dict[float, float]:
-    """The share of data sets in which something is named or doubted, for each level of chance that naming may take."""
+    """The share of data sets in which something is named or doubted, for each level of chance that
+    naming may take.
+    """
     from tractexp.discrepancy.criteria import Criteria
 
     ranks, left = (np.array([row[what] for row in rows]) for what in ("rank", "p_left"))
-    return {level: float(np.mean((ranks <= level) | (left < Criteria().adequate_p))) for level in LEVELS}
+    return {
+        level: float(np.mean((ranks <= level) | (left < Criteria().adequate_p))) for level in LEVELS
+    }
 
 
 def main() -> None:
@@ -73,7 +90,9 @@ def main() -> None:
         for noise in cases.NOISES
         for one in itertools.islice(cases.nulls(noise, events=FITTED + HELD), chosen.count)
     ]
-    rows = Parallel(n_jobs=chosen.jobs, verbose=5)(delayed(ranked)(noise, one) for noise, one in planned)
+    rows = Parallel(n_jobs=chosen.jobs, verbose=5)(
+        delayed(ranked)(noise, one) for noise, one in planned
+    )
     files.write(RESULTS, json.dumps(files.plain(rows), indent=0) + "\n")
     for level, share in shares(rows).items():
         print(f"level {level:<5g} share {share:.3f}")

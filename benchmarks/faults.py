@@ -1,12 +1,15 @@
-"""What is lost when something fails: `python benchmarks/faults.py [--part jobs,logging,...] [--seed 1]`.
+"""What is lost when something fails: `python benchmarks/faults.py [--part jobs,logging,...] [--seed
+1]`.
 
-Faults are injected into small searches, their logging, sweeps and an investigation: kills at a chosen write of a file
-or statement of the database or at a random moment, disks that are full from a chosen write on or really are (a small
-tmpfs, where it may be mounted), stores that are away, locked, cut short or of another version, signals, folders and
-homes that cannot be written, a cache that several share, umasks and other ways to start Python. Then
-the command is repeated, or `sync` and `doctor` are called, as the program itself says. Of each fault faults.json tells
-what was observed. Nothing may be lost: files are whole, results are the same as without the fault, every run is in the
-store once and finished, none says it is running, and no user reads a traceback. The exit code says whether that holds.
+Faults are injected into small searches, their logging, sweeps and an investigation: kills at a
+chosen write of a file or statement of the database or at a random moment, disks that are full from
+a chosen write on or really are (a small tmpfs, where it may be mounted), stores that are away,
+locked, cut short or of another version, signals, folders and homes that cannot be written, a cache
+that several share, umasks and other ways to start Python. Then the command is repeated, or `sync`
+and `doctor` are called, as the program itself says. Of each fault faults.json tells what was
+observed. Nothing may be lost: files are whole, results are the same as without the fault, every run
+is in the store once and finished, none says it is running, and no user reads a traceback. The exit
+code says whether that holds.
 """
 
 import argparse
@@ -37,8 +40,10 @@ from tractexp import files  # noqa: E402
 STORED = Path(__file__).with_name("faults.json")
 SEARCH = ("optimizer=pso", "optimizer.population=20", "budget=200")
 SWEEP = ("-m", *SEARCH, "seed=range(0,4)", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2")
-WRITTEN, RESULT = 8, 4  # files of a search; which of them is the result, after the three of its configuration
-WORKERS, MACHINES, DISKS = 5, 10, (40, 400, 1100)  # kills of workers, of all; kB of a disk that is too small
+# files of a search; which of them is the result, after the three of its configuration
+WRITTEN, RESULT = 8, 4
+# kills of workers, of all; kB of a disk that is too small
+WORKERS, MACHINES, DISKS = 5, 10, (40, 400, 1100)
 MOMENTS, STATEMENTS = 16, 18  # kills of a search at any moment; of what logs, at a statement
 SHARING = 6  # commands that begin at once on one cache
 FULL = OSError(errno.ENOSPC, "No space left on device")
@@ -58,7 +63,10 @@ def told(fault: str, observed: str, *problems: str) -> Fault:
 
 
 def forked(
-    act: Callable[[], int | None], kill_after: float | None = None, way: int = signal.SIGKILL, once: str = ""
+    act: Callable[[], int | None],
+    kill_after: float | None = None,
+    way: int = signal.SIGKILL,
+    once: str = "",
 ) -> tuple[int, str]:
     """Run in a copy of this process; the exit code (of a signal negative) and what was printed.
 
@@ -70,9 +78,12 @@ def forked(
         if child == 0:
             os.dup2(said.fileno(), 1)
             os.dup2(said.fileno(), 2)
-            sys.stdout, sys.stderr = (io.TextIOWrapper(os.fdopen(k, "wb", 0), write_through=True) for k in (1, 2))
+            sys.stdout, sys.stderr = (
+                io.TextIOWrapper(os.fdopen(k, "wb", 0), write_through=True) for k in (1, 2)
+            )
             warnings.simplefilter("default")  # as users have it, whatever the tests set
-            signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's background jobs ignore
+            # which a shell's background jobs ignore
+            signal.signal(signal.SIGINT, signal.default_int_handler)
             code = 1
             try:
                 code = operator.index(act() or 0)
@@ -153,7 +164,10 @@ def result(path: Path) -> dict | None:
         content = json.loads(path.read_text())
     except FileNotFoundError:
         return None
-    return {key: content[key] for key in ("parameters", "objective", "simulations", "verdicts", "intervals")}
+    return {
+        key: content[key]
+        for key in ("parameters", "objective", "simulations", "verdicts", "intervals")
+    }
 
 
 def halves(folder: Path) -> str:
@@ -164,7 +178,11 @@ def halves(folder: Path) -> str:
             json.loads(path.read_text())
         except ValueError:
             wrong.append(path.name)
-    wrong += [path.name for path in folder.rglob("*.html") if not path.read_text().rstrip().endswith("</html>")]
+    wrong += [
+        path.name
+        for path in folder.rglob("*.html")
+        if not path.read_text().rstrip().endswith("</html>")
+    ]
     return f"NOT WHOLE: {', '.join(wrong)}" if wrong else ""
 
 
@@ -173,11 +191,15 @@ def trace(said: str) -> str:
 
 
 def in_store(folder: Path, expected: int, name: str = "outputs/mlflow.db") -> str:
-    """What is wrong with the runs of a store: those that count are the finished ones, each under its key once."""
+    """What is wrong with the runs of a store: those that count are the finished ones, each under
+    its key once.
+    """
     with contextlib.closing(sqlite3.connect(folder / name)) as store:
         alive = "select run_uuid, status from runs where lifecycle_stage = 'active'"
         states = dict(store.execute(alive).fetchall())
-        keys = store.execute("select value, run_uuid from tags where key = 'tractexp.key'").fetchall()
+        keys = store.execute(
+            "select value, run_uuid from tags where key = 'tractexp.key'"
+        ).fetchall()
     finished = [key for key, run in keys if states.get(run) == "FINISHED"]
     wrong = [f"{len(finished)} FINISHED RUNS, NOT {expected}"] * (len(finished) != expected)
     wrong += ["A RUN IS THERE TWICE"] * (len({*finished}) != len(finished))
@@ -196,14 +218,17 @@ def same(folder: Path, reference: dict, file: str = "run/result.json") -> str:
 # Parts
 
 
-def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRITTEN)) -> Iterator[Fault]:
+def jobs(
+    work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRITTEN)
+) -> Iterator[Fault]:
     """A search whose files cannot be written, or whose process dies `at` one of them."""
     reference = work / "reference"
     reference.mkdir()
     code, said = forked(job(reference))
     assert code == 0, said
     found = result(reference / "run" / "result.json")
-    store = reference / "outputs" / "mlflow.db"  # made once: to make one takes ten times as long as the search
+    # made once: to make one takes ten times as long as the search
+    store = reference / "outputs" / "mlflow.db"
 
     def fresh(name: str) -> Path:
         folder = made(work / name)
@@ -228,12 +253,18 @@ def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRI
         yield told(
             f"kill -9 of a search at its file {n} of {WRITTEN}",
             f"left whole: {', '.join(kept) or 'nothing'}; repeated, the same result",
-            wrong, had, same(folder, found), trace(more), "" if code < 0 and again == 0 else f"EXIT {code}, {again}",
-        )  # fmt: skip
+            wrong,
+            had,
+            same(folder, found),
+            trace(more),
+            "" if code < 0 and again == 0 else f"EXIT {code}, {again}",
+        )
     for n in at:
         folder = fresh(f"full{n}")
         code, said = forked(failing(n, full, folder))
-        kept = sorted(p.name for p in (folder / "run").glob("*")) if (folder / "run").is_dir() else []
+        kept = (
+            sorted(p.name for p in (folder / "run").glob("*")) if (folder / "run").is_dir() else []
+        )
         lost = "" if n <= RESULT or "result.json" in kept else "THE RESULT IS LOST"
         sentence = next((s for s in said.splitlines() if "No space left" in s), "").strip()
         expected = 2 if n <= RESULT + 1 else 0  # the history; what is drawn is no reason to fail
@@ -241,9 +272,14 @@ def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRI
         yield told(
             f"disk full from file {n} of {WRITTEN} on",
             f"exit {code}, {len(kept)} files kept, '{shorter(sentence, folder)}'",
-            halves(folder), lost, trace(said), "" if code == expected else f"NOT EXIT {expected}",
-            "" if sentence else "NO SENTENCE", same(folder, found), "" if again == 0 else f"THEN EXIT {again}: {more}",
-        )  # fmt: skip
+            halves(folder),
+            lost,
+            trace(said),
+            "" if code == expected else f"NOT EXIT {expected}",
+            "" if sentence else "NO SENTENCE",
+            same(folder, found),
+            "" if again == 0 else f"THEN EXIT {again}: {more}",
+        )
     started = time.monotonic()
     forked(job(fresh("timed")))
     took = time.monotonic() - started
@@ -252,14 +288,22 @@ def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRI
         code, said = forked(job(folder), after)
         wrong, again = halves(folder), forked(job(folder))
         yield told(
-            f"kill -9 of a search after {after:.2f} s of its {took:.2f}", f"exit {code}; repeated, the same result",
-            wrong, same(folder, found), trace(again[1]), f"THEN EXIT {again[0]}" if again[0] else "",
-        )  # fmt: skip
+            f"kill -9 of a search after {after:.2f} s of its {took:.2f}",
+            f"exit {code}; repeated, the same result",
+            wrong,
+            same(folder, found),
+            trace(again[1]),
+            f"THEN EXIT {again[0]}" if again[0] else "",
+        )
     for k, way in enumerate([signal.SIGTERM] * 4 + [signal.SIGINT] * 2):
         folder = made(work / f"signal{k}")
         after = chance.uniform(0.3, 2.0)
         long = lambda folder=folder: command(  # noqa: E731
-            folder, "optimizer=pso", "optimizer.iterations=10000000", "hydra.run.dir=run", "tracking.enabled=false"
+            folder,
+            "optimizer=pso",
+            "optimizer.iterations=10000000",
+            "hydra.run.dir=run",
+            "tracking.enabled=false",
         )
         code, said = forked(long, after, way, once="optimizer: pso")
         last = said.strip().splitlines()[-1] if said.strip() else ""
@@ -267,13 +311,17 @@ def jobs(work: Path, chance: random.Random, at: Iterable[int] = range(1, 1 + WRI
         yield told(
             f"{signal.Signals(way).name} of a search, {after:.1f} s after it began",
             f"exit {code}, '{shorter(last, folder)}'",
-            "" if code == 128 + way else f"NOT EXIT {128 + way}", trace(said), halves(folder),
+            "" if code == 128 + way else f"NOT EXIT {128 + way}",
+            trace(said),
+            halves(folder),
             "" if kept else "THE BEST SO FAR IS LOST",
-        )  # fmt: skip
+        )
 
 
 def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
-    """A process killed while it writes a run into the store, at one of the statements that do so."""
+    """A process killed while it writes a run into the store, at one of the
+    statements that do so.
+    """
     from tractexp import tracking
     from tractexp.tracking.run import TrackedRun
     from tractexp.tracking.runfile import save
@@ -290,8 +338,15 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
             (folder / "result.json").write_text("{}")
             child = TrackedRun("e", "child", metrics={"x": 1.0})
             steps = list(range(1, 400))
-            run = TrackedRun("e", "job", {"a": 1}, {"x": 1.0}, {"c": (steps, steps)},
-                      artifacts=[folder / "result.json"], children=[child])  # fmt: skip
+            run = TrackedRun(
+                "e",
+                "job",
+                {"a": 1},
+                {"x": 1.0},
+                {"c": (steps, steps)},
+                artifacts=[folder / "result.json"],
+                children=[child],
+            )
             kept = save(folder / "job", run, uri)
             tracking.open_store(uri)
             count = counting_statements(n)
@@ -319,8 +374,10 @@ def logging(work: Path, chance: random.Random) -> Iterator[Fault]:
         yield told(
             f"kill -9 while logging, at statement {n} of {most}",
             f"left in the store: {', '.join(before) or 'nothing'}; after sync, one whole run",
-            in_store(folder, 1), trace(more), "" if code == -9 and again == twice == 0 else f"EXIT {code}, {again}",
-        )  # fmt: skip
+            in_store(folder, 1),
+            trace(more),
+            "" if code == -9 and again == twice == 0 else f"EXIT {code}, {again}",
+        )
 
 
 def counting_statements(n: int | None) -> list[int]:
@@ -353,25 +410,39 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
         (folder / "outputs" / "mlflow.db").write_bytes(content)
         return folder, folder / "outputs" / "mlflow.db"
 
-    def observed(fault: str, folder: Path, mend: Callable[[], None] = lambda: None, runs: int = 2) -> Fault:
+    def observed(
+        fault: str, folder: Path, mend: Callable[[], None] = lambda: None, runs: int = 2
+    ) -> Fault:
         """Search, mend, and bring in; a run of the sound store has no folder here."""
         started = time.monotonic()
         code, said = forked(job(folder))
         took = time.monotonic() - started
-        sentence = next((s for s in said.splitlines() if s.startswith(("not logged", "logged in"))), "")
+        sentence = next(
+            (s for s in said.splitlines() if s.startswith(("not logged", "logged in"))), ""
+        )
         mend()
         healed, doctor = forked(lambda: command(folder, "doctor", "."))
         return told(
-            fault, f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; in the store after doctor",
-            same(folder, found), trace(said + doctor), "" if sentence else "NO SENTENCE", in_store(folder, runs),
+            fault,
+            f"exit {code} after {took:.0f} s, '{shorter(sentence, folder)}'; in the store after"
+            " doctor",
+            same(folder, found),
+            trace(said + doctor),
+            "" if sentence else "NO SENTENCE",
+            in_store(folder, runs),
             "" if (code, healed) == (0, 0) else f"EXIT {code}, {healed}: {doctor}",
-        )  # fmt: skip
+        )
 
     for share in (0.0, 0.3, 0.9):
         folder, _ = with_store(f"cut{share}", sound[: int(share * len(sound))])
         yield observed(f"store cut short to {share:.0%}", folder, runs=1)
     folder, database = with_store("junk", bytes(chance.randrange(256) for _ in range(5000)))
-    yield observed("store overwritten with noise, which nobody knows for ours, moved away", folder, database.unlink, 1)
+    yield observed(
+        "store overwritten with noise, which nobody knows for ours, moved away",
+        folder,
+        database.unlink,
+        1,
+    )
     folder, database = with_store("torn", torn(sound, chance))
     yield observed("a page of the store overwritten", folder, runs=1)
     folder, database = with_store("locked", sound)
@@ -380,10 +451,14 @@ def stores(work: Path, chance: random.Random) -> Iterator[Fault]:
     yield observed("store locked by another process", folder, other.close)
     folder, database = with_store("newer", sound)
     version(database, "ffff00000000")
-    yield observed("store of a newer MLflow", folder, lambda: version(database, version_of(sound, work)))
+    yield observed(
+        "store of a newer MLflow", folder, lambda: version(database, version_of(sound, work))
+    )
     folder = made(work / "taken")
     (folder / "outputs").write_text("a file where the folder should be")
-    yield observed("a file where the store's folder should be", folder, (folder / "outputs").unlink, runs=1)
+    yield observed(
+        "a file where the store's folder should be", folder, (folder / "outputs").unlink, runs=1
+    )
 
 
 def torn(sound: bytes, chance: random.Random) -> bytes:
@@ -411,11 +486,15 @@ def version_of(sound: bytes, work: Path) -> str:
 def begun(folder: Path, *arguments: str, **environment: str) -> subprocess.Popen[str]:
     said = (folder / "said.txt").open("w")
     whole, there = [sys.executable, "-m", "tractexp", *arguments], os.environ | environment
-    return subprocess.Popen(whole, cwd=folder, stdout=said, stderr=said, text=True, start_new_session=True, env=there)
+    return subprocess.Popen(
+        whole, cwd=folder, stdout=said, stderr=said, text=True, start_new_session=True, env=there
+    )
 
 
 def everyone(leader: int) -> list[int]:
-    """The processes that a command has started, itself last: workers, and what logs, which has left its group."""
+    """The processes that a command has started, itself last: workers, and what logs, which has left
+    its group.
+    """
     found, todo = [leader], [leader]
     while todo:
         parent = todo.pop()
@@ -459,14 +538,17 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
             killed_at.append(len(swept(folder)))
     code = process.wait()
     said = (folder / "said.txt").read_text()
-    if code:  # a job that was hit three times is listed as failed, and run by the same command again
+    # a job that was hit three times is listed as failed, and run by the same command again
+    if code:
         begun(folder, *SWEEP).wait()
     for k, done in enumerate(killed_at, start=1):
         yield told(
             f"kill -9 of a worker, number {k} of one sweep, {done} of 4 jobs done",
             f"exit {code}; all four results are those of the sweep without a fault",
-            "" if swept(folder) == found else "OTHER RESULTS", trace(said), halves(folder),
-        )  # fmt: skip
+            "" if swept(folder) == found else "OTHER RESULTS",
+            trace(said),
+            halves(folder),
+        )
 
     folder, count = made(work / "machine"), 0
     while count < MACHINES:
@@ -482,14 +564,19 @@ def sweeps(work: Path, chance: random.Random) -> Iterator[Fault]:
         yield told(
             f"kill -9 of a whole sweep with all its processes after {after:.0f} s, time {count}",
             f"{len(done)} of 4 results on disk, each that of the sweep without a fault",
-            "" if all(found[number] == one for number, one in done.items()) else "ANOTHER RESULT", halves(folder),
-        )  # fmt: skip
+            "" if all(found[number] == one for number, one in done.items()) else "ANOTHER RESULT",
+            halves(folder),
+        )
     code = begun(folder, *SWEEP).wait()
     said = (folder / "said.txt").read_text()
     yield told(
-        f"the command repeated after {MACHINES} kills of the whole machine", f"exit {code}, all four results the same",
-        "" if swept(folder) == found else "OTHER RESULTS", trace(said), halves(folder), running(folder),
-    )  # fmt: skip
+        f"the command repeated after {MACHINES} kills of the whole machine",
+        f"exit {code}, all four results the same",
+        "" if swept(folder) == found else "OTHER RESULTS",
+        trace(said),
+        halves(folder),
+        running(folder),
+    )
     yield from disks(work, found)
 
 
@@ -511,7 +598,9 @@ def disks(work: Path, found: dict) -> Iterator[Fault]:
     for kilobytes in DISKS:
         folder = made(work / f"disk{kilobytes}")
         mount = ["mount", "-t", "tmpfs", "-o"]
-        if subprocess.run([*mount, f"size={kilobytes}k", "tmpfs", str(folder)], capture_output=True).returncode:
+        if subprocess.run(
+            [*mount, f"size={kilobytes}k", "tmpfs", str(folder)], capture_output=True
+        ).returncode:
             return  # not allowed here
         try:
             log = work / f"said{kilobytes}.txt"
@@ -526,17 +615,26 @@ def disks(work: Path, found: dict) -> Iterator[Fault]:
             last = first.strip().splitlines()[-1]
             yield told(
                 f"the disk of a sweep and its store is full at {kilobytes} kB",
-                f"exit {code}, {len(kept)} of 4 results kept, '{shorter(last, folder)}'; then exit {again}, all 4",
-                "" if swept(folder) == found else "OTHER RESULTS", trace(first + log.read_text()), halves(folder),
+                f"exit {code}, {len(kept)} of 4 results kept, '{shorter(last, folder)}'; then exit"
+                f" {again}, all 4",
+                "" if swept(folder) == found else "OTHER RESULTS",
+                trace(first + log.read_text()),
+                halves(folder),
                 "" if again == 0 else log.read_text()[-300:],
-            )  # fmt: skip
+            )
         finally:
-            subprocess.run(["umount", "-l", str(folder)], check=False)  # what logs may be in it still
+            # what logs may be in it still
+            subprocess.run(["umount", "-l", str(folder)], check=False)
 
 
 def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
     """An investigation, killed and repeated: it goes on where it was, to the same bits."""
-    asked = ("task=discrepancy", "task.effects=[stator_resistance]", "hydra.run.dir=run", "tracking.enabled=false")
+    asked = (
+        "task=discrepancy",
+        "task.effects=[stator_resistance]",
+        "hydra.run.dir=run",
+        "tracking.enabled=false",
+    )
     cache = os.environ.get("TRACTEXP_CACHE_DIR")
 
     def investigates(folder: Path, kept: Path) -> Callable[[], int]:
@@ -559,20 +657,25 @@ def longer(work: Path, chance: random.Random) -> Iterator[Fault]:
         there = len(list((kept / "descents").iterdir()))
         yield told(
             f"kill -9 of an investigation after {share:.0%} of its time",
-            f"{there} of its {descents} fits and draws are kept", "" if there else "NOTHING IS KEPT", halves(folder),
-        )  # fmt: skip
+            f"{there} of its {descents} fits and draws are kept",
+            "" if there else "NOTHING IS KEPT",
+            halves(folder),
+        )
     started = time.monotonic()
     code, said = forked(investigates(folder, kept))
     equal = code == 0 and (folder / "run" / "discrepancy.json").read_bytes() == content
     yield told(
         "the investigation repeated after three kills",
         f"exit {code}, the same bytes in {(time.monotonic() - started) / took:.0%} of the time",
-        "" if equal else "OTHER RESULTS", trace(said),
-    )  # fmt: skip
+        "" if equal else "OTHER RESULTS",
+        trace(said),
+    )
 
 
 def places(work: Path, chance: random.Random) -> Iterator[Fault]:
-    """Folders that cannot be written, caches that are shared, umasks, and other ways to start Python."""
+    """Folders that cannot be written, caches that are shared, umasks, and other ways to start
+    Python.
+    """
     reference = made(work / "reference")
     cache = {"TRACTEXP_CACHE_DIR": str(made(work / "cache"))}
     search = (*SEARCH, "hydra.run.dir=run")
@@ -583,38 +686,68 @@ def places(work: Path, chance: random.Random) -> Iterator[Fault]:
         folder = made(work / name)
         code, said = started_in(folder, search, *flags, umask=umask, **cache | more)
         return told(
-            fault, f"exit {code}, the same result", same(folder, found), trace(said), halves(folder),
-            f"EXIT {code}" if code else "", in_store(folder, 1), readable(folder),
-        )  # fmt: skip
+            fault,
+            f"exit {code}, the same result",
+            same(folder, found),
+            trace(said),
+            halves(folder),
+            f"EXIT {code}" if code else "",
+            in_store(folder, 1),
+            readable(folder),
+        )
 
     def refusal(fault: str, folder: Path, **more: str) -> Fault:
         code, said = started_in(folder, search, **cache | more)
         left = sorted(path.name for path in folder.rglob("*"))
         return told(
-            fault, f"exit {code}, '{shorter(said.strip(), folder)}'", "" if code == 2 else "NOT EXIT 2", trace(said),
-            "" if said.startswith("tractexp: ") else "NO SENTENCE", f"LEFT: {', '.join(left)}" if left else "",
-        )  # fmt: skip
+            fault,
+            f"exit {code}, '{shorter(said.strip(), folder)}'",
+            "" if code == 2 else "NOT EXIT 2",
+            trace(said),
+            "" if said.startswith("tractexp: ") else "NO SENTENCE",
+            f"LEFT: {', '.join(left)}" if left else "",
+        )
 
     for umask in (0o000, 0o077, 0o027):
         yield same_result(f"a search under umask {umask:03o}", f"umask{umask}", umask=umask)
     yield same_result("a search under python -O", "optimized", "-O")
     yield same_result("a search under python -X dev -W error", "dev", "-X", "dev", "-W", "error")
-    yield same_result("a search under LC_ALL=C and another PYTHONHASHSEED", "plain", LC_ALL="C", PYTHONHASHSEED="7")
+    yield same_result(
+        "a search under LC_ALL=C and another PYTHONHASHSEED",
+        "plain",
+        LC_ALL="C",
+        PYTHONHASHSEED="7",
+    )
     with unwritable(work / "home") as home:
-        gone = {"TRACTEXP_CACHE_DIR": "", "XDG_CACHE_HOME": "", "HOME": str(home), "MPLCONFIGDIR": ""}
+        gone = {
+            "TRACTEXP_CACHE_DIR": "",
+            "XDG_CACHE_HOME": "",
+            "HOME": str(home),
+            "MPLCONFIGDIR": "",
+        }
         yield same_result("a home folder that cannot be written", "homeless", **gone)
     with unwritable(work / "folder") as folder:
         yield refusal("a folder that cannot be written", folder)
     with unwritable(work / "store") as folder:
-        yield refusal("a cache that cannot be written", made(work / "cacheless"), TRACTEXP_CACHE_DIR=str(folder))
+        yield refusal(
+            "a cache that cannot be written",
+            made(work / "cacheless"),
+            TRACTEXP_CACHE_DIR=str(folder),
+        )
     shared = made(work / "shared")
     shared.chmod(0o777)
-    yield refusal("a cache that others can write to", made(work / "open"), TRACTEXP_CACHE_DIR=str(shared))
+    yield refusal(
+        "a cache that others can write to", made(work / "open"), TRACTEXP_CACHE_DIR=str(shared)
+    )
     yield from side_by_side(work, chance, search, found)
 
 
-def side_by_side(work: Path, chance: random.Random, search: tuple[str, ...], found: dict) -> Iterator[Fault]:
-    """Commands that begin at once on one empty cache, one of which is killed; then one more on what that left."""
+def side_by_side(
+    work: Path, chance: random.Random, search: tuple[str, ...], found: dict
+) -> Iterator[Fault]:
+    """Commands that begin at once on one empty cache, one of which is killed; then one more on what
+    that left.
+    """
     cache = str(made(work / "common"))
     folders = [made(work / f"common{k}") for k in range(SHARING)]
     jobs_of = [begun(folder, *search, TRACTEXP_CACHE_DIR=cache) for folder in folders]
@@ -624,31 +757,49 @@ def side_by_side(work: Path, chance: random.Random, search: tuple[str, ...], fou
         code, said = process.wait(), (folder / "said.txt").read_text()
         expected = (-signal.SIGKILL, 0) if k == 0 else (0,)
         yield told(
-            f"{SHARING} commands at once on an empty cache, the first killed: number {k + 1}", f"exit {code}",
-            halves(folder), trace(said), "" if code in expected else f"EXIT {code}",
+            f"{SHARING} commands at once on an empty cache, the first killed: number {k + 1}",
+            f"exit {code}",
+            halves(folder),
+            trace(said),
+            "" if code in expected else f"EXIT {code}",
             same(folder, found) if code == 0 else "",
-        )  # fmt: skip
+        )
     code = begun(folders[0], *search, TRACTEXP_CACHE_DIR=cache).wait()
     said = (folders[0] / "said.txt").read_text()
     yield told(
-        "the killed command repeated on that cache", f"exit {code}, the same result", same(folders[0], found),
-        trace(said), f"EXIT {code}" if code else "",
-    )  # fmt: skip
+        "the killed command repeated on that cache",
+        f"exit {code}, the same result",
+        same(folders[0], found),
+        trace(said),
+        f"EXIT {code}" if code else "",
+    )
 
 
-def started_in(folder: Path, arguments: tuple[str, ...], *flags: str, umask: int = -1, **environment: str):
-    """Exit code, and what was printed, of a command in a process of its own; an empty variable is taken away."""
+def started_in(
+    folder: Path, arguments: tuple[str, ...], *flags: str, umask: int = -1, **environment: str
+):
+    """Exit code, and what was printed, of a command in a process of its own; an empty variable is
+    taken away.
+    """
     there = {name: value for name, value in (os.environ | environment).items() if value}
     command = [sys.executable, *flags, "-m", "tractexp", *arguments]
     done = subprocess.run(
-        command, cwd=folder, env=there, umask=umask, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        command,
+        cwd=folder,
+        env=there,
+        umask=umask,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
     )
     return done.returncode, done.stdout
 
 
 @contextlib.contextmanager
 def unwritable(folder: Path) -> Iterator[Path]:
-    """A folder in which nobody can write: of modes, or, where this process may do as it likes, of a mount."""
+    """A folder in which nobody can write: of modes, or, where this process may do as it likes, of a
+    mount.
+    """
     made(folder)
     mount = ["mount", "-t", "tmpfs", "-o", "ro,size=64k", "tmpfs", str(folder)]
     as_mount = os.geteuid() == 0 and not subprocess.run(mount, capture_output=True).returncode
@@ -657,14 +808,20 @@ def unwritable(folder: Path) -> Iterator[Path]:
     try:
         yield folder
     finally:
-        folder.chmod(0o755) if not as_mount else subprocess.run(["umount", "-l", str(folder)], check=True)
+        folder.chmod(0o755) if not as_mount else subprocess.run(
+            ["umount", "-l", str(folder)], check=True
+        )
 
 
 def readable(folder: Path) -> str:
-    """What is wrong with modes: files that their owner cannot read, and what names the store open to others."""
+    """What is wrong with modes: files that their owner cannot read, and what names the store open
+    to others.
+    """
     files_of = [path for path in folder.rglob("*") if path.is_file()]
     closed = [path.name for path in files_of if not path.stat().st_mode & 0o400]
-    wide = [path.name for path in files_of if path.name == "mlflow.json" and path.stat().st_mode & 0o077]
+    wide = [
+        path.name for path in files_of if path.name == "mlflow.json" and path.stat().st_mode & 0o077
+    ]
     wrong = [f"NOT READABLE: {', '.join(closed)}"] * bool(closed)
     return ", ".join(wrong + ["mlflow.json IS OPEN TO OTHERS"] * bool(wide))
 
@@ -678,7 +835,14 @@ def made(folder: Path) -> Path:
     return folder
 
 
-PARTS = {"jobs": jobs, "logging": logging, "stores": stores, "sweeps": sweeps, "longer": longer, "places": places}
+PARTS = {
+    "jobs": jobs,
+    "logging": logging,
+    "stores": stores,
+    "sweeps": sweeps,
+    "longer": longer,
+    "places": places,
+}
 
 
 def ready() -> None:
@@ -716,12 +880,19 @@ def main() -> int:
         with tempfile.TemporaryDirectory(prefix="faults") as work:
             found = []
             for fault in PARTS[part](Path(work), random.Random(asked.seed)):
-                print(f"{'LOST' if fault['lost'] else 'held':>4}  {fault['fault']}: {fault['observed']}", flush=True)
+                print(
+                    f"{'LOST' if fault['lost'] else 'held':>4}  {fault['fault']}:"
+                    f" {fault['observed']}",
+                    flush=True,
+                )
                 found.append(fault)
                 known[part] = found
                 known = {name: known[name] for name in PARTS if name in known}
                 files.write(asked.store, json.dumps(known, indent=1) + "\n")
-    count, lost = sum(map(len, known.values())), sum(f["lost"] for faults in known.values() for f in faults)
+    count, lost = (
+        sum(map(len, known.values())),
+        sum(f["lost"] for faults in known.values() for f in faults),
+    )
     print(f"{count} faults, {lost} of which lost something")
     return 1 if lost else 0
 

@@ -1,11 +1,12 @@
-"""Verdicts and numbers of a fixed set of investigations and identifications, to tell whether a change moved them.
+"""Verdicts and numbers of a fixed set of investigations and identifications, to tell whether a
+change moved them.
 
     python golden.py --write        make golden.jsonl, before a change of structure
     python golden.py                make everything again and tell each difference
 
-Results come from the command line and the files it writes, so that the same script serves before and after any change
-inside. A row says on which processor it was made. There numbers are compared to `SAME`; on another to `OTHER`, since
-kernels round otherwise and a descent carries that on.
+Results come from the command line and the files it writes, so that the same script serves before
+and after any change inside. A row says on which processor it was made. There numbers are compared
+to `SAME`; on another to `OTHER`, since kernels round otherwise and a descent carries that on.
 """
 
 import argparse
@@ -31,17 +32,44 @@ FILE = Path(__file__).parent / "golden.jsonl"
 SAME, OTHER = 1e-9, 1e-5  # relative
 LOUD, QUIET = Noise(0.005), Noise(0.002)
 NULLS = ("white 0.2 %", "wandering load")
-HELD_OUT = ("stator_resistance", "undervoltage_trip", "negative_sequence_braking", "measurement_window")
+HELD_OUT = (
+    "stator_resistance",
+    "undervoltage_trip",
+    "negative_sequence_braking",
+    "measurement_window",
+)
 MODELS = ("first_order_exponential", "third_order_zip", "fifth_order_double_cage")
 OPTIMIZERS = ("issa", "multistart_least_squares", "differential_evolution")
 INVESTIGATION = (
-    "verdict", "reason", "effects", "name_sets", "where", "gap", "left", "nearest", "recommendation", "noise",
-    "phasor_window", "parameters", "simulations",
-)  # fmt: skip
+    "verdict",
+    "reason",
+    "effects",
+    "name_sets",
+    "where",
+    "gap",
+    "left",
+    "nearest",
+    "recommendation",
+    "noise",
+    "phasor_window",
+    "parameters",
+    "simulations",
+)
 RESULT = (
-    "parameters", "objective", "epsilon_p", "epsilon_q", "simulations", "refused", "iterations", "status", "events",
-    "at_bound", "standard_errors", "intervals", "verdicts",
-)  # fmt: skip
+    "parameters",
+    "objective",
+    "epsilon_p",
+    "epsilon_q",
+    "simulations",
+    "refused",
+    "iterations",
+    "status",
+    "events",
+    "at_bound",
+    "standard_errors",
+    "intervals",
+    "verdicts",
+)
 
 
 def investigations() -> Iterator[tuple[str, Case, int]]:
@@ -58,7 +86,14 @@ def investigations() -> Iterator[tuple[str, Case, int]]:
 
 def command(folder: Path, *arguments: str) -> dict[str, Any]:
     """Run tractexp in a folder; what it refuses is a row with its sentence."""
-    line = [sys.executable, "-m", "tractexp", *arguments, "tracking.enabled=false", "hydra.run.dir=run"]
+    line = [
+        sys.executable,
+        "-m",
+        "tractexp",
+        *arguments,
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+    ]
     done = subprocess.run(line, cwd=folder, capture_output=True, text=True)
     if done.returncode:
         return {"refused": done.stderr.strip().splitlines()[-1]}
@@ -67,7 +102,9 @@ def command(folder: Path, *arguments: str) -> dict[str, Any]:
     content = json.loads(file.read_text(encoding="utf-8"))
     row = {key: content[key] for key in (INVESTIGATION if investigation else RESULT)}
     if investigation:
-        row["candidates"] = [[c["effects"], c["status"], c["likelihood_ratio"]] for c in content["candidates"]]
+        row["candidates"] = [
+            [c["effects"], c["status"], c["likelihood_ratio"]] for c in content["candidates"]
+        ]
     return row
 
 
@@ -83,7 +120,11 @@ def investigated(label: str, case: Case, held: int) -> dict[str, Any]:
                 case = replace(case, size=tuple(0.8 * size for _, size in case.hidden))
         dips = [f"event{k + 1}.csv" for k in range(int(case.events))]
         train, validate = dips[: len(dips) - held], dips[len(dips) - held :]
-        data = ["data=csv", f"data.train=[{','.join(train)}]", f"data.validate=[{','.join(validate)}]"]
+        data = [
+            "data=csv",
+            f"data.train=[{','.join(train)}]",
+            f"data.validate=[{','.join(validate)}]",
+        ]
         return {"label": label, **command(folder, "task=discrepancy", *data)}
 
 
@@ -96,15 +137,23 @@ def jobs() -> Iterator[Any]:
     for label, *investigation in investigations():
         yield delayed(investigated)(label, *investigation)
     for model in MODELS:
-        yield delayed(identified)(f"model {model}", f"model={model}", "optimizer=multistart_least_squares", "seed=1")
+        yield delayed(identified)(
+            f"model {model}", f"model={model}", "optimizer=multistart_least_squares", "seed=1"
+        )
     for optimizer in OPTIMIZERS:
-        yield delayed(identified)(f"optimizer {optimizer}", f"optimizer={optimizer}", "seed=2", "data=tibet_30pct")
+        yield delayed(identified)(
+            f"optimizer {optimizer}", f"optimizer={optimizer}", "seed=2", "data=tibet_30pct"
+        )
     three = "data.train=[pkg://tractexp.data/tibet_30pct.csv,pkg://tractexp.data/tibet_65pct.csv]"
-    yield delayed(identified)("per event, robust", "data=csv", three, "model.per_event=[T_m]", "objective=huber")
+    yield delayed(identified)(
+        "per event, robust", "data=csv", three, "model.per_event=[T_m]", "objective=huber"
+    )
 
 
 def differences(before: Any, now: Any, at: str = "") -> Iterator[tuple[str, float]]:
-    """Where two JSON contents differ, a line each, and by how much, relative: infinity where it is no number."""
+    """Where two JSON contents differ, a line each, and by how much, relative: infinity where it is
+    no number.
+    """
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys((*before, *now)):
             yield from differences(before.get(key), now.get(key), f"{at}.{key}")
@@ -118,15 +167,21 @@ def differences(before: Any, now: Any, at: str = "") -> Iterator[tuple[str, floa
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument(
-        "--write", action="store_true", help="store the rows chosen by --only, and no label that is gone"
+        "--write",
+        action="store_true",
+        help="store the rows chosen by --only, and no label that is gone",
     )
     parser.add_argument("--only", default="", help="labels that contain this")
     parser.add_argument("--jobs", type=int, default=2)
     options = parser.parse_args()
     here, wanted = processor(), [job for job in jobs() if options.only in job[1][0]]
-    stored = {row["label"]: row for row in map(json.loads, FILE.read_text(encoding="utf-8").splitlines())}
+    stored = {
+        row["label"]: row for row in map(json.loads, FILE.read_text(encoding="utf-8").splitlines())
+    }
     rows, most = {}, 0.0
     for row in Parallel(n_jobs=options.jobs, return_as="generator")(wanted):
         before = dict(stored.get(row["label"], {}))
@@ -134,17 +189,28 @@ def main() -> int:
         moves = list(differences(before, row))
         most = max([most, *(size for _, size in moves)])
         large = [line[:150] for line, size in moves if size > (OTHER if elsewhere else SAME)]
-        verdict = row.get("refused") or f"{row.get('verdict', row.get('status'))} {' '.join(row.get('effects', []))}"
-        print(f"{row['label']}: {verdict}{', stored on another processor' * elsewhere}", *large[:12], sep="\n    ")
+        verdict = (
+            row.get("refused")
+            or f"{row.get('verdict', row.get('status'))} {' '.join(row.get('effects', []))}"
+        )
+        print(
+            f"{row['label']}: {verdict}{', stored on another processor' * elsewhere}",
+            *large[:12],
+            sep="\n    ",
+        )
         sys.stdout.flush()
         rows[row["label"]] = row | {"processor": here}, bool(large)
     moved = sum(large for _, large in rows.values())
-    print(f"{len(rows)} compared, {moved} differ; the largest difference of a number is {most:.1e}, on {here}")
+    print(
+        f"{len(rows)} compared, {moved} differ; the largest difference of a number is {most:.1e},"
+        f" on {here}"
+    )
     if not options.write:
         return int(moved > 0)
     stored |= {label: row for label, (row, _) in rows.items()}
     FILE.write_text(
-        "".join(json.dumps(stored[job[1][0]]) + "\n" for job in jobs() if job[1][0] in stored), encoding="utf-8"
+        "".join(json.dumps(stored[job[1][0]]) + "\n" for job in jobs() if job[1][0] in stored),
+        encoding="utf-8",
     )
     return 0
 

@@ -1,15 +1,20 @@
-"""Run the suites through the product and count: false alarms, names found, abstentions, proposals, gaps closed.
+"""Run the suites through the product and count: false alarms, names found, abstentions, proposals,
+gaps closed.
 
-    python hidden_effects_study.py                              the development set: seeds that were looked at
-    python hidden_effects_study.py --frozen COMMIT [--docs]     the judgement set    (from the folder benchmarks)
+    python hidden_effects_study.py
+        the development set: seeds that were looked at
+    python hidden_effects_study.py --frozen COMMIT [--docs]
+        the judgement set (from the folder benchmarks)
 
-Each trial is made by the independent generator, its last event held out, and investigated by `tractexp.discrepancy`.
-AIC, BIC, RMSE and sparse regression (PySINDy) choose among the same candidates on the same data. Rows are appended to a
-JSON-lines file, so that a study can be stopped and taken up.
+Each trial is made by the independent generator, its last event held out, and investigated by
+`tractexp.discrepancy`. AIC, BIC, RMSE and sparse regression (PySINDy) choose among the same
+candidates on the same data. Rows are appended to a JSON-lines file, so that a study can be stopped
+and taken up.
 
-The judgement set's seeds follow from the hash of the commit that froze product and generator, so that nobody could look
-at them before; it is refused where either is not what that commit holds. `--docs` writes its tables and figures into
-docs/judgement.md. A later set is drawn by `--frozen LATER --out judgement_LATER.jsonl` and takes the place of `NEWEST`.
+The judgement set's seeds follow from the hash of the commit that froze product and generator, so
+that nobody could look at them before; it is refused where either is not what that commit holds.
+`--docs` writes its tables and figures into docs/judgement.md. A later set is drawn by `--frozen
+LATER --out judgement_LATER.jsonl` and takes the place of `NEWEST`.
 """
 
 import argparse
@@ -40,7 +45,8 @@ from hidden_effects.outside import OUTSIDE  # noqa: E402
 
 LEFT_OUT = "left out "  # the group of trials whose effect is taken from the catalogue
 PAIRED, LARGE = (2.0, 4.0), (2.0, 4.0, 8.0)  # multiples of the detection limit
-FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")  # what judges and is judged
+# what judges and is judged
+FROZEN = ("tractexp", "plugins", "tests/oracle/hidden_effects", "tests/oracle/independent")
 ROOT, HERE = Path(__file__).parents[1], Path(__file__).parent
 NEWEST = HERE / "judgement.jsonl"  # the judgement set
 KNOWN = {  # strangers that the catalogue has, too
@@ -68,10 +74,16 @@ SAME = {  # effects whose amount is a parameter of the model, in its units
 }
 
 
-def rows_of(name: str, salt: int | None, multiples: Container[float], **settings: int) -> Iterator[tuple[str, Trials]]:
-    """(group, its endless trials) of each row of a suite; hidden effects of these multiples of their limits."""
+def rows_of(
+    name: str, salt: int | None, multiples: Container[float], **settings: int
+) -> Iterator[tuple[str, Trials]]:
+    """(group, its endless trials) of each row of a suite; hidden effects of these multiples of
+    their limits.
+    """
     if name == "nulls":
-        yield from ((f"null, {noise}", cases.nulls(noise, salt, **settings)) for noise in cases.NOISES)
+        yield from (
+            (f"null, {noise}", cases.nulls(noise, salt, **settings)) for noise in cases.NOISES
+        )
     elif name == "nuisances":
         yield "null with nuisances", cases.nuisances(salt, **settings)
     elif name == "inexact":
@@ -80,9 +92,15 @@ def rows_of(name: str, salt: int | None, multiples: Container[float], **settings
         for multiple, effect in itertools.product((m for m in PAIRED if m in multiples), PHYSICAL):
             yield f"field {multiple:g} x", cases.in_the_field(effect, multiple, salt, **settings)
     elif name == "loud":
-        for start, m, effects in ("loud ", 4.0, PHYSICAL), ("loud outside ", 8.0, HIDDEN["outside"][2]):
+        for start, m, effects in (
+            ("loud ", 4.0, PHYSICAL),
+            ("loud outside ", 8.0, HIDDEN["outside"][2]),
+        ):
             if m in multiples:
-                yield from ((f"{start}{m:g} x", cases.loud(effect, m, salt, **settings)) for effect in effects)
+                yield from (
+                    (f"{start}{m:g} x", cases.loud(effect, m, salt, **settings))
+                    for effect in effects
+                )
     elif name == "pairs":
         for m in (m for m in PAIRED if m in multiples):
             yield f"{name} {m:g} x", cases.several(2, m, salt, **settings)
@@ -92,39 +110,66 @@ def rows_of(name: str, salt: int | None, multiples: Container[float], **settings
             yield f"{group}{multiple:g} x", cases.single(effect, multiple, salt, **settings)
 
 
-def planned(suites: Iterable[str], count: int, salt: int | None, multiples: Container[float], events: int) -> Iterator:
-    """(group, trial) of `count` data sets of each row, one of every row before the second of any."""
+def planned(
+    suites: Iterable[str], count: int, salt: int | None, multiples: Container[float], events: int
+) -> Iterator:
+    """(group, trial) of `count` data sets of each row, one of every row before the
+    second of any.
+    """
     rows = [row for name in suites for row in rows_of(name, salt, multiples, events=events)]
     for _ in range(count):
         yield from ((group, next(trials)) for group, trials in rows)
 
 
 def run(group: str, planned: cases.Planned, events: int, held: int) -> dict:
-    """One data set investigated, its last `held` events kept for validation. What fails is a row with its message."""
+    """One data set investigated, its last `held` events kept for validation. What fails is a row
+    with its message.
+    """
     from tractexp.discrepancy.investigate import investigate
     from tractexp.errors import UserError
     from tractexp.model.model import compose
     from tractexp.plugin import discover, get
     from tractexp.record import Record, detect
 
-    row = {"group": group, "label": planned.label, "seed": planned.seed, "events": events, "held": held}
+    row = {
+        "group": group,
+        "label": planned.label,
+        "seed": planned.seed,
+        "events": events,
+        "held": held,
+    }
     started = time.perf_counter()
     try:
         trial = planned.make()
     except (ValueError, ArithmeticError) as error:
-        return row | {"failed": f"{type(error).__name__}: {error}", "seconds": time.perf_counter() - started}
+        return row | {
+            "failed": f"{type(error).__name__}: {error}",
+            "seconds": time.perf_counter() - started,
+        }
     hidden = [name for name, _ in trial.case.hidden]
-    row |= {"truth": sorted((KNOWN | FAMILY).get(n, n) for n in hidden), "multiples": list(trial.multiples)}
+    row |= {
+        "truth": sorted((KNOWN | FAMILY).get(n, n) for n in hidden),
+        "multiples": list(trial.multiples),
+    }
     recorder = trial.case.recorder
-    row |= {"imperfect": bool(trial.case.imperfections), "noise": asdict(trial.case.noise), "rate": recorder.rate,
-            "window": recorder.pmu or recorder.phasor_window}  # fmt: skip
+    row |= {
+        "imperfect": bool(trial.case.imperfections),
+        "noise": asdict(trial.case.noise),
+        "rate": recorder.rate,
+        "window": recorder.pmu or recorder.phasor_window,
+    }
     only = []
     if group.startswith(LEFT_OUT):
         row["truth"], only = [], [n for n in discover()["effect"] if n not in hidden]
     try:
         records = make(trial.case, trial.seed)
-        seen = [detect(Record(f"event{k + 1}", **r, source=f"{k}").check()) for k, r in enumerate(records)]
-        model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+        seen = [
+            detect(Record(f"event{k + 1}", **r, source=f"{k}").check())
+            for k, r in enumerate(records)
+        ]
+        model = compose(
+            get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+        )
         row["generated"] = time.perf_counter() - started
         found = investigate(model, seen[: events - held], seen[events - held :], only=only, seed=0)
         row |= _counted(found) | _compared(found, trial)
@@ -151,7 +196,9 @@ def _counted(found) -> dict:
         "closed_held": None if found.validate is None else found.validate.closed,
         "explained": found.train.explained,
         "explained_held": None if found.validate is None else found.validate.explained,
-        "gain_held": None if found.validate is None else [found.validate.gain, found.validate.expected],
+        "gain_held": None
+        if found.validate is None
+        else [found.validate.gain, found.validate.expected],
         "left_of_all": None if found.assessment is None else found.assessment.p_left,
         "left": [s.p_left for s in found.explanations.steps],
         "left_by": found.last.left,
@@ -164,8 +211,9 @@ def _counted(found) -> dict:
 
 
 def _predicted(found) -> list[tuple[list[str], float]]:
-    """Sets that were fitted by least squares, the best first, and the model's error with each on held-out events; the
-    base model last. None where names went by the deviance."""
+    """Sets that were fitted by least squares, the best first, and the model's error with each on
+    held-out events; the base model last. None where names went by the deviance.
+    """
     if found.evidence.there is None:
         return []
     every = sorted(found.evidence.every, key=lambda row: row.prediction.left)
@@ -173,14 +221,21 @@ def _predicted(found) -> list[tuple[list[str], float]]:
 
 
 def _refits(found) -> list[tuple[list[str], float, int]]:
-    """Every set that the investigation fitted, under one noise: its names, by how much it lowers the deviance, and its
-    parameters. What other criteria choose among."""
+    """Every set that the investigation fitted, under one noise: its names, by how much it lowers
+    the deviance, and its parameters. What other criteria choose among.
+    """
     from tractexp.inference.fitting import refit
 
-    fits = refit(found.context, found.first.noise, [(f.names, f.unit) for f in found.explanations.refits.values()])
+    fits = refit(
+        found.context,
+        found.first.noise,
+        [(f.names, f.unit) for f in found.explanations.refits.values()],
+    )
     bare = next(f.deviance for f in fits if not f.names)
     textbook = found.catalogue.textbook
-    return [(sorted(set(textbook(f.names))), bare - f.deviance, f.parameters) for f in fits if f.names]
+    return [
+        (sorted(set(textbook(f.names))), bare - f.deviance, f.parameters) for f in fits if f.names
+    ]
 
 
 def _proposed(proposed) -> dict | None:
@@ -190,49 +245,74 @@ def _proposed(proposed) -> dict | None:
     content = to_dict(proposed, "")
     if content is None:
         return None
-    return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {"explained": content["explained"]}
+    return {k: content["terms"][0][k] for k in ("balance", "signal", "clock")} | {
+        "explained": content["explained"]
+    }
 
 
 def _compared(found, trial: cases.Trial) -> dict:
-    """What the product said, held against what was made: sizes, places, clean curves, and what was to be found."""
+    """What the product said, held against what was made: sizes, places, clean curves, and what was
+    to be found.
+    """
     from tractexp.discrepancy.discrepancy_json import parameters
 
     told = truth(trial.case, trial.seed)
-    row = {"places": len(found.places), "places_true": sum(_overlaps(p, told["where"]) for p in found.places)}
+    row = {
+        "places": len(found.places),
+        "places_true": sum(_overlaps(p, told["where"]) for p in found.places),
+    }
     hidden = [e["name"] for e in told["effects"]]
     if len(hidden) == 1 and list(found.names) == hidden and hidden[0] in SAME:
         own = parameters(found)[SAME[found.names[0]]]
-        row |= {"estimate": own["value"], "error": own["standard_error"], "amount": told["effects"][0]["amount"]}
+        row |= {
+            "estimate": own["value"],
+            "error": own["standard_error"],
+            "amount": told["effects"][0]["amount"],
+        }
     made = scene(trial.case, trial.seed)
     clean = _powers(made.records())
     if found.assessment is not None:
         other = found.assessment.context
         N = other.drive.samples
         sets = [(), found.names]  # members of families have kernels of their own
-        got = other.residuals_of(np.array(found.assessment.units), sets) + other.drive.measured - clean[:, -N:]
+        got = (
+            other.residuals_of(np.array(found.assessment.units), sets)
+            + other.drive.measured
+            - clean[:, -N:]
+        )
         before, after = np.sum(got**2, axis=(1, 2))
         row["closed_true"] = 1 - after / before
-    textbook = {name for name, _ in made.effects} & CATALOG.keys()  # a stranger may have the name of an effect of waves
+    # a stranger may have the name of an effect of waves
+    textbook = {name for name, _ in made.effects} & CATALOG.keys()
     if made.effects and not found.catalogue.untestable.keys() & textbook:
         without = _powers(replace(made, effects=()).records())
         N = found.context.drive.samples
         change = (clean - without)[:, :N]
         first = found.first
         projection = first.projection.of(found.context.whiten(first.noise, -change[None]))
-        row |= {"lambda": float(projection.r[0] @ projection.r[0]), "lambda_left": _left(found, clean[:, :N])}
+        row |= {
+            "lambda": float(projection.r[0] @ projection.r[0]),
+            "lambda_left": _left(found, clean[:, :N]),
+        }
     return row
 
 
 def _left(found, clean: np.ndarray) -> float:
-    """Non-centrality that the best effect of the catalogue leaves of clean curves (2, N), refitted to the noisy ones.
+    """Non-centrality that the best effect of the catalogue leaves of clean curves (2, N), refitted
+    to the noisy ones.
 
-    At its fit the problem is linear enough: what its parameters and the nuisances can still take is projected out.
+    At its fit the problem is linear enough: what its parameters and the nuisances can still take is
+    projected out.
     """
     from tractexp.discrepancy.explanations import search_effect_sets
     from tractexp.inference.linearization import tangent
 
     bench, first, refits = found.context, found.first, found.explanations.refits
-    singles = [f for names, f in refits.items() if len(names) == 1 and names == found.catalogue.textbook(names)]
+    singles = [
+        f
+        for names, f in refits.items()
+        if len(names) == 1 and names == found.catalogue.textbook(names)
+    ]
     singles = singles or search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
     left = []
     for fit in sorted(singles, key=lambda f: f.cost)[:BEST]:
@@ -251,40 +331,69 @@ def _powers(records: list[dict]) -> np.ndarray:
 def _overlaps(place, where: list[dict]) -> bool:
     """Whether a place that was found overlaps one in which something was changed."""
     return any(
-        place.event == f"event{w['event'] + 1}" and place.start <= w["end"] and place.end >= w["start"] for w in where
+        place.event == f"event{w['event'] + 1}"
+        and place.start <= w["end"]
+        and place.end >= w["start"]
+        for w in where
     )
 
 
 def commit_of(commit: str) -> str:
     """The whole hash of the commit that froze a judgement set, from which its seeds are drawn.
 
-    Refused where what judges or is judged has changed since, or is imported from another copy of the project.
+    Refused where what judges or is judged has changed since, or is imported from another copy of
+    the project.
     """
     git = ("git", "-C", str(ROOT))
-    told = subprocess.run([*git, "rev-parse", "--verify", f"{commit}^{{commit}}"], capture_output=True, text=True)
+    told = subprocess.run(
+        [*git, "rev-parse", "--verify", f"{commit}^{{commit}}"], capture_output=True, text=True
+    )
     if told.returncode:
-        raise SystemExit(f"there is no commit '{commit}' in {ROOT}; give that which froze product and generator")
+        raise SystemExit(
+            f"there is no commit '{commit}' in {ROOT}; give that which froze product and generator"
+        )
     for package in (tractexp, importlib.import_module("tractexp_plugins")):
         if (there := Path(str(package.__file__)).resolve().parents[1]) != ROOT.resolve():
-            raise SystemExit(f"{package.__name__} is that of {there}, not of {ROOT}: pip install -e {ROOT}")
+            raise SystemExit(
+                f"{package.__name__} is that of {there}, not of {ROOT}: pip install -e {ROOT}"
+            )
     changed = subprocess.run([*git, "diff", "--quiet", commit, "--", *FROZEN], check=False)
     if changed.returncode:
-        raise SystemExit(f"{', '.join(FROZEN)} have changed since {commit}: check that commit out, or freeze anew")
+        raise SystemExit(
+            f"{', '.join(FROZEN)} have changed since {commit}: check that commit out, or freeze"
+            " anew"
+        )
     return told.stdout.strip()
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--frozen", metavar="COMMIT", help="the judgement set of this commit; else the development set")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument(
+        "--frozen",
+        metavar="COMMIT",
+        help="the judgement set of this commit; else the development set",
+    )
     parser.add_argument("--suite", action="append", choices=SUITES, help="default: all")
     parser.add_argument("--count", type=int, default=5, help="data sets of each row")
-    parser.add_argument("--multiple", action="append", type=float, choices=cases.MULTIPLES, help="default: all")
+    parser.add_argument(
+        "--multiple", action="append", type=float, choices=cases.MULTIPLES, help="default: all"
+    )
     parser.add_argument("--events", type=int, default=3, help="events fitted")
     parser.add_argument("--held", type=int, default=1, help="events held out beside them")
     parser.add_argument("--jobs", type=int, default=2)
-    parser.add_argument("--out", type=Path, help="default: the judgement set, or outputs/hidden_effects.jsonl")
-    parser.add_argument("--minutes", type=float, default=1e9, help="begin no further trial after so long")
-    parser.add_argument("--docs", action="store_true", help="write tables and figures of the judgement set, and stop")
+    parser.add_argument(
+        "--out", type=Path, help="default: the judgement set, or outputs/hidden_effects.jsonl"
+    )
+    parser.add_argument(
+        "--minutes", type=float, default=1e9, help="begin no further trial after so long"
+    )
+    parser.add_argument(
+        "--docs",
+        action="store_true",
+        help="write tables and figures of the judgement set, and stop",
+    )
     chosen = parser.parse_args()
     out = chosen.out or (NEWEST if chosen.frozen else Path("outputs/hidden_effects.jsonl"))
     if chosen.docs:
@@ -300,17 +409,26 @@ def main() -> None:
     rows = evidence.read(out) if out.exists() else []
     done = {(r["group"], r["label"], r["seed"], r["events"], r["held"]) for r in rows}
     started, total = time.perf_counter(), chosen.events + chosen.held
-    trials = planned(chosen.suite or SUITES, chosen.count, salt, chosen.multiple or cases.MULTIPLES, total)
+    trials = planned(
+        chosen.suite or SUITES, chosen.count, salt, chosen.multiple or cases.MULTIPLES, total
+    )
     wanted = (t for t in trials if (t[0], t[1].label, t[1].seed, total, chosen.held) not in done)
-    in_time = itertools.takewhile(lambda _: time.perf_counter() - started < 60 * chosen.minutes, wanted)
+    in_time = itertools.takewhile(
+        lambda _: time.perf_counter() - started < 60 * chosen.minutes, wanted
+    )
     jobs = (delayed(run)(group, trial, total, chosen.held) for group, trial in in_time)
     with out.open("a") as file:
-        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(jobs):
+        for row in Parallel(n_jobs=chosen.jobs, return_as="generator_unordered", pre_dispatch=4)(
+            jobs
+        ):
             rows.append(files.plain(row | {"frozen": frozen}))
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             told = row.get("failed") or f"{row['verdict']} {' '.join(row['names'])}"
-            print(f"{row['group']}, {row['label']}, {row['seed']}: {told} ({row['seconds']:.1f} s)", flush=True)
+            print(
+                f"{row['group']}, {row['label']}, {row['seed']}: {told} ({row['seconds']:.1f} s)",
+                flush=True,
+            )
     print(evidence.tables(rows))
 
 

@@ -1,11 +1,15 @@
-"""What the kernels compiled by Numba gave for every model of the catalogue: made once, and kept as a test.
+"""What the kernels compiled by Numba gave for every model of the catalogue: made once, and kept as
+a test.
 
-    python benchmarks/kernel_reference.py --make [--processes 2]    with the commit whose kernels are the reference
-    python benchmarks/kernel_reference.py                           how far today's kernels are from it
+    python benchmarks/kernel_reference.py --make [--processes 2]
+        with the commit whose kernels are the reference
+    python benchmarks/kernel_reference.py
+        how far today's kernels are from it
 
-Each case is a model by names, 57 candidates (usual ones, ones from all of the bounds, ones far outside) and two events
-with gaps. Kept are each candidate's sums of squared errors and misses, and the responses of four at some samples.
-The 22 cases with a relay were made again when its law changed: by Numba's kernels, with today's plugin in that commit.
+Each case is a model by names, 57 candidates (usual ones, ones from all of the bounds, ones far
+outside) and two events with gaps. Kept are each candidate's sums of squared errors and misses, and
+the responses of four at some samples. The 22 cases with a relay were made again when its law
+changed: by Numba's kernels, with today's plugin in that commit.
 """
 
 import argparse
@@ -27,18 +31,27 @@ from tractexp.parameter import Parameter
 from tractexp.plugin import discover, get
 
 FILE = Path(__file__).parents[1] / "tests" / "model" / "kernel_reference.npz"
-LANES, SHOWN, EVERY = 57, (0, 7, 30, 56), 5  # candidates; those whose responses are kept, of which each such sample
+# candidates; those whose responses are kept, of which each such sample
+LANES, SHOWN, EVERY = 57, (0, 7, 30, 56), 5
 BASE = {PHASORS: ("electromechanical", "exponential"), WAVES: ("stator_flux", "branch")}
 SUBSTEPS = {PHASORS: (2, 3), WAVES: (4, 2)}
 PAIRS = (
-    ("speed_dependent_torque", "magnetic_saturation"), ("undervoltage_trip", "second_motor_group"),
-    ("feeder_impedance", "second_motor_group"), ("stator_resistance", "exponential_recovery"),
-    ("time_skew", "undervoltage_trip"), ("measurement_window", "load_change"),
-)  # fmt: skip
+    ("speed_dependent_torque", "magnetic_saturation"),
+    ("undervoltage_trip", "second_motor_group"),
+    ("feeder_impedance", "second_motor_group"),
+    ("stator_resistance", "exponential_recovery"),
+    ("time_skew", "undervoltage_trip"),
+    ("measurement_window", "load_change"),
+)
 SEVEN = (
-    "exponential_recovery", "feeder_impedance", "magnetic_saturation", "second_motor_group", "shunt_capacitor",
-    "speed_dependent_torque", "undervoltage_trip",
-)  # fmt: skip
+    "exponential_recovery",
+    "feeder_impedance",
+    "magnetic_saturation",
+    "second_motor_group",
+    "shunt_capacitor",
+    "speed_dependent_torque",
+    "undervoltage_trip",
+)
 LIBRARIES = ("answer", "timed")
 OMEGA = 2 * np.pi * 50.0
 
@@ -49,10 +62,15 @@ def cases() -> Iterator[dict[str, Any]]:
     for domain, (motor, static) in BASE.items():
         for m in sorted(known["model/motor"]):
             for s in sorted(known["model/static"]):
-                if m == motor or s == static or (m in ("double_cage", "mechanical") and s in ("zip", "none")):
+                if (
+                    m == motor
+                    or s == static
+                    or (m in ("double_cage", "mechanical") and s in ("zip", "none"))
+                ):
                     yield case(domain, m, s)
         for name in sorted(known["effect"]):
-            if name != "harmonics_source":  # fits more harmonics than these samples tell apart: rounding, magnified
+            # fits more harmonics than these samples tell apart: rounding, magnified
+            if name != "harmonics_source":
                 yield case(domain, motor, static, name)
         for names in (*PAIRS, SEVEN, ("injection",), *((f"library {kind}",) for kind in LIBRARIES)):
             yield case(domain, motor, static, *names)
@@ -61,8 +79,16 @@ def cases() -> Iterator[dict[str, Any]]:
         yield case(domain, motor, static, "undervoltage_trip", integration="printed")
 
 
-def case(domain: str, motor: str, static: str, *effects: str, integration: str = "classical") -> dict[str, Any]:
-    return {"domain": domain, "motor": motor, "static": static, "effects": effects, "integration": integration}
+def case(
+    domain: str, motor: str, static: str, *effects: str, integration: str = "classical"
+) -> dict[str, Any]:
+    return {
+        "domain": domain,
+        "motor": motor,
+        "static": static,
+        "effects": effects,
+        "integration": integration,
+    }
 
 
 def model(of: dict[str, Any]) -> Model:
@@ -92,8 +118,18 @@ def phasors(depth: float, step: float, samples: int, U0: float, speed: float) ->
     P, Q = 1 - 0.6 * shape + 0.05 * np.sin(40 * t), 0.6 - 0.4 * shape
     P[12:19] = Q[9:40:7] = np.nan
     return Excitation(
-        step, U0 * (1 - depth * shape), P, Q, U0, 1.0, 0.6, speed - 1.5 * shape, speed, U2=0.01 + 0.03 * shape, U20=0.01
-    )  # fmt: skip
+        step,
+        U0 * (1 - depth * shape),
+        P,
+        Q,
+        U0,
+        1.0,
+        0.6,
+        speed - 1.5 * shape,
+        speed,
+        U2=0.01 + 0.03 * shape,
+        U20=0.01,
+    )
 
 
 def waves(depth: float, negative: float, U0: float, length: float) -> WaveformDrive:
@@ -104,13 +140,25 @@ def waves(depth: float, negative: float, U0: float, length: float) -> WaveformDr
     currents = np.stack([turn.real * (1 - 0.3 * shape), turn.imag, 0.02 * shape])
     currents[0, 8:12] = np.nan
     return WaveformDrive(
-        step=1 / 1200, v=v, v_zero=0.03 * shape * np.sin(OMEGA * t), turn=turn, currents=currents, U=np.abs(v),
-        U2=negative * shape, U0=U0, P0=1.0, Q0=0.6, omega_s0=0.0, omega_n=OMEGA,
-    )  # fmt: skip
+        step=1 / 1200,
+        v=v,
+        v_zero=0.03 * shape * np.sin(OMEGA * t),
+        turn=turn,
+        currents=currents,
+        U=np.abs(v),
+        U2=negative * shape,
+        U0=U0,
+        P0=1.0,
+        Q0=0.6,
+        omega_s0=0.0,
+        omega_n=OMEGA,
+    )
 
 
 def candidates(of: Model, name: str) -> np.ndarray:
-    """57 candidates (57, d), exact in single precision: 25 usual ones, 20 from all of the bounds, 12 far outside."""
+    """57 candidates (57, d), exact in single precision: 25 usual ones, 20 from all of the bounds,
+    12 far outside.
+    """
     rng = np.random.default_rng(zlib.crc32(name.encode()))
     low, high = np.array([p.bounds for p in of.parameters]).T
     centre = np.array([_usual(p) for p in of.parameters])
@@ -129,10 +177,18 @@ def _usual(p: Parameter) -> float:
 
 
 def played(of: Model, values: np.ndarray, shown: bool = True) -> dict[str, np.ndarray]:
-    """What the kernel gives: sums (E, C, n), miss (E, n), and, if `shown`, outputs (C, 4, some) of a few candidates."""
-    driven, substeps = drive(of.domain), np.array(SUBSTEPS[of.domain] if of.integration == "classical" else (1, 1))
+    """What the kernel gives: sums (E, C, n), miss (E, n), and, if `shown`, outputs (C, 4, some) of
+    a few candidates.
+    """
+    driven, substeps = (
+        drive(of.domain),
+        np.array(SUBSTEPS[of.domain] if of.integration == "classical" else (1, 1)),
+    )
     with np.errstate(all="ignore"):
-        errors, response = of.errors(driven, values, substeps), of.simulate(driven, values, substeps)
+        errors, response = (
+            of.errors(driven, values, substeps),
+            of.simulate(driven, values, substeps),
+        )
     outputs = {"outputs": response.outputs[:, SHOWN, ::EVERY]} if shown else {}
     return {"sums": errors.sums, "miss": response.miss, **outputs}
 
@@ -151,7 +207,9 @@ def make(processes: int) -> None:
     every = [*cases()]
     rows = Parallel(n_jobs=processes, batch_size=1, verbose=5)(delayed(_made)(of) for of in every)
     kept = [row for row in rows if row is not None]
-    arrays = {f"{k}_{name}": array for k, (_, own) in enumerate(kept) for name, array in own.items()}
+    arrays = {
+        f"{k}_{name}": array for k, (_, own) in enumerate(kept) for name, array in own.items()
+    }
     np.savez_compressed(FILE, cases=np.array(json.dumps([of for of, _ in kept])), **arrays)
     print(f"{len(kept)} of {len(every)} cases compose; {FILE.stat().st_size / 1e6:.2f} MB")
 

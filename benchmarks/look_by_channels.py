@@ -1,7 +1,9 @@
-"""CPU seconds of a look by the number of channels: `python benchmarks/look_by_channels.py [samples]`.
+"""CPU seconds of a look by the number of channels: `python benchmarks/look_by_channels.py
+[samples]`.
 
-Stations of feeders on one bus, three voltages and three currents each, sampled at 4 kHz, with one dip. Reading the
-file is in it, starting Python and loading libraries are not. The slope is that of the logarithms between neighbors.
+Stations of feeders on one bus, three voltages and three currents each, sampled at 4 kHz, with one
+dip. Reading the file is in it, starting Python and loading libraries are not. The slope is that of
+the logarithms between neighbors.
 """
 
 import sys
@@ -37,7 +39,9 @@ def station(channels: int, samples: int) -> Recording:
         gain = 2.5 * size / 30000
         letter, unit, quantity = ("U", "kV", "voltage") if voltage else ("I", "kA", "current")
         name = f"F{feeder} {letter}{'ABC'[phase]}"
-        made.append(Channel(name, np.round(wave / gain).astype(np.int16), unit, quantity, gain=gain))
+        made.append(
+            Channel(name, np.round(wave / gain).astype(np.int16), unit, quantity, gain=gain)
+        )
     return Recording("station", made, [Segment(0, samples, RATE, 0.0)])
 
 

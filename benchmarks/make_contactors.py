@@ -1,8 +1,9 @@
 """Make the shipped set `contactors`: python benchmarks/make_contactors.py [--out DIR]
 
-The load of `make_tibet` with an effect that has nothing to do with the order of its machine: contactors that drop out
-in a dip and come back along a ramp. It comes from the simulator in `hidden_effects`, whose relay runs on the clean
-voltage with timers of its own and shares nothing with the effect of the catalogue; docs/data.md tells more.
+The load of `make_tibet` with an effect that has nothing to do with the order of its machine:
+contactors that drop out in a dip and come back along a ramp. It comes from the simulator in
+`hidden_effects`, whose relay runs on the clean voltage with timers of its own and shares nothing
+with the effect of the catalogue; docs/data.md tells more.
 """
 
 import json
@@ -15,10 +16,17 @@ import oracle  # noqa: F401
 from hidden_effects import Case, Noise, Recorder, make, truth
 
 MADE_BY = "benchmarks/make_contactors.py"
-NOTE = "synthetic: simulated with an independent machine, a relay with timers and a noisy recorder, measured nowhere"
+NOTE = (
+    "synthetic: simulated with an independent machine, a relay with timers and a noisy recorder,"
+    " measured nowhere"
+)
 SEED = 19  # draws the level and the times of the relay, and the noise
-NAMES = {f"contactors_{depth}": dip for depth, (_, dip) in
-         ((name.removeprefix("tibet_"), made) for name, made in make_tibet.DIPS.items())}  # fmt: skip
+NAMES = {
+    f"contactors_{depth}": dip
+    for depth, (_, dip) in (
+        (name.removeprefix("tibet_"), made) for name, made in make_tibet.DIPS.items()
+    )
+}
 CASE = Case(
     effect="undervoltage_trip",
     size=2.0,  # a tenth of the load
@@ -49,11 +57,16 @@ def sidecar(name: str, event: int) -> dict[str, object]:
 
 
 def write(folder: Path) -> list[Path]:
-    """Write the three records and their sidecars into `folder`, made if need be, and return their paths."""
+    """Write the three records and their sidecars into `folder`, made if need be, and return their
+    paths.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for event, (name, columns) in enumerate(zip(NAMES, make(CASE, SEED), strict=True)):
-        contents = {".csv": make_tibet.table(columns), ".json": json.dumps(sidecar(name, event), indent=2) + "\n"}
+        contents = {
+            ".csv": make_tibet.table(columns),
+            ".json": json.dumps(sidecar(name, event), indent=2) + "\n",
+        }
         for suffix, text in contents.items():
             written.append(folder / f"{name}{suffix}")
             written[-1].write_bytes(text.encode())

@@ -1,4 +1,6 @@
-"""Text in a page of the docs that is generated from a stored result, between two marks that name the script."""
+"""Text in a page of the docs that is generated from a stored result, between two marks that name
+the script.
+"""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -8,7 +10,9 @@ from tractexp import files
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """A Markdown table."""
-    return "\n".join("| " + " | ".join(map(str, row)) + " |" for row in (head, ["---"] * len(head), *rows))
+    return "\n".join(
+        "| " + " | ".join(map(str, row)) + " |" for row in (head, ["---"] * len(head), *rows)
+    )
 
 
 def marks(name: str) -> tuple[str, str]:
@@ -17,7 +21,9 @@ def marks(name: str) -> tuple[str, str]:
 
 
 def parted(page: str, name: str) -> tuple[str, str, str]:
-    """What stands before, between and after the marks of `name`. Raises `ValueError` where they are missing."""
+    """What stands before, between and after the marks of `name`. Raises `ValueError` where they are
+    missing.
+    """
     first, last = marks(name)
     before, begins, rest = page.partition(first)
     text, ends, after = rest.partition(last)

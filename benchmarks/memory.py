@@ -1,4 +1,6 @@
-"""The greatest memory of this process, on Linux; `ru_maxrss` starts at what the parent process had."""
+"""The greatest memory of this process, on Linux; `ru_maxrss` starts at what the parent
+process had.
+"""
 
 from pathlib import Path
 
@@ -11,5 +13,7 @@ def reset():
 
 def peak():
     """Peak resident memory [MB] since `reset`."""
-    line = next(one for one in Path("/proc/self/status").read_text().splitlines() if one.startswith("VmHWM"))
+    line = next(
+        one for one in Path("/proc/self/status").read_text().splitlines() if one.startswith("VmHWM")
+    )
     return int(line.split()[1]) / 1024

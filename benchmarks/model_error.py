@@ -1,13 +1,16 @@
-"""Is the estimate good where the model is not exact? python benchmarks/model_error.py --only andes --count 40
+"""Is the estimate good where the model is not exact? python benchmarks/model_error.py --only andes
+--count 40
 
-Each data set is identified by the public call, some events fitted and others held out, and judged against what is known
-of it: `andes` sets of `andes_loads` by two models (of a double cage by one that lacks it); `null` and `effect` from the
-generator `hidden_effects`, nothing missing or one effect at multiples of its detection limit, three events, one held
-out; `record`, those at hand, real ones and shipped ones, whose truth is not known. Stored for each: estimate, intervals
-and errors, where the search ended, Eq. (8) of both, and the error in S: rms of calculated less measured power over the
-rms of how far it moved from what it was before, from the dip's start on, of each event at both. Rows are appended to a
-file, so that a study goes on where it stopped; `--tables` prints what is stored. Thresholds may be looked at on the
-series `calibration`; its seeds are never those of the series `final`, which is reported.
+Each data set is identified by the public call, some events fitted and others held out, and judged
+against what is known of it: `andes` sets of `andes_loads` by two models (of a double cage by one
+that lacks it); `null` and `effect` from the generator `hidden_effects`, nothing missing or one
+effect at multiples of its detection limit, three events, one held out; `record`, those at hand,
+real ones and shipped ones, whose truth is not known. Stored for each: estimate, intervals and
+errors, where the search ended, Eq. (8) of both, and the error in S: rms of calculated less measured
+power over the rms of how far it moved from what it was before, from the dip's start on, of each
+event at both. Rows are appended to a file, so that a study goes on where it stopped; `--tables`
+prints what is stored. Thresholds may be looked at on the series `calibration`; its seeds are never
+those of the series `final`, which is reported.
 """
 
 import argparse
@@ -40,12 +43,15 @@ KINDS = ("record", "andes", "null", "effect")
 EXPONENTIAL, ZIP = "third_order_exponential", "third_order_zip"
 MULTIPLES = (1.0, 2.0, 4.0, 8.0)
 EVENTS, TRAIN = 3, 2  # of a generated data set
-BLOCK, CYCLE, BLOCKS = 0.1, 0.02, 10  # s, s: residuals of a block are one observation, fewer than ten are no sample
+# s, s: residuals of a block are one observation, fewer than ten are no sample
+BLOCK, CYCLE, BLOCKS = 0.1, 0.02, 10
 
 
 @dataclass(frozen=True)
 class Data:
-    """Events to fit and to hold out, the truth where it is known, and what a row says of them beside."""
+    """Events to fit and to hold out, the truth where it is known, and what a row says of them
+    beside.
+    """
 
     train: Sequence[Any]
     validate: Sequence[Any]
@@ -56,7 +62,9 @@ class Data:
 
 @dataclass(frozen=True)
 class Task:
-    """One identification. `name` and `seed` say of which data set; `multiple` is of the detection limit."""
+    """One identification. `name` and `seed` say of which data set; `multiple` is of the detection
+    limit.
+    """
 
     kind: str
     name: str
@@ -70,8 +78,12 @@ class Task:
         return f"{self.series}|{self.kind}|{self.name}|{self.model}|{self.multiple:g}|{self.seed}"
 
 
-def tasks(series: str, count: int, multiples: Sequence[float], models: Sequence[str]) -> Iterator[Task]:
-    """Every identification of a series: `count` ANDES sets, nulls, and data sets of each effect at each multiple."""
+def tasks(
+    series: str, count: int, multiples: Sequence[float], models: Sequence[str]
+) -> Iterator[Task]:
+    """Every identification of a series: `count` ANDES sets, nulls, and data sets of each effect at
+    each multiple.
+    """
     for name, model in itertools.product(RECORDS, models):
         if model == EXPONENTIAL or name.startswith("andes"):
             yield Task("record", name, model)
@@ -79,14 +91,18 @@ def tasks(series: str, count: int, multiples: Sequence[float], models: Sequence[
         yield Task("andes", "set", model, number, series=series)
     noises = itertools.islice(itertools.cycle(cases.NOISES), count)
     seeds = {noise: cases.seeds(f"model error {series} null {noise}") for noise in cases.NOISES}
-    yield from (Task("null", noise, EXPONENTIAL, next(seeds[noise]), series=series) for noise in noises)
+    yield from (
+        Task("null", noise, EXPONENTIAL, next(seeds[noise]), series=series) for noise in noises
+    )
     for multiple, name in itertools.product(multiples, (*CATALOG, *OUTSIDE)):
         some = itertools.islice(cases.seeds(f"model error {series} {name} {multiple:g}"), count)
         yield from (Task("effect", name, EXPONENTIAL, seed, multiple, series) for seed in some)
 
 
 def data_of(task: Task, shared: Path = SHARED) -> Data:
-    """The data set of a task; FileNotFoundError or UserError, with the reason, where it cannot be had."""
+    """The data set of a task; FileNotFoundError or UserError, with the reason, where it cannot be
+    had.
+    """
     if task.kind == "record":
         return RECORDS[task.name](shared)
     return andes_set(task) if task.kind == "andes" else generator_set(task)
@@ -107,17 +123,23 @@ def andes_set(task: Task) -> Data:
 
 
 def floor(values: dict[str, float], events: Sequence[Any]) -> float:
-    """Error in S at the truth of the third order with its ZIP load: what sampling and stator resistance leave."""
+    """Error in S at the truth of the third order with its ZIP load: what sampling and stator
+    resistance leave.
+    """
     import tractexp
 
     model = tractexp.compose(ZIP)
-    simulation = tractexp.simulate(model, {name: values[name] for name in model.parameters}, records=list(events))
+    simulation = tractexp.simulate(
+        model, {name: values[name] for name in model.parameters}, records=list(events)
+    )
     squares = [Compared.of(e, r) for e, r in zip(events, simulation.responses, strict=True)]
     return overall(squares)
 
 
 def generator_set(task: Task) -> Data:
-    """Nothing missing under one of the generator's noises, or an effect at a multiple of its detection limit."""
+    """Nothing missing under one of the generator's noises, or an effect at a multiple of its
+    detection limit.
+    """
     if task.kind == "null":
         return events_of(Case(noise=cases.NOISES[task.name], events=EVENTS), task.seed)
     trial = cases.at_limit((task.name,), task.multiple, task.seed, events=EVENTS)
@@ -128,8 +150,13 @@ def events_of(case: Case, seed: int, multiple: float = 0.0) -> Data:
     """The events of a case of the generator, the last one held out."""
     import tractexp
 
-    events = [tractexp.read(**columns, name=f"event{k}")[0] for k, columns in enumerate(make(case, seed), 1)]
-    return Data(events[:TRAIN], events[TRAIN:], truth(case, seed)["load"], {"multiple_hidden": multiple})
+    events = [
+        tractexp.read(**columns, name=f"event{k}")[0]
+        for k, columns in enumerate(make(case, seed), 1)
+    ]
+    return Data(
+        events[:TRAIN], events[TRAIN:], truth(case, seed)["load"], {"multiple_hidden": multiple}
+    )
 
 
 def andes_dips(shared: Path) -> Data:
@@ -140,12 +167,23 @@ def andes_dips(shared: Path) -> Data:
     for letter in "abc":
         path = shared / "cases" / "andes" / f"dip_{letter}.csv"
         t, U, P, Q, f = np.loadtxt(path, delimiter=",", skiprows=1).T
-        events += tractexp.read(t=t, U=U, P=P / 5.05, Q=Q / 5.05, f=f, name=path.stem, frequency=60.0)
-    values = {"T_prime": 0.0411, "X_prime": 0.363, "C": 0.938, "M": 0.00221, "T_m": 0.4156, "p_v": 1.3}
+        events += tractexp.read(
+            t=t, U=U, P=P / 5.05, Q=Q / 5.05, f=f, name=path.stem, frequency=60.0
+        )
+    values = {
+        "T_prime": 0.0411,
+        "X_prime": 0.363,
+        "C": 0.938,
+        "M": 0.00221,
+        "T_m": 0.4156,
+        "p_v": 1.3,
+    }
     return Data(events[:1], events[1:], values, {})
 
 
-def station(voltages: Sequence[int], currents: Sequence[int], domain: str | None) -> Callable[[Path], Data]:
+def station(
+    voltages: Sequence[int], currents: Sequence[int], domain: str | None
+) -> Callable[[Path], Data]:
     """A transformer of station xtz: its first dip fitted, its second held out."""
 
     def data(shared: Path) -> Data:
@@ -159,13 +197,18 @@ def station(voltages: Sequence[int], currents: Sequence[int], domain: str | None
 
 
 def pole_slip(currents: Sequence[int]) -> Callable[[Path], Data]:
-    """A feeder of the 110 kV station: the first of its steady swings fitted, the two after it held out."""
+    """A feeder of the 110 kV station: the first of its steady swings fitted, the two after it held
+    out.
+    """
 
     def data(shared: Path) -> Data:
         import tractexp
 
         path = shared / "data" / "async110kv-wisp" / "async110.cfg"
-        dips = {e.record.name: e for e in tractexp.read(path_of(path), voltages=[0, 1, 2], currents=currents)}
+        dips = {
+            e.record.name: e
+            for e in tractexp.read(path_of(path), voltages=[0, 1, 2], currents=currents)
+        }
         events = [dips[f"async110_dip{k}"] for k in (15, 16, 17)]
         return Data(events[:1], events[1:], {}, {})
 
@@ -216,7 +259,9 @@ RECORDS: dict[str, Callable[[Path], Data]] = {
 
 @dataclass(frozen=True, eq=False)
 class Compared:
-    """Squares [pu²] from the dip's start on, (N,) each: of what is missed in S, and of how far S moved; t [s]."""
+    """Squares [pu²] from the dip's start on, (N,) each: of what is missed in S, and of how far S
+    moved; t [s].
+    """
 
     t: np.ndarray
     missed: np.ndarray
@@ -238,15 +283,21 @@ class Compared:
 
 def overall(some: Sequence[Compared]) -> float:
     """The error in S over several events."""
-    missed, moved = (np.concatenate([getattr(one, name) for one in some]) for name in ("missed", "moved"))
+    missed, moved = (
+        np.concatenate([getattr(one, name) for one in some]) for name in ("missed", "moved")
+    )
     return float(np.sqrt(missed.mean() / moved.mean()))
 
 
-def block_difference(estimate: Sequence[Compared], search: Sequence[Compared]) -> tuple[float, float, float]:
-    """Mean difference of the squared error in S (estimate less search), its standard error, and the search's mean.
+def block_difference(
+    estimate: Sequence[Compared], search: Sequence[Compared]
+) -> tuple[float, float, float]:
+    """Mean difference of the squared error in S (estimate less search), its standard error, and the
+    search's mean.
 
-    All over the mean square of how far S moved. Differences are paired by sample and averaged over blocks of 0.1 s,
-    whose scatter gives the standard error; of a short record over tenths of it, but no less than a cycle.
+    All over the mean square of how far S moved. Differences are paired by sample and averaged over
+    blocks of 0.1 s, whose scatter gives the standard error; of a short record over tenths of it,
+    but no less than a cycle.
     """
     means, sizes = [], []
     block = float(np.clip(min(one.t[-1] - one.t[0] for one in search) / BLOCKS, CYCLE, BLOCK))
@@ -258,14 +309,17 @@ def block_difference(estimate: Sequence[Compared], search: Sequence[Compared]) -
     weight = np.array(sizes) / np.sum(sizes)
     mean = float(weight @ means)
     blocks = np.count_nonzero(weight)
-    deviation = float(np.sqrt(np.sum(weight**2 * (np.array(means) - mean) ** 2) * blocks / max(blocks - 1, 1)))
+    deviation = float(
+        np.sqrt(np.sum(weight**2 * (np.array(means) - mean) ** 2) * blocks / max(blocks - 1, 1))
+    )
     moved = float(np.concatenate([one.moved for one in search]).mean())
     missed = float(np.concatenate([one.missed for one in search]).mean())
     return mean / moved, deviation / moved, missed / moved
 
 
 def worse_than_chance(estimate: Sequence[Compared], search: Sequence[Compared]) -> bool:
-    """Whether the estimate is worse by more than chance explains, and by more than 1 % of the error.
+    """Whether the estimate is worse by more than chance explains, and by more than 1 % of the
+    error.
 
     The mean difference exceeds twice its standard error, and the error in S grows by more than 1 %.
     """
@@ -277,7 +331,13 @@ def run(task: Task, shared: Path = SHARED) -> dict[str, Any]:
     """One data set identified. What fails, or is absent, is a row with its message."""
     from tractexp.errors import UserError
 
-    row = {"key": task.key, "kind": task.kind, "name": task.name, "model": task.model, "seed": task.seed}
+    row = {
+        "key": task.key,
+        "kind": task.kind,
+        "name": task.name,
+        "model": task.model,
+        "seed": task.seed,
+    }
     row |= {"multiple": task.multiple, "series": task.series}
     try:
         data = data_of(task, shared)
@@ -296,13 +356,21 @@ def judgement(task: Task, data: Data) -> dict[str, Any]:
     fit, wall, cpu = identification(task, data)
     result = fit.result
     content = {
-        "wall": wall, "cpu": cpu, "grade": fit.grade, "headline": fit.headline, "parameters": result.parameters,
-        "errors": result.standard_errors, "intervals": result.intervals, "at_bound": result.at_bound,
+        "wall": wall,
+        "cpu": cpu,
+        "grade": fit.grade,
+        "headline": fit.headline,
+        "parameters": result.parameters,
+        "errors": result.standard_errors,
+        "intervals": result.intervals,
+        "at_bound": result.at_bound,
         "verdicts": {name: verdict.partition(" (")[0] for name, verdict in result.verdicts.items()},
-        "objective": result.objective, "epsilon": [result.epsilon_p, result.epsilon_q],
+        "objective": result.objective,
+        "epsilon": [result.epsilon_p, result.epsilon_q],
         "search": {key: result.search[key] for key in ("parameters", "objective", "at_bound")},
-        "model_error": getattr(result, "model_error", None), "truth": data.truth,
-    }  # fmt: skip
+        "model_error": getattr(result, "model_error", None),
+        "truth": data.truth,
+    }
     return content | size_of_error(fit, data)
 
 
@@ -312,14 +380,19 @@ def identification(task: Task, data: Data) -> tuple[Any, float, float]:
 
     wall, cpu = time.perf_counter(), time.process_time()
     fit = tractexp.identify(
-        data.train, model=task.model, validate=data.validate, domain=data.domain,
-        optimizer="multistart_least_squares", progress=False,
-    )  # fmt: skip
+        data.train,
+        model=task.model,
+        validate=data.validate,
+        domain=data.domain,
+        optimizer="multistart_least_squares",
+        progress=False,
+    )
     return fit, time.perf_counter() - wall, time.process_time() - cpu
 
 
 def comparisons(fit: Any, data: Data) -> dict[str, tuple[list[Compared], list[Compared]]]:
-    """Of the fitted, of the held-out and of all events: at the estimate, and where the search ended.
+    """Of the fitted, of the held-out and of all events: at the estimate, and where the search
+    ended.
 
     An event that one of them gives no steady state raises `UserError`.
     """
@@ -329,15 +402,27 @@ def comparisons(fit: Any, data: Data) -> dict[str, tuple[list[Compared], list[Co
     for role, events in (("train", data.train), ("validate", data.validate)):
         if not events:
             continue
-        simulation = tractexp.simulate(fit.model, fit.result.search["parameters"], records=list(events)).responses
+        simulation = tractexp.simulate(
+            fit.model, fit.result.search["parameters"], records=list(events)
+        ).responses
         here = [Compared.of(event, fit.predict(event)) for event in events]
-        sides[role] = here, [Compared.of(event, response) for event, response in zip(events, simulation, strict=True)]
-    here, there = (list(itertools.chain.from_iterable(some)) for some in zip(*sides.values(), strict=True))
+        sides[role] = (
+            here,
+            [
+                Compared.of(event, response)
+                for event, response in zip(events, simulation, strict=True)
+            ],
+        )
+    here, there = (
+        list(itertools.chain.from_iterable(some)) for some in zip(*sides.values(), strict=True)
+    )
     return sides | {"all": (here, there)}
 
 
 def size_of_error(fit: Any, data: Data) -> dict[str, Any]:
-    """The error in S of each event, at the estimate and where the search ended, and whether chance explains more."""
+    """The error in S of each event, at the estimate and where the search ended, and whether chance
+    explains more.
+    """
     content: dict[str, Any] = {"S": {}, "chance": {}}
     for role, (here, there) in comparisons(fit, data).items():
         sides = {"estimate": here, "search": there}
@@ -362,20 +447,34 @@ def six_digits(value: Any) -> Any:
 
 def rows_of(path: Path) -> list[dict[str, Any]]:
     """The rows of a file; none where it is absent."""
-    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+    return (
+        [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+        if path.exists()
+        else []
+    )
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--series", default="calibration", help="of seeds")
-    parser.add_argument("--count", type=int, default=8, help="ANDES sets, nulls, and data sets of each effect")
-    parser.add_argument("--only", nargs="*", default=KINDS, help=f"kinds ({', '.join(KINDS)}) or names of data sets")
-    parser.add_argument("--multiples", nargs="*", type=float, default=MULTIPLES, help="of the detection limit")
+    parser.add_argument(
+        "--count", type=int, default=8, help="ANDES sets, nulls, and data sets of each effect"
+    )
+    parser.add_argument(
+        "--only", nargs="*", default=KINDS, help=f"kinds ({', '.join(KINDS)}) or names of data sets"
+    )
+    parser.add_argument(
+        "--multiples", nargs="*", type=float, default=MULTIPLES, help="of the detection limit"
+    )
     parser.add_argument("--models", nargs="*", default=(EXPONENTIAL, ZIP), help="of ANDES sets")
     parser.add_argument("--shared", type=Path, default=SHARED, help="folder of the records at hand")
     parser.add_argument("--out", type=Path, default=Path("model_error.jsonl"))
-    parser.add_argument("--tables", action="store_true", help="print what is stored, and run nothing")
-    parser.add_argument("--against", type=Path, help="a file of rows before: how far estimates moved")
+    parser.add_argument(
+        "--tables", action="store_true", help="print what is stored, and run nothing"
+    )
+    parser.add_argument(
+        "--against", type=Path, help="a file of rows before: how far estimates moved"
+    )
     options = parser.parse_args()
     rows = rows_of(options.out)
     if options.tables:

@@ -1,9 +1,11 @@
-"""Play a dip through motulator's induction machine: run by a Python that has it (see motulator_check.py).
+"""Play a dip through motulator's induction machine: run by a Python that has it (see
+motulator_check.py).
 
     python motulator_run.py case.json response.npz
 
-`case.json` holds the machine in SI units, the load torque, the voltage's peak, the frequency and the sampling rate. The
-equations and their state are motulator's; SciPy integrates them. Written: t, and the space vectors u and i [V, A].
+`case.json` holds the machine in SI units, the load torque, the voltage's peak, the frequency and
+the sampling rate. The equations and their state are motulator's; SciPy integrates them. Written: t,
+and the space vectors u and i [V, A].
 """
 
 import json
@@ -19,7 +21,10 @@ from scipy.optimize import root
 def voltage(t, case):
     """A dip to 0.55 with a jump of the angle and a negative sequence, between 0 and 0.1 s [V]."""
     smooth = lambda x: 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0, 1))  # noqa: E731
-    there, turn = smooth(t / 0.004) - smooth((t - 0.1) / 0.004), np.exp(2j * np.pi * case["frequency"] * t)
+    there, turn = (
+        smooth(t / 0.004) - smooth((t - 0.1) / 0.004),
+        np.exp(2j * np.pi * case["frequency"] * t),
+    )
     return case["peak"] * ((1 - 0.45 * there) * np.exp(0.5j * there) * turn + 0.2 * there / turn)
 
 
@@ -28,7 +33,9 @@ class Drive:
 
     def __init__(self, case):
         self.case = case
-        self.machine = InductionMachine(SimpleNamespace(**{k: case[k] for k in ("n_p", "R_s", "R_r", "L_ell", "L_s")}))
+        self.machine = InductionMachine(
+            SimpleNamespace(**{k: case[k] for k in ("n_p", "R_s", "R_r", "L_ell", "L_s")})
+        )
         self.shaft = StiffMechanicalSystem(J=case["J"], tau_L=lambda t: case["torque"] + 0 * t)
 
     def rates(self, t, psi_s, psi_r, speed, u):
@@ -65,7 +72,9 @@ class Drive:
             return np.array(rates, dtype=complex)
 
         start = np.array([psi_s * turn, psi_r * turn, speed], dtype=complex)
-        y = solve_ivp(rhs, (t[0], t[-1]), start, "DOP853", t, rtol=1e-10, atol=1e-10, max_step=1e-3).y
+        y = solve_ivp(
+            rhs, (t[0], t[-1]), start, "DOP853", t, rtol=1e-10, atol=1e-10, max_step=1e-3
+        ).y
         return y[0] / self.case["L_s"] + (y[0] - y[1]) / self.case["L_ell"]
 
 

@@ -1,10 +1,11 @@
 """What becomes of damaged files: `python benchmarks/mutated_files.py [--count 10000] [--seed 1]`.
 
-One small record, written in every format that is read, is damaged in ways that happen to files - bits, bytes, digits,
-fields and lines changed, lost, doubled or swapped, files cut - and given to `tractexp.read` in a process of its own.
-Allowed is a reading, or one sentence. Not allowed: another exception, a warning, words of Python in what a user reads,
-more than 5 s of a processor, more than 500 MB (a workbook's rows come from a process whose own memory is limited).
-Counts and worst figures go to mutated_files.json; the exit code says whether all held.
+One small record, written in every format that is read, is damaged in ways that happen to files -
+bits, bytes, digits, fields and lines changed, lost, doubled or swapped, files cut - and given to
+`tractexp.read` in a process of its own. Allowed is a reading, or one sentence. Not allowed: another
+exception, a warning, words of Python in what a user reads, more than 5 s of a processor, more than
+500 MB (a workbook's rows come from a process whose own memory is limited). Counts and worst figures
+go to mutated_files.json; the exit code says whether all held.
 """
 
 import argparse
@@ -37,15 +38,45 @@ from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noq
 
 SECONDS, MEGABYTES = 5.0, 500.0
 LEAKS = re.compile(
-    r"invalid literal|could not convert|list index|out of bounds|NoneType|codec|unpack|month must be|Traceback"
-    r"|object is not|expected str|Error:|Exception|<class|broadcast|dtype|\bndarray|not subscriptable"
-    r"|unsupported operand|must be real|keyword argument|positional|has no attribute|cannot reshape|integer division"
+    r"invalid literal|could not convert|list index|out of bounds|NoneType|codec|unpack|month must"
+    r" be|Traceback"
+    r"|object is not|expected str|Error:|Exception|<class|broadcast|dtype|\bndarray|not"
+    r" subscriptable"
+    r"|unsupported operand|must be real|keyword argument|positional|has no attribute|cannot"
+    r" reshape|integer division"
     r"|zero-size|lambda|recursion|surrogate|ordinal not|null byte|embedded|is out of range for"
     r"|int\(\)|float\(\)|year \d+ is out"
 )
-NASTY = ["nan", "inf", "-inf", "1e308", "-1", "0", "", " ", "abc", "99999999999", "1e-320", "２", "1_0", "0x10", "1;5",
-         "NULL", "#N/A", "32768", "-32768", "99999", "é", '"', "1,5", "4294967296", "2000000000", "1e99",
-         "A", "D"]  # fmt: skip
+NASTY = [
+    "nan",
+    "inf",
+    "-inf",
+    "1e308",
+    "-1",
+    "0",
+    "",
+    " ",
+    "abc",
+    "99999999999",
+    "1e-320",
+    "２",
+    "1_0",
+    "0x10",
+    "1;5",
+    "NULL",
+    "#N/A",
+    "32768",
+    "-32768",
+    "99999",
+    "é",
+    '"',
+    "1,5",
+    "4294967296",
+    "2000000000",
+    "1e99",
+    "A",
+    "D",
+]
 
 
 def record():
@@ -61,12 +92,19 @@ def record():
         Channel(f"I{p}", np.round(i).astype(np.int16), "A", "current", p, "Feeder", 0.02)
         for p, i in zip("abc", amperes, strict=True)
     ]
-    states = [StatusChannel("trip", (t > 0.31).astype(int)), StatusChannel("close", (t > 0.5).astype(int))]
-    return Recording("made", channels, [Segment(0, 1280, 1600.0, 0.0)], 50.0, "Station", "device", status=states)
+    states = [
+        StatusChannel("trip", (t > 0.31).astype(int)),
+        StatusChannel("close", (t > 0.5).astype(int)),
+    ]
+    return Recording(
+        "made", channels, [Segment(0, 1280, 1600.0, 0.0)], 50.0, "Station", "device", status=states
+    )
 
 
 def event_report(made, every=1):
-    """The record as an SEL relay's compressed event report; filtered, of 4 samples a cycle, with `every` 8."""
+    """The record as an SEL relay's compressed event report; filtered, of 4 samples a cycle, with
+    `every` 8.
+    """
 
     def row(*cells):
         text = "".join(f"{cell}," for cell in cells)
@@ -82,8 +120,14 @@ def event_report(made, every=1):
         row('"FREQ"', '"SAM/CYC_A"', '"SAM/CYC_D"', '"EVENT"'),
         row(50, 32 // every, 4, '"ER"'),
     ]
-    lines += [row('"IA"', '"IB"', '"IC"', '"VA(kV)"', '"VB(kV)"', '"VC(kV)"', '"TRIG"', '"51P * TRIP 52A"')]
-    values = np.array([made.channels[k].values() * (1e3 if k > 2 else 1) for k in (3, 4, 5, 0, 1, 2)]).T / np.sqrt(2)
+    lines += [
+        row(
+            '"IA"', '"IB"', '"IC"', '"VA(kV)"', '"VB(kV)"', '"VC(kV)"', '"TRIG"', '"51P * TRIP 52A"'
+        )
+    ]
+    values = np.array(
+        [made.channels[k].values() * (1e3 if k > 2 else 1) for k in (3, 4, 5, 0, 1, 2)]
+    ).T / np.sqrt(2)
     for i, cells in enumerate(values[::every]):
         word = "" if i % 8 else '"B0"' if i > 490 else '"80"'
         lines.append(row(*(f"{x:.2f}" for x in cells), ">" if i == 480 // every else "", word))
@@ -91,17 +135,27 @@ def event_report(made, every=1):
 
 
 def quality_files(made, columns):
-    """The record as PQDIF: {name: bytes} of its waveforms, compressed and not, and of a log of its powers."""
+    """The record as PQDIF: {name: bytes} of its waveforms, compressed and not, and of a log of its
+    powers.
+    """
     letters, when = {"voltage": "V", "current": "A"}, datetime(2024, 5, 17, 8, 30)
     waves = [
-        made_pqdif.definition(c.name, "abc".index(c.phase) + 1, letters[c.quantity], group=c.circuit)
+        made_pqdif.definition(
+            c.name, "abc".index(c.phase) + 1, letters[c.quantity], group=c.circuit
+        )
         for c in made.channels
     ]
     rows = [
-        made_pqdif.instance(k, 0 if k else [1, made.samples, 1 / 1600], c.raw, 1e3 * c.gain * c.factor)
+        made_pqdif.instance(
+            k, 0 if k else [1, made.samples, 1 / 1600], c.raw, 1e3 * c.gain * c.factor
+        )
         for k, c in enumerate(made.channels)
     ]
-    captured = [made_pqdif.source(*waves), made_pqdif.settings(), made_pqdif.observation(when, *rows)]
+    captured = [
+        made_pqdif.source(*waves),
+        made_pqdif.settings(),
+        made_pqdif.observation(when, *rows),
+    ]
     logged = [
         made_pqdif.definition(name, phase, unit, "log", scaled=False)
         for name, phase, unit in (("U", 15, "V"), ("P", 13, "W"), ("Q", 13, "var"))
@@ -110,7 +164,9 @@ def quality_files(made, columns):
         made_pqdif.instance(k, [1, len(columns["t"]), 1 / 400], scale * columns[name], dtype="<f4")
         for k, (name, scale) in enumerate((("U", 27.5e3), ("P", 20e6), ("Q", 20e6)))
     ]
-    powers = made_pqdif.file([made_pqdif.source(*logged), made_pqdif.observation(when, *log)], compressed=False)
+    powers = made_pqdif.file(
+        [made_pqdif.source(*logged), made_pqdif.observation(when, *log)], compressed=False
+    )
     return {
         "PQDIF": made_pqdif.file(captured),
         "PQDIF uncompressed": made_pqdif.file(captured, compressed=False),
@@ -123,20 +179,29 @@ def tables(made):
     t = np.arange(400) / 400
     U = np.where((t >= 0.3) & (t < 0.45), 0.7, 1.0)
     columns = {"t": t, "U": U, "P": 0.9 * U**1.5, "Q": 0.3 * U**2}
-    waves = {"t": made.segments[0].t} | {c.name.lower(): 1e3 * c.values() for c in made.channels}  # V, A
+    # V, A
+    waves = {"t": made.segments[0].t} | {c.name.lower(): 1e3 * c.values() for c in made.channels}
 
     def text(given, mark):
         rows = zip(*(v.tolist() for v in given.values()), strict=True)
-        return "\n".join([mark.join(given), *(mark.join(f"{x:.6g}" for x in row) for row in rows)]) + "\n"
+        return (
+            "\n".join([mark.join(given), *(mark.join(f"{x:.6g}" for x in row) for row in rows)])
+            + "\n"
+        )
 
     rows = text(columns, ",").partition("\n")[2]
     names = "b:tnow in s,m:u1:bus1 in p.u.,m:Psum:bus1 in p.u.,m:Qsum:bus1 in p.u.\n"
-    german = "Zeitpunkt in s;Bus 1\\m:u1 in p.u.;Last 1\\m:Psum:bus1 in p.u.;Last 1\\m:Qsum:bus1 in p.u.\n"
+    german = (
+        "Zeitpunkt in s;Bus 1\\m:u1 in p.u.;Last 1\\m:Psum:bus1 in p.u.;Last 1\\m:Qsum:bus1 in"
+        " p.u.\n"
+    )
     return columns, {
-        ".csv": text(columns, ","), ".tsv": text(columns, "\t"), "_waves.csv": text(waves, ","),
+        ".csv": text(columns, ","),
+        ".tsv": text(columns, "\t"),
+        "_waves.csv": text(waves, ","),
         "_powerfactory.csv": f"All calculations,Bus 1,Load 1,Load 1\n{names}{rows}",
         "_digsilent.csv": german + rows.replace(",", ";").replace(".", ","),
-    }  # fmt: skip
+    }
 
 
 def open_document(columns):
@@ -145,11 +210,15 @@ def open_document(columns):
     number = '<table:table-cell office:value-type="float" office:value="{:.6g}"/>'
     rows = [[text.format(name) for name in columns]]
     rows += [[number.format(x) for x in row] for row in zip(*columns.values(), strict=True)]
-    spaces = "".join(f' xmlns:{k}="urn:oasis:names:tc:opendocument:xmlns:{k}:1.0"' for k in ("office", "table", "text"))
+    spaces = "".join(
+        f' xmlns:{k}="urn:oasis:names:tc:opendocument:xmlns:{k}:1.0"'
+        for k in ("office", "table", "text")
+    )
     lines = "".join(f"<table:table-row>{''.join(row)}</table:table-row>" for row in rows)
     content = (
-        f'<?xml version="1.0"?><office:document-content{spaces}><office:body><office:spreadsheet><table:table '
-        f'table:name="S">{lines}</table:table></office:spreadsheet></office:body></office:document-content>'
+        f'<?xml version="1.0"?><office:document-content{spaces}><office:body><office:spreadsheet>'
+        f'<table:table table:name="S">{lines}</table:table>'
+        "</office:spreadsheet></office:body></office:document-content>"
     )
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
@@ -165,18 +234,27 @@ def originals(folder):
     for kind in ("ASCII", "BINARY", "BINARY32", "FLOAT32"):
         formats[f"COMTRADE {kind}"] = comtrade.write(made, folder / f"{kind.lower()}.cfg", kind)
     for kind in ("ASCII", "BINARY", "FLOAT32"):
-        formats[f"COMTRADE {kind} in one file"] = comtrade.write(made, folder / f"{kind.lower()}.cff", kind)
+        formats[f"COMTRADE {kind} in one file"] = comtrade.write(
+            made, folder / f"{kind.lower()}.cff", kind
+        )
     formats["COMTRADE 1999"] = comtrade.write(made, folder / "old.cfg", "BINARY", 1999)
     formats["SEL CEV"] = [files.write(folder / "report.cev", event_report(made))]
-    formats["SEL CEV filtered"] = [files.write(folder / "filtered.cev", event_report(made, every=8))]
+    formats["SEL CEV filtered"] = [
+        files.write(folder / "filtered.cev", event_report(made, every=8))
+    ]
     columns, texts = tables(made)
     for name, content in quality_files(made, columns).items():
         formats[name] = [files.write(folder / f"{name.replace(' ', '_')}.pqd", content)]
-    rows = "".join("".join(f" {x:.8E}" for x in row) + "\n" for row in zip(*columns.values(), strict=True))
-    named = "".join(f'PGB({k}) Output Desc="{n}" Group="" Units="pu"\n' for k, n in enumerate("UPQ", 1))
+    rows = "".join(
+        "".join(f" {x:.8E}" for x in row) + "\n" for row in zip(*columns.values(), strict=True)
+    )
+    named = "".join(
+        f'PGB({k}) Output Desc="{n}" Group="" Units="pu"\n' for k, n in enumerate("UPQ", 1)
+    )
     formats["PSCAD"] = [
-        files.write(folder / "case_01.out", f" title\n{rows}"), files.write(folder / "case.inf", named)
-    ]  # fmt: skip
+        files.write(folder / "case_01.out", f" title\n{rows}"),
+        files.write(folder / "case.inf", named),
+    ]
     for ending, content in texts.items():
         formats[f"table {ending}"] = [files.write(folder / f"table{ending}", content)]
     formats["table .ods"] = [files.write(folder / "table.ods", open_document(columns))]
@@ -287,12 +365,28 @@ def drop_field(data, rng):
     return _fields(data, rng, lambda fields, k: fields.pop(k))
 
 
-DAMAGE = [flip, cut, insert, lose, zero, digit, drop_line, double_line, blank_line, swap_lines, swap_fields,
-          nasty_field, nasty_field, drop_field]  # fmt: skip
+DAMAGE = [
+    flip,
+    cut,
+    insert,
+    lose,
+    zero,
+    digit,
+    drop_line,
+    double_line,
+    blank_line,
+    swap_lines,
+    swap_fields,
+    nasty_field,
+    nasty_field,
+    drop_field,
+]
 
 
 def damaged(paths, folder, rng):
-    """The files of a record with one to three kinds of damage in one of them; its path, and what was done."""
+    """The files of a record with one to three kinds of damage in one of them; its path, and what
+    was done.
+    """
     done = []
     for path in paths:
         (folder / path.name).write_bytes(path.read_bytes())
@@ -307,14 +401,19 @@ def damaged(paths, folder, rng):
 
 
 def outcome(path):
-    """(kind, words, figures) of reading one file: how it ended, what was said, and events, mean U and P."""
+    """(kind, words, figures) of reading one file: how it ended, what was said, and events, mean U
+    and P.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
             events = tractexp.read(str(path))
             words = " | ".join(note for event in events for note in event.record.notes)
             kind = "read"
-            figures = [len(events), *(float(np.mean([np.mean(getattr(e.record, k)) for e in events])) for k in "UP")]
+            figures = [
+                len(events),
+                *(float(np.mean([np.mean(getattr(e.record, k)) for e in events])) for k in "UP"),
+            ]
         except UserError as error:
             kind, words, figures = "refused", str(error), []
         except Exception:
@@ -323,7 +422,9 @@ def outcome(path):
 
 
 def _work(pipe):
-    """A process that reads the files it is told, and says how it went, with seconds and growth [MB]."""
+    """A process that reads the files it is told, and says how it went, with seconds and growth
+    [MB].
+    """
     while (path := pipe.recv()) is not None:
         before, start = reset(), spent()
         kind, words, figures = outcome(Path(path))
@@ -331,7 +432,9 @@ def _work(pipe):
 
 
 def spent():
-    """Seconds of processors that this process and those it has waited for took: they hold on a shared machine too."""
+    """Seconds of processors that this process and those it has waited for took: they hold on a
+    shared machine too.
+    """
     return sum(os.times()[:4])
 
 
@@ -355,7 +458,8 @@ class Worker:
 
     def once(self, path):
         self.pipe.send(str(path))
-        limit = 120 if self.fresh else 12 * SECONDS  # of a clock; a fresh one imports and compiles first
+        # of a clock; a fresh one imports and compiles first
+        limit = 120 if self.fresh else 12 * SECONDS
         try:
             if not self.pipe.poll(limit):
                 raise EOFError
@@ -373,7 +477,9 @@ class Worker:
 
 
 def run(count, seed, damaged=damaged):
-    """Counts and findings of so many files, each `damaged(paths, folder, rng)`: its path and what was done."""
+    """Counts and findings of so many files, each `damaged(paths, folder, rng)`: its path and what
+    was done.
+    """
     rng, worker = np.random.default_rng(seed), Worker()
     with tempfile.TemporaryDirectory() as base:
         sound, broken = Path(base) / "sound", Path(base) / "broken"
@@ -392,12 +498,19 @@ def run(count, seed, damaged=damaged):
             path, done = damaged(formats[name], broken, rng)
             kind, words, figures, seconds, growth = worker.read(path)
             if kind == "read":
-                same = figures[:1] == right[name][:1] and np.allclose(figures, right[name], rtol=1e-6)
+                same = figures[:1] == right[name][:1] and np.allclose(
+                    figures, right[name], rtol=1e-6
+                )
                 kind = "read as undamaged" if same else "read as it now stands"
             counts[name][kind] = counts[name].get(kind, 0) + 1
-            worst = {"seconds": max(worst["seconds"], seconds), "megabytes": max(worst["megabytes"], growth)}
+            worst = {
+                "seconds": max(worst["seconds"], seconds),
+                "megabytes": max(worst["megabytes"], growth),
+            }
             if kind not in ("read as undamaged", "read as it now stands", "refused"):
-                bad.append({"file": k, "format": name, "damage": done, "kind": kind, "words": words})
+                bad.append(
+                    {"file": k, "format": name, "damage": done, "kind": kind, "words": words}
+                )
             if (k + 1) % 500 == 0:
                 print(f"{k + 1} files, {len(bad)} bad", flush=True)
         worker.pipe.send(None)
@@ -406,7 +519,9 @@ def run(count, seed, damaged=damaged):
 
 
 def command(run, about, place):
-    """The exit code of a benchmark's command: `run(count, seed)` damages, and its counts go to a file beside it."""
+    """The exit code of a benchmark's command: `run(count, seed)` damages, and its counts go to a
+    file beside it.
+    """
     asked = argparse.ArgumentParser(description=about.splitlines()[0])
     asked.add_argument("--count", type=int, default=10_000)
     asked.add_argument("--seed", type=int, default=1)

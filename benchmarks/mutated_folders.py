@@ -2,8 +2,8 @@
 
     python benchmarks/mutated_folders.py [CASES] [SEED]
 
-Each case is read, left out or refused in one sentence; anything else is printed with its number, by which
-`fuzzed` in `tests/process/test_doors.py` makes it again.
+Each case is read, left out or refused in one sentence; anything else is printed with its number, by
+which `fuzzed` in `tests/process/test_doors.py` makes it again.
 """
 
 import contextlib

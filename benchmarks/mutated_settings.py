@@ -1,12 +1,14 @@
-"""What becomes of damaged settings: `python benchmarks/mutated_settings.py [--count 10000] [--seed 1]`.
+"""What becomes of damaged settings: `python benchmarks/mutated_settings.py [--count 10000] [--seed
+1]`.
 
-Four in ten are commands that work, changed in one to three arguments as people and programs change them: values that
-are no numbers, not finite, huge, of another kind, names that do not exist, settings taken out, doubled or misspelt,
-references, brackets by the thousand, files that are none. A command is composed, checked and, where it is accepted and
-identifies, its problem is made and searched for a moment. The others are sidecars of a table, changed as JSON and as
-bytes, with which the table is read. Allowed is that it works, or one sentence. Not allowed: another exception, a
-warning, words of Python in what a user reads, more than 10 s of processor time. Counts go to mutated_settings.json; the
-exit code says whether all held.
+Four in ten are commands that work, changed in one to three arguments as people and programs change
+them: values that are no numbers, not finite, huge, of another kind, names that do not exist,
+settings taken out, doubled or misspelt, references, brackets by the thousand, files that are none.
+A command is composed, checked and, where it is accepted and identifies, its problem is made and
+searched for a moment. The others are sidecars of a table, changed as JSON and as bytes, with which
+the table is read. Allowed is that it works, or one sentence. Not allowed: another exception, a
+warning, words of Python in what a user reads, more than 10 s of processor time. Counts go to
+mutated_settings.json; the exit code says whether all held.
 """
 
 import copy
@@ -34,30 +36,120 @@ from tractexp.errors import UserError  # noqa: E402
 
 SECONDS = 10  # of processor time; a kernel that is compiled first takes half of it
 WORDS = re.compile(
-    LEAKS.pattern
-    + r"|Config\b(?<!the Config)|OmegaConf|\bof type '|\btype '|\bdict\b|\btuple\b|\bint\b|\bstr\b|\bfloat\b"
-    r"|(?<!['=])\b(None|True|False)\b(?!')|Integer\b|\bkwarg|\bargument of type|\bregex|\battribute|__"
+    LEAKS.pattern + r"|Config\b(?<!the Config)|OmegaConf|\bof type '|\btype"
+    r" '|\bdict\b|\btuple\b|\bint\b|\bstr\b|\bfloat\b"
+    r"|(?<!['=])\b(None|True|False)\b(?!')|Integer\b|\bkwarg|\bargument of"
+    r" type|\bregex|\battribute|__"
     r"|\bnode\b|Enum|primitive"
 )
 DEEP = "[" * 100_000 + "]" * 100_000
 VALUES = [
-    *NASTY, "inf", "-inf", "1e999", "-1", "0", "0.0", "null", "true", "false", "???", "[]", "{}", "[[1]]", "{a:1}",
-    "[1,2]", "[a,b]", "1,2", "a,b", "${nothing}", "${oc.env:HOME}", "${oc.env:NO_SUCH_VARIABLE}", "${seed}", "${", "}",
-    "'", '"', "[", "(", "a b", "a=b", "=", "\\", "~", "*", "glob(*)", "range(1,3)", "choice(1,2)", "interval(0,1)",
-    "1e20", "99999999999999999999", "-5e-324", "/proc/x", "/dev/null", "/dev/zero", ".", "/", "nothing.csv", "é", "—",
-    "\x00", "\n", "None", "1j", "0x10", "1_000", "issa", "pso", "voltage", "zip", "stator_resistance",
-    DEEP[:4000] + DEEP[-4000:], "x" * 5000,
-]  # fmt: skip
-JSONS = [None, True, False, 0, -1, 1e308, -1e-320, 10**400, "", " ", "abc", "é", "U", "kV", "nan", "/", [], {}, [[]],
-         {"a": 1}, [1, 2, 3], ["U", "P"], {"": ""}, float("nan"), float("inf"), -float("inf"), "x" * 5000]  # fmt: skip
+    *NASTY,
+    "inf",
+    "-inf",
+    "1e999",
+    "-1",
+    "0",
+    "0.0",
+    "null",
+    "true",
+    "false",
+    "???",
+    "[]",
+    "{}",
+    "[[1]]",
+    "{a:1}",
+    "[1,2]",
+    "[a,b]",
+    "1,2",
+    "a,b",
+    "${nothing}",
+    "${oc.env:HOME}",
+    "${oc.env:NO_SUCH_VARIABLE}",
+    "${seed}",
+    "${",
+    "}",
+    "'",
+    '"',
+    "[",
+    "(",
+    "a b",
+    "a=b",
+    "=",
+    "\\",
+    "~",
+    "*",
+    "glob(*)",
+    "range(1,3)",
+    "choice(1,2)",
+    "interval(0,1)",
+    "1e20",
+    "99999999999999999999",
+    "-5e-324",
+    "/proc/x",
+    "/dev/null",
+    "/dev/zero",
+    ".",
+    "/",
+    "nothing.csv",
+    "é",
+    "—",
+    "\x00",
+    "\n",
+    "None",
+    "1j",
+    "0x10",
+    "1_000",
+    "issa",
+    "pso",
+    "voltage",
+    "zip",
+    "stator_resistance",
+    DEEP[:4000] + DEEP[-4000:],
+    "x" * 5000,
+]
+JSONS = [
+    None,
+    True,
+    False,
+    0,
+    -1,
+    1e308,
+    -1e-320,
+    10**400,
+    "",
+    " ",
+    "abc",
+    "é",
+    "U",
+    "kV",
+    "nan",
+    "/",
+    [],
+    {},
+    [[]],
+    {"a": 1},
+    [1, 2, 3],
+    ["U", "P"],
+    {"": ""},
+    float("nan"),
+    float("inf"),
+    -float("inf"),
+    "x" * 5000,
+]
 
 SIDECAR = {
-    "name": "dip", "note": "made", "notes": ["one", "two"], "base": {"voltage": 27.5, "power": 20.0, "frequency": 50.0},
-    "columns": {"t": "t", "U": "U", "P": "P", "Q": "Q"}, "units": {"t": "s", "U": "pu", "P": "pu", "Q": "pu"},
-    "uniform": True, "more": ["THD_u"],
+    "name": "dip",
+    "note": "made",
+    "notes": ["one", "two"],
+    "base": {"voltage": 27.5, "power": 20.0, "frequency": 50.0},
+    "columns": {"t": "t", "U": "U", "P": "P", "Q": "Q"},
+    "units": {"t": "s", "U": "pu", "P": "pu", "Q": "pu"},
+    "uniform": True,
+    "more": ["THD_u"],
     "window": {"name": "cycle", "at": [-0.01, 0.0, 0.01], "weights": [0.25, 0.5, 0.25]},
     "mine": {"kept": [1, {"a": None}]},
-}  # fmt: skip
+}
 
 
 class Hung(Exception):
@@ -68,7 +160,9 @@ def table(folder):
     """A table with a dip, of 300 rows; its path."""
     t = np.arange(300) / 200
     u = 1 - 0.4 * ((t >= 0.5) & (t < 0.7))
-    rows = "\n".join(f"{a:.3f},{b:.3f},{b * b:.4f},{0.6 * b * b:.4f},0.01" for a, b in zip(t, u, strict=True))
+    rows = "\n".join(
+        f"{a:.3f},{b:.3f},{b * b:.4f},{0.6 * b * b:.4f},0.01" for a, b in zip(t, u, strict=True)
+    )
     return files.write(folder / "dip.csv", f"t,U,P,Q,THD_u\n{rows}\n")
 
 
@@ -84,8 +178,21 @@ def commands(path):
         ["optimizer=covariant_sparrow", "model=motor_alone", "target=0.1", "time_limit=60"],
         ["optimizer=cmaes", "objective=student_t", "model.effects=[stator_resistance]"],
         ["model/motor=mechanical", "model/static=constant_impedance", "optimizer=random_search"],
-        [*csv, "data.base_voltage=27.5", "data.base_power=20", "data.frequency=50", "data.pre=0.4", "data.post=1.0"],
-        [*csv, "data.columns={U:U,P:P}", "data.units={U:pu}", "optimizer=pso", "optimizer.population=20"],
+        [
+            *csv,
+            "data.base_voltage=27.5",
+            "data.base_power=20",
+            "data.frequency=50",
+            "data.pre=0.4",
+            "data.post=1.0",
+        ],
+        [
+            *csv,
+            "data.columns={U:U,P:P}",
+            "data.units={U:pu}",
+            "optimizer=pso",
+            "optimizer.population=20",
+        ],
         [f"data.path={path}", "data=csv", "data.train=[1]", "model.per_event=[T_m]"],
         ["data=tibet_50pct_comtrade", "optimizer=cobyqa"],
         ["task=profile", "task.points=5"],
@@ -99,9 +206,13 @@ def misspelt(word, rng):
     if not word:
         return "x"
     k = int(rng.integers(len(word)))
-    return [word[:k] + word[k + 1 :], word[:k] + "x" + word[k:], word[::-1], word.upper(), word + "."][
-        int(rng.integers(5))
-    ]
+    return [
+        word[:k] + word[k + 1 :],
+        word[:k] + "x" + word[k:],
+        word[::-1],
+        word.upper(),
+        word + ".",
+    ][int(rng.integers(5))]
 
 
 def one_of(items, rng):
@@ -164,7 +275,17 @@ def keys_of(arguments):
     whole = OmegaConf.to_container(compose("config", overrides(arguments)))
     keys = [key for key, _ in leaves(whole)]
     sections = sorted({key.rpartition(".")[0] for key in keys} - {""})
-    groups = ["optimizer", "data", "objective", "model", "model/motor", "model/static", "task", "domain", "experiment"]
+    groups = [
+        "optimizer",
+        "data",
+        "objective",
+        "model",
+        "model/motor",
+        "model/static",
+        "task",
+        "domain",
+        "experiment",
+    ]
     return [*keys, *keys, *sections, *groups, "model.bounds.C", "model.fixed.T_m", "data.columns.U"]
 
 
@@ -197,7 +318,11 @@ def perform(arguments, folder):
 
             asked = {key: job.config[key] for key in ("budget", "time_limit", "target")}
             setup = Setup.of(
-                job.events.train, job.config["model"], job.events.validate, job.config["objective"], **asked
+                job.events.train,
+                job.config["model"],
+                job.events.validate,
+                job.config["objective"],
+                **asked,
             )
             optimizer = Choice.of("optimizer", job.config["optimizer"]).build("optimizer")
             search(setup.problem, optimizer, job.seed, Limits(60, 5.0, job.config["target"]))
@@ -215,9 +340,11 @@ def outcome(call, *given):
         raise Hung
 
     signal.signal(signal.SIGPROF, late)
-    signal.setitimer(signal.ITIMER_PROF, SECONDS)  # of this process: other work on the machine does not count
+    # of this process: other work on the machine does not count
+    signal.setitimer(signal.ITIMER_PROF, SECONDS)
     signal.signal(signal.SIGALRM, late)
-    signal.setitimer(signal.ITIMER_REAL, 60 * SECONDS)  # what waits for something takes no time of its own
+    # what waits for something takes no time of its own
+    signal.setitimer(signal.ITIMER_REAL, 60 * SECONDS)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -234,17 +361,28 @@ def outcome(call, *given):
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
             signal.setitimer(signal.ITIMER_REAL, 0)
-    words = words.replace(str(Path.cwd()), "…")  # a folder of random name may hold any characters of a leak
-    for one in (*map(str, given), *(str(each) for each in given[0])) if isinstance(given[0], list) else ():
+    # a folder of random name may hold any characters of a leak
+    words = words.replace(str(Path.cwd()), "…")
+    for one in (
+        (*map(str, given), *(str(each) for each in given[0])) if isinstance(given[0], list) else ()
+    ):
         for part in {one, one.partition("=")[2], one.partition("=")[0]} - {""}:
             words = words.replace(part, "…") if len(part) > 3 else words
-    return ("leak" if WORDS.search(words) else "several lines" if "\n" in words.strip() else "refused"), str(words)
+    return (
+        "leak" if WORDS.search(words) else "several lines" if "\n" in words.strip() else "refused"
+    ), str(words)
 
 
 def nodes(told, where=()):
     """The places of all values within JSON."""
     yield where
-    items = told.items() if isinstance(told, dict) else enumerate(told) if isinstance(told, list) else ()
+    items = (
+        told.items()
+        if isinstance(told, dict)
+        else enumerate(told)
+        if isinstance(told, list)
+        else ()
+    )
     for key, inner in items:
         yield from nodes(inner, (*where, key))
 
@@ -323,13 +461,30 @@ def run(count, seed):
                     shown = (
                         given[0]
                         if call is perform
-                        else Path(given[0]).with_suffix(".json").read_bytes().decode(errors="replace")
+                        else Path(given[0])
+                        .with_suffix(".json")
+                        .read_bytes()
+                        .decode(errors="replace")
                     )
-                    bad.append({"number": k, "what": what, "kind": kind, "given": str(shown)[:600], "words": words})
+                    bad.append(
+                        {
+                            "number": k,
+                            "what": what,
+                            "kind": kind,
+                            "given": str(shown)[:600],
+                            "words": words,
+                        }
+                    )
         finally:
             os.chdir(here)
             end()
-    return {"mutants": count, "seed": seed, "counts": counts, "slowest": round(worst, 1), "bad": bad}
+    return {
+        "mutants": count,
+        "seed": seed,
+        "counts": counts,
+        "slowest": round(worst, 1),
+        "bad": bad,
+    }
 
 
 if __name__ == "__main__":

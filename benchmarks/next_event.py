@@ -1,11 +1,12 @@
-"""Whether the event that is recommended for a tie ends it as often as it says: a row each tie in next_event.json.
+"""Whether the event that is recommended for a tie ends it as often as it says: a row each tie in
+next_event.json.
 
     cd benchmarks && python next_event.py [--first 931000] [--count 120] [--most 30] [--minutes 30]
 
-Small effects of `hidden_effects` in two mild dips, of which an investigation leaves several. The event it recommends is
-simulated by the same generator, which shares nothing with the product, and added to the others; the investigation is
-made again. Only plain dips and switching are recommended here: the generator has no phase jump. Seeds begin at 931000
-and are used nowhere else.
+Small effects of `hidden_effects` in two mild dips, of which an investigation leaves several. The
+event it recommends is simulated by the same generator, which shares nothing with the product, and
+added to the others; the investigation is made again. Only plain dips and switching are recommended
+here: the generator has no phase jump. Seeds begin at 931000 and are used nowhere else.
 """
 
 import argparse
@@ -48,14 +49,21 @@ def hidden(seed: int) -> tuple[str, float, Scene]:
     """Name, size and scene of a data set of two mild dips."""
     rng = np.random.default_rng(seed)
     name, size = AMONG[seed % len(AMONG)], float(rng.choice(SIZES))
-    dips = tuple(Dip(depth=d, start=0.5, duration=float(rng.uniform(0.1, 0.3))) for d in rng.uniform(0.08, 0.35, 2))
+    dips = tuple(
+        Dip(depth=d, start=0.5, duration=float(rng.uniform(0.1, 0.3)))
+        for d in rng.uniform(0.08, 0.35, 2)
+    )
     return name, size, scene(Case(name, size, events=dips, noise=NOISE), seed)
 
 
 def recorded(made: Scene, seed: int) -> list[Event]:
     """The events with their noise, which an added one leaves as they were."""
-    noisy = [NOISE.add(r, np.random.default_rng([seed, 2, k])) for k, r in enumerate(made.records())]
-    return [detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)]
+    noisy = [
+        NOISE.add(r, np.random.default_rng([seed, 2, k])) for k, r in enumerate(made.records())
+    ]
+    return [
+        detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)
+    ]
 
 
 def plain(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
@@ -66,7 +74,13 @@ def plain(bench: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
 def with_event(made: Scene, chosen: NextEvent) -> Scene:
     """The scene with the recommended event at the end."""
     event = chosen.best.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
+    dip = Dip(
+        depth=event.depth,
+        start=0.5,
+        duration=event.duration,
+        fall=PHASORS.dips.edge,
+        rise=PHASORS.dips.edge,
+    )
     return replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
 
 
@@ -80,7 +94,13 @@ def row(seed: int) -> dict | None:
     name, size, made = hidden(seed)
     found = investigated(recorded(made, seed))
     chosen, names = found.next_event, [list(names) for names in found.verdict.sets]
-    told = {"seed": seed, "effect": name, "size": size, "verdict": found.verdict.word, "sets": names}
+    told = {
+        "seed": seed,
+        "effect": name,
+        "size": size,
+        "verdict": found.verdict.word,
+        "sets": names,
+    }
     if found.verdict.word != "tied":
         return told
     chances = chosen.best.chances
@@ -97,7 +117,10 @@ def row(seed: int) -> dict | None:
     except (ValueError, ArithmeticError) as error:  # a motor that stalls
         return told | {"after": None, "why": str(error)}
     after = investigated(again)
-    return told | {"after": after.verdict.word, "sets_after": [list(names) for names in after.verdict.sets]}
+    return told | {
+        "after": after.verdict.word,
+        "sets_after": [list(names) for names in after.verdict.sets],
+    }
 
 
 def table(rows: Sequence[dict]) -> str:
@@ -105,13 +128,18 @@ def table(rows: Sequence[dict]) -> str:
     ties = [r for r in rows if r["verdict"] == "tied"]
     gone = [r for r in ties if r["after"] in ("named", "candidate")]
     right = [r for r in gone if r["sets_after"] == [[r["effect"]]]]
-    lines = ["| predicted for the truth | ties | predicted, mean | truth alone left |", "| --- | --- | --- | --- |"]
+    lines = [
+        "| predicted for the truth | ties | predicted, mean | truth alone left |",
+        "| --- | --- | --- | --- |",
+    ]
     for low, high in itertools.pairwise(BINS):
         own = [r for r in ties if r["predicted"] is not None and low <= r["predicted"] < high]
         if own:
             mean = sum(r["predicted"] for r in own) / len(own)
             seen = sum(r in right for r in own)
-            lines.append(f"| {low:.0%} to {min(high, 1.0):.0%} | {len(own)} | {mean:.0%} | {seen} |")
+            lines.append(
+                f"| {low:.0%} to {min(high, 1.0):.0%} | {len(own)} | {mean:.0%} | {seen} |"
+            )
     ended = f"{len(gone)} ended with one event, {len(right)} of them with the truth"
     told = f"{len(rows)} data sets, {len(ties)} ties; {ended}."
     return "\n".join(lines) + "\n\n" + textwrap.fill(told, 120)
@@ -130,7 +158,9 @@ def main() -> None:
         except ValueError as error:  # no load that survives, or an effect too large for it
             rows.append({"seed": seed, "verdict": "not made", "why": str(error)})
         print(json.dumps(rows[-1]), flush=True)
-        TABLE.write_text(json.dumps({"noise": "white 0.4 %", "among": AMONG, "rows": rows}, indent=1) + "\n")
+        TABLE.write_text(
+            json.dumps({"noise": "white 0.4 %", "among": AMONG, "rows": rows}, indent=1) + "\n"
+        )
         ties = sum(r["verdict"] == "tied" for r in rows)
         if ties >= given.most or time.monotonic() - begun > 60 * given.minutes:
             break

@@ -1,20 +1,26 @@
-"""Which optimizer to take: all of them at equal simulations, on records and on BBOB. See docs/optimizers.md.
+"""Which optimizer to take: all of them at equal simulations, on records and on BBOB. See
+docs/optimizers.md.
 
-    python benchmarks/optimizers.py --series choice     # problems on which settings and ideas may be chosen
-    python benchmarks/optimizers.py --series final      # others, looked at once, after everything is chosen
-    python benchmarks/optimizers.py --series readings   # the readings of the paper, on the shipped records
-    python benchmarks/optimizers.py --docs              # write docs/optimizers.md's tables from the stored result
+    python benchmarks/optimizers.py --series choice
+        # problems on which settings and ideas may be chosen
+    python benchmarks/optimizers.py --series final
+        # others, looked at once, after everything is chosen
+    python benchmarks/optimizers.py --series readings
+        # the readings of the paper, on the shipped records
+    python benchmarks/optimizers.py --docs
+        # write docs/optimizers.md's tables from the stored result
 
-A problem is a record of a random load (`drawn_records`) or a function of BBOB; the series share no record, no
-instance and no seed. A search that ends by itself is started again from new random numbers until its budget is spent,
-and all end where the floor is reached: within 0.01 % of the lowest objective that a long multi-start knows, within
-1e-8 on BBOB. The result is stored whole in `benchmarks/optimizers.json`. Each problem is one task, whose runs do not
-depend on the others.
+A problem is a record of a random load (`drawn_records`) or a function of BBOB; the series share no
+record, no instance and no seed. A search that ends by itself is started again from new random
+numbers until its budget is spent, and all end where the floor is reached: within 0.01 % of the
+lowest objective that a long multi-start knows, within 1e-8 on BBOB. The result is stored whole in
+`benchmarks/optimizers.json`. Each problem is one task, whose runs do not depend on the others.
 """
 
 import os
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrices are small, and the cores have tasks to do
+# the matrices are small, and the cores have tasks to do
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import argparse
 import json
@@ -45,12 +51,28 @@ AT_END = 1e-4  # of the floor: a search that is so near has nothing left to find
 SOLVED = 1e-8  # distance to a BBOB function's optimum
 LONG = {"name": "multistart_least_squares", "scatter": 3000, "starts": 60, "tolerance": 1e-12}
 SHIPPED = ("tibet_50pct", "tibet_30pct", "tibet_65pct")
-RESIDUALS = ("multistart_least_squares", "issa_polish")  # need a sum of squares, which no BBOB function is
+# need a sum of squares, which no BBOB function is
+RESIDUALS = ("multistart_least_squares", "issa_polish")
 ALL = (
-    "random_search", "ssa", "issa", "covariant_sparrow", "pso", "differential_evolution", "cmaes", "cobyqa", *RESIDUALS,
-)  # fmt: skip
-ABLATED = ("issa_no_tent_init", "issa_no_levy", "issa_no_gaussian", "issa_no_tent_perturbation", "issa_by_stage")
-TRIED = tuple(o for o in (*ALL, *ABLATED) if o != "cobyqa")  # which no choice was about, and which takes longest
+    "random_search",
+    "ssa",
+    "issa",
+    "covariant_sparrow",
+    "pso",
+    "differential_evolution",
+    "cmaes",
+    "cobyqa",
+    *RESIDUALS,
+)
+ABLATED = (
+    "issa_no_tent_init",
+    "issa_no_levy",
+    "issa_no_gaussian",
+    "issa_no_tent_perturbation",
+    "issa_by_stage",
+)
+# which no choice was about, and which takes longest
+TRIED = tuple(o for o in (*ALL, *ABLATED) if o != "cobyqa")
 READINGS = ("", "_10_perceivers", "_scalar", "_raw", "_raw_scalar", "_to_the_letter")
 
 
@@ -80,10 +102,20 @@ SERIES = {
     "choice": Series(161, 12, (), 4, (11, 12), (5, 7), TRIED),
     "final": Series(162, 12, SHIPPED, 4, (1, 2), (5, 7), ALL, left_out=SLOW),
     "readings": Series(
-        163, 0, SHIPPED, 10, (), (), (*(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")), "issa_by_stage",
-        "issa_printed_levy"), (15000,),
+        163,
+        0,
+        SHIPPED,
+        10,
+        (),
+        (),
+        (
+            *(f"{name}{r}" for r in READINGS for name in ("ssa", "issa")),
+            "issa_by_stage",
+            "issa_printed_levy",
+        ),
+        (15000,),
     ),
-}  # fmt: skip
+}
 
 
 def settings(name: str) -> dict[str, Any]:
@@ -105,8 +137,12 @@ class Ended:
     seconds: float
 
 
-def restarted(problem: Any, optimizer: Any, seeds: Sequence[int], budget: int, target: float) -> Ended:
-    """Search, and search again from new random numbers, until the budget is spent or the target reached."""
+def restarted(
+    problem: Any, optimizer: Any, seeds: Sequence[int], budget: int, target: float
+) -> Ended:
+    """Search, and search again from new random numbers, until the budget is spent or the target
+    reached.
+    """
     spent, seconds, best = 0, 0.0, None
     while spent < budget and (best is None or best.objective > target):
         found: SearchResult = search(
@@ -120,9 +156,14 @@ def restarted(problem: Any, optimizer: Any, seeds: Sequence[int], budget: int, t
 
 
 def on_record(series: Series, name: str) -> dict[str, Any]:
-    """Every optimizer on one record: excess over the floor, right valley or not, simulations and seconds."""
+    """Every optimizer on one record: excess over the floor, right valley or not, simulations and
+    seconds.
+    """
     if name in SHIPPED:
-        problem, number = drawn_records.problem(drawn_records.shipped(name)), 1000 + SHIPPED.index(name)
+        problem, number = (
+            drawn_records.problem(drawn_records.shipped(name)),
+            1000 + SHIPPED.index(name),
+        )
     else:
         number = int(name.split()[1])
         problem = drawn_records.problem(drawn_records.drawn((series.key, number))[0])
@@ -130,23 +171,41 @@ def on_record(series: Series, name: str) -> dict[str, Any]:
     target = (1 + AT_END) * long.objective
     ended = {
         (optimizer, budget): [
-            restarted(problem, build("optimizer", settings(optimizer)), (series.key, number, s), budget, target)
+            restarted(
+                problem,
+                build("optimizer", settings(optimizer)),
+                (series.key, number, s),
+                budget,
+                target,
+            )
             for s in range(series.seeds)
         ]
         for optimizer in series.optimizers
         for budget in series.budgets
     }
-    runs = {key: [_run(problem, key, s, run) for s, run in enumerate(group)] for key, group in ended.items()}
-    polished = floor.polish(problem, [run for group in runs.values() for run in group], lambda n: lambda: None)
+    runs = {
+        key: [_run(problem, key, s, run) for s, run in enumerate(group)]
+        for key, group in ended.items()
+    }
+    polished = floor.polish(
+        problem, [run for group in runs.values() for run in group], lambda n: lambda: None
+    )
     assert polished is not None
-    lowest = min(long.objective, polished.objective, *(run.objective for group in ended.values() for run in group))
+    lowest = min(
+        long.objective,
+        polished.objective,
+        *(run.objective for group in ended.values() for run in group),
+    )
     return {
         "kind": "record",
         "floor": lowest,
         "runs": {
             f"{optimizer} {budget}": {
                 **_told(group, [run.objective / lowest - 1 for run in group]),
-                "valley": [int(polished.reached[run] <= (1 + floor.FLOOR_SHARE) * lowest) for run in runs[key]],
+                "valley": [
+                    int(polished.reached[run] <= (1 + floor.FLOOR_SHARE) * lowest)
+                    for run in runs[key]
+                ],
             }
             for key, group in ended.items()
             for optimizer, budget in [key]
@@ -160,7 +219,9 @@ def _run(problem: Problem, key: tuple[str, int], seed: int, ended: Ended) -> Sea
 
 
 def on_function(series: Series, name: str) -> dict[str, Any]:
-    """Every optimizer on the instances of one function of BBOB: distance to the optimum, simulations and seconds."""
+    """Every optimizer on the instances of one function of BBOB: distance to the optimum,
+    simulations and seconds.
+    """
     function, dimension = (int(part[1:]) for part in name.split())
     runs = {}
     for optimizer in series.optimizers:
@@ -170,11 +231,14 @@ def on_function(series: Series, name: str) -> dict[str, Any]:
             problems = [bbob.Bbob(function, dimension, i, [SOLVED]) for i in series.instances]
             group = [
                 restarted(
-                    p, build("optimizer", settings(optimizer)), (series.key, function, dimension, i), budget,
+                    p,
+                    build("optimizer", settings(optimizer)),
+                    (series.key, function, dimension, i),
+                    budget,
                     p.optimum + SOLVED,
                 )
                 for p, i in zip(problems, series.instances, strict=True)
-            ]  # fmt: skip
+            ]
             runs[f"{optimizer} {budget}"] = _told(group, [p.best - p.optimum for p in problems])
     return {"kind": "bbob", "runs": runs}
 
@@ -198,7 +262,9 @@ def perform(name: str, processes: int, only: Sequence[str] = ()) -> dict[str, An
 
     series, commit, started = SERIES[name], provenance.commit(), time.time()
     done: Any = Parallel(n_jobs=processes, verbose=5)(
-        delayed(run)(series, problem) for problem in series.problems() if not only or problem in only
+        delayed(run)(series, problem)
+        for problem in series.problems()
+        if not only or problem in only
     )
     return {
         "commit": commit,
@@ -233,14 +299,21 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--series", choices=SERIES, help="run it and put it into the stored result")
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--docs", action="store_true", help="write the tables of docs/optimizers.md")
+    parser.add_argument(
+        "--docs", action="store_true", help="write the tables of docs/optimizers.md"
+    )
     given = parser.parse_args()
     if given.series:
         store(given.series, perform(given.series, given.processes))
     if given.docs:
         from optimizers_tables import DOCS, filled
 
-        files.write(DOCS, filled(DOCS.read_text(encoding="utf-8"), json.loads(STORED.read_text(encoding="utf-8"))))
+        files.write(
+            DOCS,
+            filled(
+                DOCS.read_text(encoding="utf-8"), json.loads(STORED.read_text(encoding="utf-8"))
+            ),
+        )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,6 @@
-"""The tables of docs/optimizers.md, from the stored result of benchmarks/optimizers.py and nothing else."""
+"""The tables of docs/optimizers.md, from the stored result of benchmarks/optimizers.py and nothing
+else.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -24,9 +26,13 @@ class Kind:
 
     def __init__(self, series: Stored, kind: str):
         self.kind, self.budgets = kind, series["plan"]["budgets"]
-        self.problems = {name: p["runs"] for name, p in series["problems"].items() if p["kind"] == kind}
+        self.problems = {
+            name: p["runs"] for name, p in series["problems"].items() if p["kind"] == kind
+        }
         have = {key for runs in self.problems.values() for key in runs}
-        self.optimizers = [o for o in series["plan"]["optimizers"] if any(f"{o} {b}" in have for b in self.budgets)]
+        self.optimizers = [
+            o for o in series["plan"]["optimizers"] if any(f"{o} {b}" in have for b in self.budgets)
+        ]
 
     def at(self, budget: int) -> list[str]:
         """The optimizers that were run with a budget."""
@@ -34,16 +40,22 @@ class Kind:
         return [o for o in self.optimizers if f"{o} {budget}" in first]
 
     def excess(self, optimizer: str, budget: int) -> np.ndarray:
-        """(problems, seeds) over the floor, or to the optimum; never below where every search ends."""
+        """(problems, seeds) over the floor, or to the optimum; never below where every
+        search ends.
+        """
         rows = [runs[f"{optimizer} {budget}"]["excess"] for runs in self.problems.values()]
         return np.maximum(np.array(rows), AT_END[self.kind])
 
     def valley(self, optimizer: str, budget: int) -> float:
         """The share of searches that ended in the right valley."""
-        return float(np.mean([runs[f"{optimizer} {budget}"]["valley"] for runs in self.problems.values()]))
+        return float(
+            np.mean([runs[f"{optimizer} {budget}"]["valley"] for runs in self.problems.values()])
+        )
 
     def medians(self, optimizer: str, budget: int) -> np.ndarray:
-        """(problems,) logarithms of the median over the seeds, which are what is ranked and tested."""
+        """(problems,) logarithms of the median over the seeds, which are what is
+        ranked and tested.
+        """
         return np.log10(np.median(self.excess(optimizer, budget), axis=1))
 
     def ranks(self, budget: int) -> Ranks:
@@ -56,12 +68,19 @@ class Kind:
         return ranks.mean[ranks.names.index(optimizer)]
 
     def against(self, budget: int) -> dict[str, tuple[float, float]]:
-        """{optimizer: (A, p)} against the reference: mean A within problems, Wilcoxon over problems with Holm."""
+        """{optimizer: (A, p)} against the reference: mean A within problems, Wilcoxon over problems
+        with Holm.
+        """
         others = [o for o in self.at(budget) if o != REFERENCE]
-        p = holm([wilcoxon(self.medians(o, budget), self.medians(REFERENCE, budget))[0] for o in others])
+        p = holm(
+            [wilcoxon(self.medians(o, budget), self.medians(REFERENCE, budget))[0] for o in others]
+        )
         base = self.excess(REFERENCE, budget)
         effects = [
-            np.mean([vargha_delaney(a, b) for a, b in zip(self.excess(o, budget), base, strict=True)]) for o in others
+            np.mean(
+                [vargha_delaney(a, b) for a, b in zip(self.excess(o, budget), base, strict=True)]
+            )
+            for o in others
         ]
         return dict(zip(others, zip(map(float, effects), map(float, p), strict=True), strict=True))
 
@@ -72,7 +91,9 @@ def percent(share: float) -> str:
 
 def over_floor(excess: float) -> str:
     """1 + excess, as many digits as it takes to see that it is not 1."""
-    return "1.000" if excess <= 5e-4 else f"{1 + excess:.3f}" if excess < 0.1 else f"{1 + excess:.2g}"
+    return (
+        "1.000" if excess <= 5e-4 else f"{1 + excess:.3f}" if excess < 0.1 else f"{1 + excess:.2g}"
+    )
 
 
 def cells(of: Kind, optimizer: str, told: Callable[[int], str]) -> str:
@@ -85,13 +106,17 @@ def compared(of: Kind, optimizer: str) -> str:
     if optimizer == REFERENCE:
         return "reference"
     found = {b: of.against(b) for b in of.budgets}
-    return cells(of, optimizer, lambda b: f"{found[b][optimizer][0]:.2f}" + "*" * (found[b][optimizer][1] < 0.05))
+    return cells(
+        of,
+        optimizer,
+        lambda b: f"{found[b][optimizer][0]:.2f}" + "*" * (found[b][optimizer][1] < 0.05),
+    )
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join("| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)).replace(
-        "| --- ", "|---"
-    )
+    return "\n".join(
+        "| " + " | ".join(row) + " |" for row in (head, ["---"] * len(head), *rows)
+    ).replace("| --- ", "|---")
 
 
 def ordered(of: Kind) -> list[str]:
@@ -105,13 +130,23 @@ def records(of: Kind) -> str:
         return [
             f"`{o}`",
             cells(of, o, lambda b: over_floor(float(np.median(of.excess(o, b))))),
-            *(cells(of, o, lambda b, n=near: f"{100 * np.mean(of.excess(o, b) <= n):.0f}") for near in NEAR),
+            *(
+                cells(of, o, lambda b, n=near: f"{100 * np.mean(of.excess(o, b) <= n):.0f}")
+                for near in NEAR
+            ),
             cells(of, o, lambda b: f"{100 * of.valley(o, b):.0f}"),
             cells(of, o, lambda b: f"{of.rank(o, b):.1f}"),
             compared(of, o),
         ]
 
-    head = ("optimizer", "objective / floor, median", "% within 1 %", "% within 10 %", "% in its valley", "mean rank")
+    head = (
+        "optimizer",
+        "objective / floor, median",
+        "% within 1 %",
+        "% within 10 %",
+        "% in its valley",
+        "mean rank",
+    )
     return table((*head, f"A against `{REFERENCE}`"), [row(o) for o in ordered(of)])
 
 
@@ -126,7 +161,13 @@ def functions(of: Kind) -> str:
             compared(of, o),
         ]
 
-    head = ("optimizer", "distance, median", "% of targets met", "% of runs within 1e-8", "mean rank")
+    head = (
+        "optimizer",
+        "distance, median",
+        "% of targets met",
+        "% of runs within 1e-8",
+        "mean rank",
+    )
     return table((*head, f"A against `{REFERENCE}`"), [row(o) for o in ordered(of)])
 
 
@@ -135,9 +176,17 @@ def caption(series: Stored, of: Kind) -> str:
     plan = series["plan"]
     budgets = " / ".join(f"{b:,}" for b in of.budgets)
     apart = " / ".join(f"{of.ranks(b).critical_difference:.1f}" for b in of.budgets)
-    many = f"{plan['seeds']} seeds" if of.kind == "record" else f"{len(plan['instances'])} instances"
-    what = f"{len(of.problems)} {'records' if of.kind == 'record' else 'functions (24, d = 5 and 7)'}, {many} each"
-    return f"{what}; {budgets} simulations. Critical difference of the mean ranks (Nemenyi, 5 %): {apart}."
+    many = (
+        f"{plan['seeds']} seeds" if of.kind == "record" else f"{len(plan['instances'])} instances"
+    )
+    what = (
+        f"{len(of.problems)} {'records' if of.kind == 'record' else 'functions (24, d = 5 and 7)'},"
+        f" {many} each"
+    )
+    return (
+        f"{what}; {budgets} simulations. Critical difference of the mean ranks (Nemenyi, 5 %):"
+        f" {apart}."
+    )
 
 
 def answer(series: Stored) -> str:
@@ -159,18 +208,23 @@ def answer(series: Stored) -> str:
     told = [f"`{o}` {at_floor(o)}" for o in ("issa", "ssa", "pso")]
     return "\n".join(
         (
-            f"- **To fit a record take `{first}`**: after {budgets} simulations {at_floor(first)} of its"
+            f"- **To fit a record take `{first}`**: after {budgets} simulations {at_floor(first)}"
+            " of its"
             " searches are within 1 % of the lowest objective known.",
-            f"- **Without a sum of squares take `{free}`**: {at_floor(free)}, and {met(free)} of BBOB's targets;"
+            f"- **Without a sum of squares take `{free}`**: {at_floor(free)}, and {met(free)} of"
+            " BBOB's targets;"
             f" `cobyqa` where simulations are dear: {at_floor('cobyqa')}.",
-            f"- **Of the sparrow searches take `covariant_sparrow`**: {at_floor('covariant_sparrow')}, and"
+            "- **Of the sparrow searches take `covariant_sparrow`**:"
+            f" {at_floor('covariant_sparrow')}, and"
             f" {met('covariant_sparrow')} of the targets; {', '.join(told)}.",
         )
     )
 
 
 def readings(series: Stored) -> str:
-    """Median and worst objective over the floor on the three shipped records, `ssa` beside `issa`."""
+    """Median and worst objective over the floor on the three shipped records, `ssa`
+    beside `issa`.
+    """
     of = Kind(series, "record")
     (budget,) = of.budgets
 
@@ -181,8 +235,13 @@ def readings(series: Stored) -> str:
         at = percent(float(np.mean(found <= NEAR[0])))
         return f"{over_floor(float(np.median(found)))} ({over_floor(float(found.max()))}), {at}"
 
-    names = list(dict.fromkeys(o.removeprefix("i").removeprefix("ssa").lstrip("_") for o in of.optimizers))
-    rows = [[f"`*_{n}`" if n else "default", *(cell(f"{o}_{n}" if n else o) for o in ("ssa", "issa"))] for n in names]
+    names = list(
+        dict.fromkeys(o.removeprefix("i").removeprefix("ssa").lstrip("_") for o in of.optimizers)
+    )
+    rows = [
+        [f"`*_{n}`" if n else "default", *(cell(f"{o}_{n}" if n else o) for o in ("ssa", "issa"))]
+        for n in names
+    ]
     return table(("reading", "`ssa`", "`issa`"), rows)
 
 

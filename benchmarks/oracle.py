@@ -1,4 +1,6 @@
-"""The independent simulator and the generator of hidden effects lie with the tests: this puts them on the path."""
+"""The independent simulator and the generator of hidden effects lie with the tests: this puts them
+on the path.
+"""
 
 import sys
 from pathlib import Path

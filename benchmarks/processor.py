@@ -5,12 +5,17 @@ from llvmlite import binding as llvm
 
 from tractexp.kernel import target
 
-BITS = {"avx512f": 512, "avx": 256}  # of the widest vectors of processors with a feature; of others 128
+# of the widest vectors of processors with a feature; of others 128
+BITS = {"avx512f": 512, "avx": 256}
 
 
 def processor() -> str:
-    """LLVM's name of it, the width of its kernels' vectors, and LLVM's version, which writes the machine code."""
+    """LLVM's name of it, the width of its kernels' vectors, and LLVM's version, which writes the
+    machine code.
+    """
     version = ".".join(map(str, llvm.llvm_version_info))
     name, features = target.processor()
-    bits = next((wide for feature, wide in BITS.items() if f"+{feature}" in features.split(",")), 128)
+    bits = next(
+        (wide for feature, wide in BITS.items() if f"+{feature}" in features.split(",")), 128
+    )
     return f"{name}, vectors of {bits} bits, LLVM {version}, llvmlite {llvmlite.__version__}"

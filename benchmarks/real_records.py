@@ -1,8 +1,10 @@
-"""What an investigation says of real records, each dip fitted in turn: python benchmarks/real_records.py [--docs]
+"""What an investigation says of real records, each dip fitted in turn: python
+benchmarks/real_records.py [--docs]
 
-The records are those of a 220 kV fault recorder (station xtz: two transformers, two dips), as phasors and as waveforms,
-and of a load in ANDES that lacks a stator resistance and has a ZIP static load. Stored are the verdict, its names and
-the model's error before and after, fitted and held out; `--docs` writes them into docs/judgement.md.
+The records are those of a 220 kV fault recorder (station xtz: two transformers, two dips), as
+phasors and as waveforms, and of a load in ANDES that lacks a stator resistance and has a ZIP static
+load. Stored are the verdict, its names and the model's error before and after, fitted and held out;
+`--docs` writes them into docs/judgement.md.
 """
 
 import argparse
@@ -40,11 +42,16 @@ def row(name: str, fitted: str) -> dict[str, Any]:
     verdict = {"verdict": found.verdict, "complete": found.complete, "names": list(found.names)}
     near = found.content["nearest"]
     return {
-        "record": name, "fitted": fitted, **verdict, "reason": found.reason,
+        "record": name,
+        "fitted": fitted,
+        **verdict,
+        "reason": found.reason,
         "sets": found.content["name_sets"],
-        "nearest": near and near["effects"], "gap": found.content["gap"], "near_gap": near and near.get("gap"),
+        "nearest": near and near["effects"],
+        "gap": found.content["gap"],
+        "near_gap": near and near.get("gap"),
         "seconds": time.perf_counter() - started,
-    }  # fmt: skip
+    }
 
 
 def percent(misfit: Mapping[str, Any] | None) -> str:
@@ -54,7 +61,14 @@ def percent(misfit: Mapping[str, Any] | None) -> str:
 
 def table(rows: list[dict[str, Any]]) -> str:
     """Markdown: a line for each investigation."""
-    head = ["record", "dips fitted", "verdict", "names", "fitted: before, after [%]", "held out: before, after [%]"]
+    head = [
+        "record",
+        "dips fitted",
+        "verdict",
+        "names",
+        "fitted: before, after [%]",
+        "held out: before, after [%]",
+    ]
     lines = []
     for one in rows:
         names, gaps = "; ".join(joined(names) for names in one["sets"]), one["gap"]
@@ -73,15 +87,23 @@ def joined(names: list[str]) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--only", nargs="*", choices=ASKED, default=ASKED)
-    parser.add_argument("--docs", action="store_true", help="write the table of what is stored, and stop")
+    parser.add_argument(
+        "--docs", action="store_true", help="write the table of what is stored, and stop"
+    )
     chosen = parser.parse_args()
     rows = json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else []
     for name in () if chosen.docs else chosen.only:
         for fitted in (FIRST, LAST):
-            rows = [r for r in rows if (r["record"], r["fitted"]) != (name, fitted)] + [row(name, fitted)]
-            files.write_json(STORED, sorted(rows, key=lambda r: (ASKED.index(r["record"]), r["fitted"])))
+            rows = [r for r in rows if (r["record"], r["fitted"]) != (name, fitted)] + [
+                row(name, fitted)
+            ]
+            files.write_json(
+                STORED, sorted(rows, key=lambda r: (ASKED.index(r["record"]), r["fitted"]))
+            )
             print(table(rows[-1:]), f"{rows[-1]['seconds']:.0f} s", flush=True)
     if chosen.docs:
         marked.replace(DOCS, MARK, table(rows))

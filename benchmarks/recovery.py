@@ -1,9 +1,11 @@
-"""Parameters that others' simulators were run with, recovered from their records: python benchmarks/recovery.py
+"""Parameters that others' simulators were run with, recovered from their records: python
+benchmarks/recovery.py
 
-A numbered table of cases, like the PEtab test suite: a load of known parameters, played by ANDES or by motulator, is
-identified by the public calls from what it drew, and each parameter must come back within the tolerance of its case.
-Tolerances are a few times what was reached when the case was added. Those of ANDES come from its trapezoidal steps of
-1 ms; motulator integrates to 1e-10. No case holds noise: what is tested is the way from a record to a parameter.
+A numbered table of cases, like the PEtab test suite: a load of known parameters, played by ANDES or
+by motulator, is identified by the public calls from what it drew, and each parameter must come back
+within the tolerance of its case. Tolerances are a few times what was reached when the case was
+added. Those of ANDES come from its trapezoidal steps of 1 ms; motulator integrates to 1e-10. No
+case holds noise: what is tested is the way from a record to a parameter.
 """
 
 import argparse
@@ -34,7 +36,8 @@ POWER_BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": andes_check.FREQUE
 class Case:
     """A load and what must come back: `within` is {name or "one / other": relative tolerance}.
 
-    `model` are the arguments of `compose`, `truth` the load's values, `depths` those of ANDES's dips.
+    `model` are the arguments of `compose`, `truth` the load's values, `depths` those of ANDES's
+    dips.
     """
 
     number: int
@@ -59,9 +62,10 @@ class Case:
 def by_andes(case: Case) -> list[Event]:
     """The load's tables as they are exported, played in ANDES."""
     settings = {
-        "motor": {"name": case.model["motor"]}, "static": {"name": case.model["static"]},
+        "motor": {"name": case.model["motor"]},
+        "static": {"name": case.model["static"]},
         "effects": list(case.model.get("effects", ())),
-    }  # fmt: skip
+    }
     load = Identified(andes_check.result(dict(case.truth), settings, POWER_BEFORE))
     tables = json.loads(build("format", {"name": "andes"}).text(load))
     records = []
@@ -69,7 +73,9 @@ def by_andes(case: Case) -> list[Event]:
         seen = andes_check.andes(tables, andes_check.dip(STEP, depth=depth), STEP)
         f = andes_check.FREQUENCY + np.gradient(seen["angle"], STEP, edge_order=2) / (2 * np.pi)
         t = np.arange(len(f)) * STEP
-        records += tractexp.read(t=t, U=seen["U"], P=seen["P"], Q=seen["Q"], f=f, name=f"dip of {depth:.0%}")
+        records += tractexp.read(
+            t=t, U=seen["U"], P=seen["P"], Q=seen["Q"], f=f, name=f"dip of {depth:.0%}"
+        )
     return records
 
 
@@ -82,11 +88,19 @@ def by_motulator(case: Case) -> list[Event]:
     samples = np.concatenate([np.tile(cycle, BEFORE), samples], axis=1)
     kV, kA = motulator_check.PEAK / 1e3, motulator_check.RATED / 1e3
     base = Base(np.sqrt(1.5) * kV, 1.5 * kV * kA, motulator_check.FREQUENCY)
-    phasors = measure(samples, RATE, motulator_check.FREQUENCY, 0.0, window=estimator_of(ESTIMATOR).averager)
+    phasors = measure(
+        samples, RATE, motulator_check.FREQUENCY, 0.0, window=estimator_of(ESTIMATOR).averager
+    )
     powers = {"U": phasors.U, "P": phasors.S.real, "Q": phasors.S.imag, "U2": phasors.U2}
     waves = Waves(samples, 0.0, RATE, ESTIMATOR)
     record = Record(
-        "machine", t=phasors.t, f=phasors.f, base=base, source="motulator", waves=waves, **base.per_unit(powers)
+        "machine",
+        t=phasors.t,
+        f=phasors.f,
+        base=base,
+        source="motulator",
+        waves=waves,
+        **base.per_unit(powers),
     )
     return [detect(record.check())]
 
@@ -102,42 +116,79 @@ PLAIN = {"T_prime": 1e-3, "M": 1e-3, "T_m": 2e-4}  # what every record of a moto
 
 CASES = (
     Case(
-        1, "third-order motor, exponential load (Motor3, FLoad)", "ANDES",
-        {"motor": "electromechanical", "static": "exponential"}, MOTOR | EXPONENTS,
-        PLAIN | {"X_prime": 2e-3, "C": 2e-3, "p_v": 5e-4, "q_v": 2e-2}, (0.4, 0.25),
+        1,
+        "third-order motor, exponential load (Motor3, FLoad)",
+        "ANDES",
+        {"motor": "electromechanical", "static": "exponential"},
+        MOTOR | EXPONENTS,
+        PLAIN | {"X_prime": 2e-3, "C": 2e-3, "p_v": 5e-4, "q_v": 2e-2},
+        (0.4, 0.25),
     ),
     Case(
-        2, "third-order motor, ZIP load (Motor3, ZIP)", "ANDES",
-        {"motor": "electromechanical", "static": "zip"}, MOTOR | COMPOSITION,
-        PLAIN | {"C / X_prime": 2e-3, "a_Z": 1e-2, "a_I": 1e-2}, (0.4, 0.25),
+        2,
+        "third-order motor, ZIP load (Motor3, ZIP)",
+        "ANDES",
+        {"motor": "electromechanical", "static": "zip"},
+        MOTOR | COMPOSITION,
+        PLAIN | {"C / X_prime": 2e-3, "a_Z": 1e-2, "a_I": 1e-2},
+        (0.4, 0.25),
     ),
     Case(
-        3, "third-order motor, constant impedance: C and X' are one number", "ANDES",
-        {"motor": "electromechanical", "static": "constant_impedance"}, MOTOR, PLAIN | {"C / X_prime": 1e-3},
+        3,
+        "third-order motor, constant impedance: C and X' are one number",
+        "ANDES",
+        {"motor": "electromechanical", "static": "constant_impedance"},
+        MOTOR,
+        PLAIN | {"C / X_prime": 1e-3},
     ),
     Case(
-        4, "double cage, exponential load (Motor5, FLoad)", "ANDES",
-        {"motor": "double_cage", "static": "exponential"}, CAGES | EXPONENTS,
-        PLAIN | {"X_prime": 3e-3, "C": 3e-3, "T_second": 1e-2, "X_second": 5e-3, "p_v": 5e-4, "q_v": 3e-2}, (0.4, 0.25),
+        4,
+        "double cage, exponential load (Motor5, FLoad)",
+        "ANDES",
+        {"motor": "double_cage", "static": "exponential"},
+        CAGES | EXPONENTS,
+        PLAIN
+        | {
+            "X_prime": 3e-3,
+            "C": 3e-3,
+            "T_second": 1e-2,
+            "X_second": 5e-3,
+            "p_v": 5e-4,
+            "q_v": 3e-2,
+        },
+        (0.4, 0.25),
     ),
     Case(
-        5, "third-order motor with stator resistance, exponential load (Motor3, FLoad)", "ANDES",
+        5,
+        "third-order motor with stator resistance, exponential load (Motor3, FLoad)",
+        "ANDES",
         {"motor": "electromechanical", "static": "exponential", "effects": ["stator_resistance"]},
-        MOTOR | EXPONENTS | {"R_s": 0.02}, PLAIN | {"R_s": 5e-3, "C": 2e-3, "X_prime": 2e-3, "p_v": 5e-4}, (0.4, 0.25),
+        MOTOR | EXPONENTS | {"R_s": 0.02},
+        PLAIN | {"R_s": 5e-3, "C": 2e-3, "X_prime": 2e-3, "p_v": 5e-4},
+        (0.4, 0.25),
     ),
     Case(
-        6, "fifth-order motor in waveforms, an unbalanced dip (2.2 kW induction machine)", "motulator",
-        {"motor": "stator_flux", "static": "none", "domain": "waves"}, motulator_check.parameters(),
-        dict.fromkeys(["T_prime", "X_prime", "C", "M", "T_m", "R_s"], 1e-5), bounds={"M": [1e-4, 0.05]},
+        6,
+        "fifth-order motor in waveforms, an unbalanced dip (2.2 kW induction machine)",
+        "motulator",
+        {"motor": "stator_flux", "static": "none", "domain": "waves"},
+        motulator_check.parameters(),
+        dict.fromkeys(["T_prime", "X_prime", "C", "M", "T_m", "R_s"], 1e-5),
+        bounds={"M": [1e-4, 0.05]},
     ),
-)  # fmt: skip
+)
 
 
 def identified(case: Case) -> dict[str, float]:
     """The values that come back from the records of a case, in the base of its truth."""
     model = tractexp.compose(**case.model, bounds=dict(case.bounds))
     fit = tractexp.identify(
-        case.records(), model, optimizer="multistart_least_squares", seed=1, check_intervals=False, progress=False
+        case.records(),
+        model,
+        optimizer="multistart_least_squares",
+        seed=1,
+        check_intervals=False,
+        progress=False,
     )
     return {name: estimate.value for name, estimate in fit.on_given_base.items()}
 

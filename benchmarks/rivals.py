@@ -1,8 +1,10 @@
-"""The base model simulated with its objective in the usual other ways, each written as one who knows it would.
+"""The base model simulated with its objective in the usual other ways, each written as one who
+knows it would.
 
-Each way is a class made from a record and called with candidates (n, 7); it returns their sums of squared errors (n,).
-Those that integrate with an error control read the voltage off the same cubics as the kernel, so that all solve the
-same equations. Optional packages (`numbalsoda`, `jax` and `diffrax`) are imported where their way is made.
+Each way is a class made from a record and called with candidates (n, 7); it returns their sums of
+squared errors (n,). Those that integrate with an error control read the voltage off the same cubics
+as the kernel, so that all solve the same equations. Optional packages (`numbalsoda`, `jax` and
+`diffrax`) are imported where their way is made.
 """
 
 import math
@@ -25,7 +27,14 @@ def _hoisted(p):
     twice = 1.0 + (1.0 - 4.0 * (T_m * X_prime / C) ** 2) ** 0.5
     E_re, E_im, omega = C / 2 * twice, -T_m * X_prime, -2.0 * T_m * X_prime / C / (T_prime * twice)
     derivative = -1.0 / T_prime, C / T_prime, -1.0 / (X_prime * M), -T_m / M
-    output = 1.0 + E_im / X_prime, -1.0 / X_prime, 0.6 - (1.0 - E_re) / X_prime, 1.0 / X_prime, p_v, q_v
+    output = (
+        1.0 + E_im / X_prime,
+        -1.0 / X_prime,
+        0.6 - (1.0 - E_re) / X_prime,
+        1.0 / X_prime,
+        p_v,
+        q_v,
+    )
     return (E_re, E_im, omega), derivative, output
 
 
@@ -36,7 +45,9 @@ def _slope(E_re, E_im, omega, U, c):
 
 @inlined
 def _power(E_re, E_im, U, log_U, c):
-    return c[1] * U * E_im + c[0] * math.exp(c[4] * log_U), c[3] * U * (U - E_re) + c[2] * math.exp(c[5] * log_U)
+    return c[1] * U * E_im + c[0] * math.exp(c[4] * log_U), c[3] * U * (U - E_re) + c[2] * math.exp(
+        c[5] * log_U
+    )
 
 
 @fast
@@ -66,7 +77,10 @@ def _voltage(t, U, rise, h):
     """The voltage at any time: the cubic between samples that the kernel follows."""
     i = min(max(int(t / h), 0), len(U) - 2)
     x, step = t / h - i, U[i + 1] - U[i]
-    return U[i] + x * (rise[i] + x * (3 * step - 2 * rise[i] - rise[i + 1] + x * (rise[i] + rise[i + 1] - 2 * step)))
+    return U[i] + x * (
+        rise[i]
+        + x * (3 * step - 2 * rise[i] - rise[i + 1] + x * (rise[i] + rise[i + 1] - 2 * step))
+    )
 
 
 @fast
@@ -98,7 +112,9 @@ class Record:
         start, c, _ = _hoisted(tuple(p))
         given = (self.U, self.rise, self.h, c)
         span = (0.0, self.t[-1])
-        return solve_ivp(_right_hand_side, span, start, method, self.t, args=given, rtol=rtol, **settings).y
+        return solve_ivp(
+            _right_hand_side, span, start, method, self.t, args=given, rtol=rtol, **settings
+        ).y
 
     def solution(self, p: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """P and Q (N,) of one candidate to ten digits or more: the reference."""
@@ -153,7 +169,9 @@ class Vectorized(OneAtATime):
 
 
 class SciPy:
-    """`solve_ivp` one candidate after another; right-hand side and objective compiled, steps of 20 ms at most."""
+    """`solve_ivp` one candidate after another; right-hand side and objective compiled, steps of 20
+    ms at most.
+    """
 
     def __init__(self, record: Record, method: str, rtol: float):
         self.r, self.method, self.rtol = record, method, rtol
@@ -179,7 +197,9 @@ class NumbaLSODA:
         @cfunc(lsoda_sig, fastmath=FAST, error_model="numpy")
         def right_hand_side(t, y, dy, data):
             given = carray(data, (4 + 2 * size,))
-            d = _slope(y[0], y[1], y[2], _voltage(t, given[4 : 4 + size], given[4 + size :], h), given)
+            d = _slope(
+                y[0], y[1], y[2], _voltage(t, given[4 : 4 + size], given[4 + size :], h), given
+            )
             dy[0], dy[1], dy[2] = d
 
         solve, address = {"LSODA": lsoda, "DOP853": dop853}[method], right_hand_side.address
@@ -203,7 +223,9 @@ class NumbaLSODA:
 
 
 class Diffrax:
-    """All candidates at once in diffrax on JAX: `Tsit5` in double precision, steps of one sample."""
+    """All candidates at once in diffrax on JAX: `Tsit5` in double precision, steps
+    of one sample.
+    """
 
     def __init__(self, record: Record):
         import diffrax
@@ -211,7 +233,9 @@ class Diffrax:
         from jax import numpy as jnp
 
         jax.config.update("jax_enable_x64", True)
-        U, rise, log_U, P, Q, t = (jnp.asarray(getattr(record, k)) for k in ("U", "rise", "log_U", "P", "Q", "t"))
+        U, rise, log_U, P, Q, t = (
+            jnp.asarray(getattr(record, k)) for k in ("U", "rise", "log_U", "P", "Q", "t")
+        )
         h, last = record.h, len(record.U) - 2
         grid = diffrax.StepTo(ts=t)
 
@@ -223,11 +247,22 @@ class Diffrax:
 
         def one(p):
             start, c, (P_s, dP, Q_s, dQ, p_v, q_v) = _hoisted.py_func(p)
-            term = diffrax.ODETerm(lambda time, y, c: jnp.stack(_slope.py_func(*y, voltage(time), c)))
+            term = diffrax.ODETerm(
+                lambda time, y, c: jnp.stack(_slope.py_func(*y, voltage(time), c))
+            )
             solved = diffrax.diffeqsolve(
-                term, diffrax.Tsit5(), t[0], t[-1], None, jnp.stack(start), c, stepsize_controller=grid,
-                saveat=diffrax.SaveAt(ts=t), adjoint=diffrax.DirectAdjoint(), max_steps=len(record.U),
-            )  # fmt: skip
+                term,
+                diffrax.Tsit5(),
+                t[0],
+                t[-1],
+                None,
+                jnp.stack(start),
+                c,
+                stepsize_controller=grid,
+                saveat=diffrax.SaveAt(ts=t),
+                adjoint=diffrax.DirectAdjoint(),
+                max_steps=len(record.U),
+            )
             E_re, E_im, _ = solved.ys.T
             p = dP * U * E_im + P_s * jnp.exp(p_v * log_U)
             q = dQ * U * (U - E_re) + Q_s * jnp.exp(q_v * log_U)

@@ -1,8 +1,10 @@
-"""A machine of states for the folder of a run: runs, kills, full disks, second runs, `again`, `sync` and exports.
+"""A machine of states for the folder of a run: runs, kills, full disks, second runs, `again`,
+`sync` and exports.
 
-Hypothesis chooses what comes next, from every state that comes about; what must hold is looked at after each step. The
-search of a run is left out, which these say nothing of: its files are written, its folder is taken and given, its
-settings read back and its run logged by the code of the package. A directory stands for the MLflow store.
+Hypothesis chooses what comes next, from every state that comes about; what must hold is looked at
+after each step. The search of a run is left out, which these say nothing of: its files are written,
+its folder is taken and given, its settings read back and its run logged by the code of the package.
+A directory stands for the MLflow store.
 
     python benchmarks/run_machine.py [MINUTES]        a long one; the short one is a test
 """
@@ -27,7 +29,13 @@ import pytest
 import yaml
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, initialize, invariant, rule, run_state_machine_as_test
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    invariant,
+    rule,
+    run_state_machine_as_test,
+)
 
 from tractexp import files
 from tractexp.cli.again import build_repeat_command
@@ -35,7 +43,8 @@ from tractexp.errors import UserError
 from tractexp.run_folder import CONFIGURATION, GOES, LOCK, NEXT, WHOLE, run_folder
 from tractexp.tracking import TrackedRun, runfile, sync
 
-CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")  # of `os`: each changes what is on the disk
+# of `os`: each changes what is on the disk
+CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")
 URI = "sqlite:////nowhere/mlflow.db"
 SEEDS, MOMENTS = st.integers(1, 4), st.integers(1, 160)
 COUNTS: collections.Counter[str] = collections.Counter()
@@ -50,7 +59,9 @@ def result_of(seed: int) -> str:
 def write(seed: int):
     def results(folder: Path) -> list[Path]:
         paths = [files.write(folder / "result.json", result_of(seed))]
-        return paths + ([files.write(folder / "history.csv", f"seed {seed}\n")] if seed != 4 else [])
+        return paths + (
+            [files.write(folder / "history.csv", f"seed {seed}\n")] if seed != 4 else []
+        )
 
     return results
 
@@ -58,11 +69,16 @@ def write(seed: int):
 def configuration_of(folder: Path, seed: int) -> dict[str, str]:
     runtime = {"cwd": str(folder.parent), "config_sources": []}
     overrides = yaml.safe_dump(["optimizer=pso", f"seed={seed}"])
-    return {"hydra.yaml": yaml.safe_dump({"hydra": {"runtime": runtime}}), "overrides.yaml": overrides}
+    return {
+        "hydra.yaml": yaml.safe_dump({"hydra": {"runtime": runtime}}),
+        "overrides.yaml": overrides,
+    }
 
 
 class Shelf:
-    """A store: a folder with a file for each run that was logged, of which a killed writer leaves none."""
+    """A store: a folder with a file for each run that was logged, of which a killed writer leaves
+    none.
+    """
 
     def __init__(self, folder: Path):
         self.folder = folder
@@ -81,8 +97,12 @@ class Shelf:
     def run_of(self, client: object, uri: str, run_id: str) -> object:
         if (content := self.runs().get(run_id)) is None:
             return None
-        info = SimpleNamespace(run_id=run_id, status="FINISHED", lifecycle_stage="active", run_name=content["name"])
-        return SimpleNamespace(info=info, data=SimpleNamespace(tags={"tractexp.key": content["key"]}))
+        info = SimpleNamespace(
+            run_id=run_id, status="FINISHED", lifecycle_stage="active", run_name=content["name"]
+        )
+        return SimpleNamespace(
+            info=info, data=SimpleNamespace(tags={"tractexp.key": content["key"]})
+        )
 
 
 @contextlib.contextmanager
@@ -91,7 +111,9 @@ def ended_at(moment: int, end):
     numbers = itertools.count(1)
     with contextlib.ExitStack() as stack:
         for name in CALLS:
-            stack.enter_context(mock.patch.object(os, name, counted(getattr(os, name), numbers, moment, end)))
+            stack.enter_context(
+                mock.patch.object(os, name, counted(getattr(os, name), numbers, moment, end))
+            )
         yield
 
 
@@ -107,7 +129,9 @@ def counted(usual, numbers, moment: int, end):
 
 
 class RunMachine(RuleBasedStateMachine):
-    """`newest` are the seeds of which the whole run in the folder may be: several where a process was ended."""
+    """`newest` are the seeds of which the whole run in the folder may be: several where a process
+    was ended.
+    """
 
     def __init__(self):
         super().__init__()
@@ -126,7 +150,11 @@ class RunMachine(RuleBasedStateMachine):
     def perform(self, seed: int) -> None:
         with run_folder(self.folder, configuration_of(self.folder, seed), frozenset()) as place:
             place.place(write(seed))
-            entry = runfile.save(self.folder, TrackedRun("e", str(seed), artifacts=[self.folder / "result.json"]), URI)
+            entry = runfile.save(
+                self.folder,
+                TrackedRun("e", str(seed), artifacts=[self.folder / "result.json"]),
+                URI,
+            )
             entry.logged(self.shelf.log(entry.run, URI))
 
     @initialize(seed=st.none() | SEEDS)
@@ -199,7 +227,11 @@ class RunMachine(RuleBasedStateMachine):
     @rule()
     def sync(self):
         COUNTS["sync"] += 1
-        stand_ins = {"open_store": lambda uri: None, "run_of": self.shelf.run_of, "log": self.shelf.log}
+        stand_ins = {
+            "open_store": lambda uri: None,
+            "run_of": self.shelf.run_of,
+            "log": self.shelf.log,
+        }
         with mock.patch.multiple(sync, **stand_ins):
             counts = sync.sync(self.root)
         assert counts[sync.NOT] == 0
@@ -216,8 +248,11 @@ class RunMachine(RuleBasedStateMachine):
     @invariant()
     def a_whole_result_fits_its_configuration(self):
         STATES.add(self.state())
-        if (self.folder / WHOLE / GOES).exists():  # a newer one is whole: it has its places at the next look
-            assert (self.folder / WHOLE / "result.json").exists() or (self.folder / "result.json").exists()
+        # a newer one is whole: it has its places at the next look
+        if (self.folder / WHOLE / GOES).exists():
+            assert (self.folder / WHOLE / "result.json").exists() or (
+                self.folder / "result.json"
+            ).exists()
             return
         if not (self.folder / "result.json").exists():
             assert None in self.newest
@@ -239,16 +274,26 @@ class RunMachine(RuleBasedStateMachine):
         kept = json.loads((self.folder / runfile.FILE).read_text()) if runfile.FILE in names else {}
         on_the_way = any(name.startswith(f"{NEXT}.") and name != LOCK for name in names)
         return (
-            "result.json" in names, CONFIGURATION in names, WHOLE in names, on_the_way,
-            LOCK in names, bool(kept), bool(kept.get("run_id")), "load.mo" in names,
-        )  # fmt: skip
+            "result.json" in names,
+            CONFIGURATION in names,
+            WHOLE in names,
+            on_the_way,
+            LOCK in names,
+            bool(kept),
+            bool(kept.get("run_id")),
+            "load.mo" in names,
+        )
 
 
 RunMachine.TestCase.settings = settings(deadline=None)
 SHORT = settings(
-    max_examples=12, stateful_step_count=15, deadline=None, suppress_health_check=[*HealthCheck], database=None,
+    max_examples=12,
+    stateful_step_count=15,
+    deadline=None,
+    suppress_health_check=[*HealthCheck],
+    database=None,
     derandomize=True,
-)  # fmt: skip
+)
 
 
 def main(minutes: float) -> None:

@@ -1,11 +1,12 @@
 """Time and memory against size: python benchmarks/scale.py [--case NAME ...] [--tables]
 
-Each case is a command as users type it, on inputs of several sizes that are made here: the rows of a table with twenty
-dips, the events of one fit, the jobs of a sweep, the files of a survey, the samples of waveforms, and the commands that
-begin side by side on an empty cache. CPU seconds are those of the whole tree of processes, so they hold on a shared
-machine too, wall seconds do not; the peak is that of the command's own process. The slope is that of log CPU over log
-size between two sizes, less what the command takes for nothing (`--help`): 1 is linear. Rows are stored in scale.json
-case by case, and docs/benchmarks.md has its table from there.
+Each case is a command as users type it, on inputs of several sizes that are made here: the rows of
+a table with twenty dips, the events of one fit, the jobs of a sweep, the files of a survey, the
+samples of waveforms, and the commands that begin side by side on an empty cache. CPU seconds are
+those of the whole tree of processes, so they hold on a shared machine too, wall seconds do not; the
+peak is that of the command's own process. The slope is that of log CPU over log size between two
+sizes, less what the command takes for nothing (`--help`): 1 is linear. Rows are stored in
+scale.json case by case, and docs/benchmarks.md has its table from there.
 """
 
 import argparse
@@ -36,7 +37,15 @@ from tractexp import files  # noqa: E402
 
 STORED = Path(__file__).with_suffix(".json")
 PAGE = Path(__file__).parents[1] / "docs" / "benchmarks.md"
-MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+MOTOR = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 DIPS = 20  # of a table
 RATE = 50.0  # Hz, of a table
 NOISE = 1e-3  # pu
@@ -46,7 +55,9 @@ SMALL = ("optimizer=pso", "optimizer.population=20", "budget=200")
 
 @dataclass(frozen=True)
 class Use:
-    """What a command took: seconds, those of processors, and the greatest memory [MB] of its own process."""
+    """What a command took: seconds, those of processors, and the greatest memory [MB] of its own
+    process.
+    """
 
     wall: float
     cpu: float
@@ -54,11 +65,15 @@ class Use:
 
 
 def use(folder: Path, arguments: Sequence[str], **environment: str) -> Use:
-    """Run `python -m tractexp` in a folder. Raises `RuntimeError` with what it printed where it fails."""
+    """Run `python -m tractexp` in a folder. Raises `RuntimeError` with what it printed where it
+    fails.
+    """
     with (folder / "printed.txt").open("w+") as printed:
         started = time.perf_counter()
         command = [sys.executable, "-m", "tractexp", *arguments]
-        process = subprocess.Popen(command, cwd=folder, stdout=printed, stderr=printed, env=os.environ | environment)
+        process = subprocess.Popen(
+            command, cwd=folder, stdout=printed, stderr=printed, env=os.environ | environment
+        )
         peaks: list[float] = []
         watch = threading.Thread(target=watched, args=(process.pid, peaks))
         watch.start()
@@ -73,7 +88,9 @@ def use(folder: Path, arguments: Sequence[str], **environment: str) -> Use:
 
 
 def watched(pid: int, peaks: list[float]) -> None:
-    """Add the greatest memory of a process [MB] so far until it ends; a parent's own does not count as with rusage."""
+    """Add the greatest memory of a process [MB] so far until it ends; a parent's own does not count
+    as with rusage.
+    """
     while True:
         try:
             lines = Path(f"/proc/{pid}/status").read_text().splitlines()
@@ -92,11 +109,17 @@ def watched(pid: int, peaks: list[float]) -> None:
 def dip(rate: float, length: float, depth: float = 0.4) -> tuple[np.ndarray, ...]:
     """t [s], U, P, Q [pu] (N,) of a motor and a static load in a dip in the middle."""
     settings = {"depth": depth, "duration": 0.3, "fall": 0.1, "recovery": 0.1, "start": length / 2}
-    made = tractexp.simulate(tractexp.compose(), MOTOR, rate=rate, length=length, **settings).responses[0].to_frame()
+    made = (
+        tractexp.simulate(tractexp.compose(), MOTOR, rate=rate, length=length, **settings)
+        .responses[0]
+        .to_frame()
+    )
     return tuple(made[name].to_numpy() for name in "tUPQ")
 
 
-def write(path: Path, t: np.ndarray, U: np.ndarray, P: np.ndarray, Q: np.ndarray, seed: int) -> None:
+def write(
+    path: Path, t: np.ndarray, U: np.ndarray, P: np.ndarray, Q: np.ndarray, seed: int
+) -> None:
     """A table with noise in P and Q."""
     noise = NOISE * np.random.default_rng(seed).standard_normal((2, len(t)))
     table = np.column_stack([t, U, P + noise[0], Q + noise[1]])
@@ -133,7 +156,13 @@ def events(folder: Path, count: int) -> list[str]:
 
 
 def jobs(folder: Path, count: int) -> list[str]:
-    return ["-m", *SMALL, f"seed=range(0,{count})", "hydra.sweep.dir=sweep", "hydra.launcher.n_jobs=2"]
+    return [
+        "-m",
+        *SMALL,
+        f"seed=range(0,{count})",
+        "hydra.sweep.dir=sweep",
+        "hydra.launcher.n_jobs=2",
+    ]
 
 
 def archive(folder: Path, count: int) -> list[str]:
@@ -161,11 +190,19 @@ def waveforms(folder: Path, samples: int) -> list[str]:
     for k, row in enumerate(x * sizes[:, None]):
         gain, quantity = float(np.abs(row).max() / 32000), "voltage" if k < 3 else "current"
         unit, whole = "kV" if k < 3 else "kA", np.round(row / gain).astype(np.int16)
-        channels.append(Channel(f"{'UI'[k // 3]}{'ABC'[k % 3]}", whole, unit, quantity, "ABC"[k % 3], gain=gain))
+        channels.append(
+            Channel(f"{'UI'[k // 3]}{'ABC'[k % 3]}", whole, unit, quantity, "ABC"[k % 3], gain=gain)
+        )
     segment, start = Segment(0, x.shape[1], rate, 0.0), datetime(2026, 1, 1)
     made = Recording("", channels, [segment], 50.0, station="made", start=start)
     write_comtrade(made, folder / "waves.cfg", "BINARY", 1999)
-    return ["data=comtrade", "data.path=waves.cfg", "domain=waves", "model=fifth_order_branch", *FIT]
+    return [
+        "data=comtrade",
+        "data.path=waves.cfg",
+        "domain=waves",
+        "model=fifth_order_branch",
+        *FIT,
+    ]
 
 
 Prepare = Callable[[Path, int], list[str]]
@@ -182,7 +219,9 @@ def one(prepare: Prepare) -> Callable[[int], Use]:
 
 
 def cold(count: int) -> Use:
-    """So many commands begun at once on one empty cache: all of them must end well, with the same result."""
+    """So many commands begun at once on one empty cache: all of them must end well, with the same
+    result.
+    """
     with tempfile.TemporaryDirectory(prefix="scale") as name:
         cache, found = str(Path(name, "cache")), {}
 
@@ -196,9 +235,14 @@ def cold(count: int) -> Use:
             thread.start()
         for thread in threads:
             thread.join()
-        results = {json.dumps(json.loads(p.read_text())["parameters"]) for p in Path(name).glob("*/run/result.json")}
+        results = {
+            json.dumps(json.loads(p.read_text())["parameters"])
+            for p in Path(name).glob("*/run/result.json")
+        }
     if len(found) != count or len(results) != 1:
-        raise RuntimeError(f"{len(found)} of {count} commands ended well, with {len(results)} different results")
+        raise RuntimeError(
+            f"{len(found)} of {count} commands ended well, with {len(results)} different results"
+        )
     uses = list(found.values())
     return Use(max(u.wall for u in uses), sum(u.cpu for u in uses), max(u.peak for u in uses))
 
@@ -214,7 +258,11 @@ class Case:
 
 CASES = {
     "look": Case("rows of a table, `look`", one(looked), (450_000, 900_000, 1_800_000)),
-    "identify": Case("rows of a table, fitted about its first dip", one(identified), (450_000, 900_000, 1_800_000)),
+    "identify": Case(
+        "rows of a table, fitted about its first dip",
+        one(identified),
+        (450_000, 900_000, 1_800_000),
+    ),
     "events": Case("events in one fit", one(events), (5, 50, 500)),
     "sweep": Case("jobs of a sweep, logged", one(jobs), (20, 200, 2000)),
     "survey": Case("files of a survey", one(archive), (50, 500, 5000)),
@@ -238,9 +286,14 @@ def row(case: str, size: int) -> dict[str, Any]:
 
 
 def slopes(rows: Sequence[dict[str, Any]], idle: float) -> list[float | None]:
-    """Of log CPU beyond `idle` over log size, from each size to the next; None where nothing is beyond it."""
+    """Of log CPU beyond `idle` over log size, from each size to the next; None where nothing is
+    beyond it.
+    """
     beyond = [(one["size"], one["cpu"] - idle) for one in rows]
-    return [log(b[1] / a[1]) / log(b[0] / a[0]) if min(a[1], b[1]) > 0 else None for a, b in pairwise(beyond)]
+    return [
+        log(b[1] / a[1]) / log(b[0] / a[0]) if min(a[1], b[1]) > 0 else None
+        for a, b in pairwise(beyond)
+    ]
 
 
 def text(stored: dict[str, Any]) -> str:
@@ -248,7 +301,9 @@ def text(stored: dict[str, Any]) -> str:
     lines = ["| what grows | size | CPU, s | peak, MB | slope |", "|---|---|---|---|---|"]
     for name, case in CASES.items():
         rows = stored.get(name, [])
-        for k, (found, slope) in enumerate(zip(rows, [None, *slopes(rows, stored["idle"])], strict=False)):
+        for k, (found, slope) in enumerate(
+            zip(rows, [None, *slopes(rows, stored["idle"])], strict=False)
+        ):
             last = "" if slope is None else f"{slope:.2f}"
             cells = f"{found['size']:,} | {found['cpu']:.1f} | {found['peak']} | {last}"
             lines.append(f"| {'' if k else case.of} | {cells} |")
@@ -259,7 +314,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--case", nargs="*", choices=CASES, default=list(CASES))
     parser.add_argument("--most", type=int, help="leave larger sizes out")
-    parser.add_argument("--tables", action="store_true", help="write the page from what is stored, and run nothing")
+    parser.add_argument(
+        "--tables", action="store_true", help="write the page from what is stored, and run nothing"
+    )
     chosen = parser.parse_args()
     stored = json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else {}
     if not chosen.tables:

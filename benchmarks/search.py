@@ -1,11 +1,12 @@
-"""What an optimizer costs beside the simulations: microseconds per evaluation of a trivial objective.
+"""What an optimizer costs beside the simulations: microseconds per evaluation of a trivial
+objective.
 
     python benchmarks/search.py [--json] [--repeats 5]
 
-Population 50, 7 parameters, 15,000 evaluations through the one search loop (clipping, counting, history included);
-the median of the repeats, less the objective itself, timed on batches of the same size. Beside them, where
-installed, pycma by ask and tell and SciPy's differential evolution by themselves, one call per candidate and
-vectorized.
+Population 50, 7 parameters, 15,000 evaluations through the one search loop (clipping, counting,
+history included); the median of the repeats, less the objective itself, timed on batches of the
+same size. Beside them, where installed, pycma by ask and tell and SciPy's differential evolution by
+themselves, one call per candidate and vectorized.
 """
 
 import argparse
@@ -37,7 +38,9 @@ class Trivial:
 
 
 def ours(name: str) -> Callable[[], int]:
-    """One search by a plugin, with the benchmark's population where it has one; returns the evaluations made."""
+    """One search by a plugin, with the benchmark's population where it has one; returns the
+    evaluations made.
+    """
     settings = {"name": name}
     if hasattr(discover()["optimizer"][name], "population"):
         settings["population"] = POPULATION
@@ -68,9 +71,14 @@ def scipy_differential_evolution(vectorized: bool) -> int:
     one = lambda x: problem.objective(x[None])[0]  # noqa: E731
     found = differential_evolution(
         (lambda x: problem.objective(x.T)) if vectorized else one,
-        [(-1, 3)] * DIMENSION, init=start, maxiter=EVALUATIONS // POPULATION - 1, tol=0, polish=False,
-        vectorized=vectorized, updating="deferred",
-    )  # fmt: skip
+        [(-1, 3)] * DIMENSION,
+        init=start,
+        maxiter=EVALUATIONS // POPULATION - 1,
+        tol=0,
+        polish=False,
+        vectorized=vectorized,
+        updating="deferred",
+    )
     return (found.nit + 1) * POPULATION
 
 
@@ -84,13 +92,18 @@ def objective_microseconds(batch: int) -> float:
 
 
 def measure(run: Callable[[], int], repeats: int, objective: float) -> dict[str, float]:
-    """The run's cost per evaluation, the objective's taken off; the first run warms up and is not counted."""
+    """The run's cost per evaluation, the objective's taken off; the first run warms up and is not
+    counted.
+    """
     evaluations, times = run(), []
     for _ in range(repeats):
         start = time.perf_counter()
         run()
         times.append(time.perf_counter() - start)
-    return {"evaluations": evaluations, "microseconds": statistics.median(times) / evaluations * 1e6 - objective}
+    return {
+        "evaluations": evaluations,
+        "microseconds": statistics.median(times) / evaluations * 1e6 - objective,
+    }
 
 
 def main() -> None:
@@ -110,7 +123,12 @@ def main() -> None:
         rows[name] = measure(run, given.repeats, objective_microseconds(batch))
 
     if given.json:
-        setting = {"population": POPULATION, "dimension": DIMENSION, "budget": EVALUATIONS, "repeats": given.repeats}
+        setting = {
+            "population": POPULATION,
+            "dimension": DIMENSION,
+            "budget": EVALUATIONS,
+            "repeats": given.repeats,
+        }
         print(json.dumps({**setting, "overhead": rows}, indent=2))
         return
     print(f"{'optimizer':28}{'evaluations':>12}{'us per evaluation':>20}")

@@ -1,13 +1,16 @@
-"""Time per Runge-Kutta step and candidate, objective included, beside the usual ways of doing it. Run: see --help.
+"""Time per Runge-Kutta step and candidate, objective included, beside the usual ways of doing it.
+Run: see --help.
 
-All ways simulate the same record of 1,000 samples with the base model and sum the squared errors, in turns within this
-one run; the smallest time of each is reported, which is the figure least disturbed by other work on the machine. The
-measured power is the solution to ten digits, so that the objective at the true parameters tells each way's error. Ways
-that control their error by a tolerance take the loosest one that meets the error asked for.
+All ways simulate the same record of 1,000 samples with the base model and sum the squared errors,
+in turns within this one run; the smallest time of each is reported, which is the figure least
+disturbed by other work on the machine. The measured power is the solution to ten digits, so that
+the objective at the true parameters tells each way's error. Ways that control their error by a
+tolerance take the loosest one that meets the error asked for.
 
-Two ways are there where their packages are: `pip install numbalsoda` (C++ LSODA; MIT; builds with a Fortran compiler)
-and `pip install diffrax` (on JAX; Apache 2.0). So is ANDES (GPL; extra `crosscheck`), which solves more than is asked:
-the network's equations with the load's, one load at a time, without an objective.
+Two ways are there where their packages are: `pip install numbalsoda` (C++ LSODA; MIT; builds with a
+Fortran compiler) and `pip install diffrax` (on JAX; Apache 2.0). So is ANDES (GPL; extra
+`crosscheck`), which solves more than is asked: the network's equations with the load's, one load at
+a time, without an objective.
 """
 
 import argparse
@@ -97,14 +100,24 @@ def loosest(make: Callable[[float], Callable], most: float) -> tuple[Callable, f
 def rival_ways(record: rivals.Record, error: float) -> dict[str, Way]:
     """Everything that is installed, by the key its figures have."""
     ways = {
-        "numba_one_at_a_time": Way("Numba, one at a time, the same steps", rivals.OneAtATime(record), CANDIDATES),
+        "numba_one_at_a_time": Way(
+            "Numba, one at a time, the same steps", rivals.OneAtATime(record), CANDIDATES
+        ),
         "numpy": Way("NumPy, all at once, the same steps", rivals.Vectorized(record), CANDIDATES),
     }
     adaptive = {
         "solve_ivp": ("SciPy LSODA", lambda rtol: rivals.SciPy(record, "LSODA", rtol), 2),
         "solve_ivp_dop853": ("SciPy DOP853", lambda rtol: rivals.SciPy(record, "DOP853", rtol), 2),
-        "numbalsoda": ("numbalsoda LSODA", lambda rtol: rivals.NumbaLSODA(record, "LSODA", rtol), 20),
-        "numbalsoda_dop853": ("numbalsoda DOP853", lambda rtol: rivals.NumbaLSODA(record, "DOP853", rtol), 20),
+        "numbalsoda": (
+            "numbalsoda LSODA",
+            lambda rtol: rivals.NumbaLSODA(record, "LSODA", rtol),
+            20,
+        ),
+        "numbalsoda_dop853": (
+            "numbalsoda DOP853",
+            lambda rtol: rivals.NumbaLSODA(record, "DOP853", rtol),
+            20,
+        ),
     }
     for key, (label, make, count) in adaptive.items():
         for suffix, most in (("", error), ("_loose", LOOSE)):
@@ -116,7 +129,9 @@ def rival_ways(record: rivals.Record, error: float) -> dict[str, Way]:
             if found:
                 ways[key + suffix] = Way(f"{label}, tolerance {found[1]:.0e}", found[0], count)
     try:
-        ways["diffrax"] = Way("diffrax Tsit5, all at once, a step a sample", rivals.Diffrax(record), CANDIDATES)
+        ways["diffrax"] = Way(
+            "diffrax Tsit5, all at once, a step a sample", rivals.Diffrax(record), CANDIDATES
+        )
     except ImportError as missing:
         print(f"diffrax left out: {missing}", file=sys.stderr)
     return ways
@@ -132,12 +147,18 @@ def race(ways: list[Way], rounds: int) -> None:
 
 
 def andes_row() -> dict[str, float] | None:
-    """ANDES on the same load behind a line: time per step, and its error at its own terminal voltage."""
+    """ANDES on the same load behind a line: time per step, and its error at its own terminal
+    voltage.
+    """
     if andes_check.interpreter() is None:
         return None
     step, voltage = 1e-3, excitation().U
     parameters = dict(zip(base().names, TRUTH, strict=True))
-    settings = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "effects": []}
+    settings = {
+        "motor": {"name": "electromechanical"},
+        "static": {"name": "exponential"},
+        "effects": [],
+    }
     before = {"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": andes_check.FREQUENCY}
     load = Identified(andes_check.result(parameters, settings, before))
     tables = json.loads(build("format", {"name": "andes"}).text(load))
@@ -151,7 +172,10 @@ def andes_row() -> dict[str, float] | None:
 def kernels(drive: Drive) -> dict[tuple[int, int], Way]:
     """Our public batch call by number of candidates and substeps."""
     calls = ((CANDIDATES, 1), (CANDIDATES, 2), (POPULATION, 1), (FEW, 1))
-    return {(n, substeps): Way("tractexp", ours(base(), drive, substeps), n, substeps) for n, substeps in calls}
+    return {
+        (n, substeps): Way("tractexp", ours(base(), drive, substeps), n, substeps)
+        for n, substeps in calls
+    }
 
 
 def limits(ways: dict[tuple[int, int], Way], rounds: int) -> list[dict]:
@@ -207,23 +231,41 @@ def measure(rounds: int) -> dict:
     figures |= {f"nanoseconds_per_step_{key}": per_sample[key] for key in others}
     figures |= {f"ratio_to_{key}": per_sample[key] / own.nanoseconds for key in others}
     return figures | {
-        "simulations_per_second": CANDIDATES / own.seconds, "largest_difference_to_numpy": float(difference),
-        "candidates": CANDIDATES, "samples": SAMPLES, "machine": platform.processor() or platform.machine(),
-    }  # fmt: skip
+        "simulations_per_second": CANDIDATES / own.seconds,
+        "largest_difference_to_numpy": float(difference),
+        "candidates": CANDIDATES,
+        "samples": SAMPLES,
+        "machine": platform.processor() or platform.machine(),
+    }
 
 
 def tell(figures: dict) -> None:
     """The tables."""
-    print(f"{SAMPLES} samples, one thread; per sample and candidate; error: RMS of P and Q at the truth\n")
+    print(
+        f"{SAMPLES} samples, one thread; per sample and candidate; error: RMS of P and Q at the"
+        " truth\n"
+    )
     for row in figures["rows"]:
-        line = f"{row['way']:<46}{row['nanoseconds']:>10.1f} ns{row['ratio']:>9.1f} x{row['error']:>12.1e} pu"
+        line = (
+            f"{row['way']:<46}{row['nanoseconds']:>10.1f} ns{row['ratio']:>9.1f}"
+            f" x{row['error']:>12.1e} pu"
+        )
         print(line)
     if row := figures["andes"]:
         times = row["nanoseconds_per_step"] / figures["nanoseconds_per_step"]
-        print(f"{'ANDES, one load with its network':<46}{row['nanoseconds_per_step']:>10.0f} ns{times:>9.0f} x", end="")
+        print(
+            f"{'ANDES, one load with its network':<46}{row['nanoseconds_per_step']:>10.0f}"
+            f" ns{times:>9.0f} x",
+            end="",
+        )
         print(f"{row['error']:>12.1e} pu, without an objective")
-    print("\nkernel, public batch call; ns per Runge-Kutta step and candidate; floating-point operations per step and")
-    print("vector; limit: these alone, at the rate that operations in registers reach in this run\n")
+    print(
+        "\nkernel, public batch call; ns per Runge-Kutta step and candidate; floating-point"
+        " operations per step and"
+    )
+    print(
+        "vector; limit: these alone, at the rate that operations in registers reach in this run\n"
+    )
     print(f"{'candidates':>12}{'substeps':>10}{'ns':>8}{'operations':>12}{'limit':>8}{'share':>7}")
     for row in figures["kernel"]:
         line = f"{row['candidates']:>12}{row['substeps']:>10}{row['nanoseconds_per_step']:>8.2f}"

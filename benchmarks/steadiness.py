@@ -1,10 +1,12 @@
-"""Is what a load does beside a dip seen, and nothing else? `python benchmarks/steadiness.py [--tables]`.
+"""Is what a load does beside a dip seen, and nothing else? `python benchmarks/steadiness.py
+[--tables]`.
 
-Dips of loads whose parameters, voltage, sampling rate and frequency are drawn, with noise of 0.1 and 1 %. In each kind
-the load, or its voltage, also changes for another reason, smeared over the cycle of a phasor. Counted is what
-`tractexp.record.detect` makes of it; a record without such a change is a false alarm where anything is noted, refused
-or cut. The seeds are of a series that chose no constant; an earlier one had shown a
-fault of `USUAL_U`. docs/records.md has the table from steadiness.json.
+Dips of loads whose parameters, voltage, sampling rate and frequency are drawn, with noise of 0.1
+and 1 %. In each kind the load, or its voltage, also changes for another reason, smeared over the
+cycle of a phasor. Counted is what `tractexp.record.detect` makes of it; a record without such a
+change is a false alarm where anything is noted, refused or cut. The seeds are of a series that
+chose no constant; an earlier one had shown a fault of `USUAL_U`. docs/records.md has the table from
+steadiness.json.
 """
 
 import json
@@ -32,7 +34,9 @@ Course = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Drawn:
-    """A record with a change at time `at` [s]; `load` is P + jQ right before the dip, and the dip ends at `end` [s]."""
+    """A record with a change at time `at` [s]; `load` is P + jQ right before the dip, and the dip
+    ends at `end` [s].
+    """
 
     record: Record
     at: float
@@ -45,14 +49,28 @@ def plain(rng: np.random.Generator, noise: float) -> Drawn:
     frequency, rate = float(rng.choice([50.0, 60.0])), float(rng.choice([100.0, 200.0, 500.0]))
     model, duration = tractexp.compose(), rng.uniform(0.06, 0.3)
     while True:
-        values = {"T_prime": rng.uniform(0.03, 0.3), "X_prime": rng.uniform(0.15, 0.6), "C": rng.uniform(0.8, 0.97),
-                  "M": rng.uniform(0.003, 0.015), "T_m": rng.uniform(0.2, 0.7), "p_v": rng.uniform(0.5, 2.5),
-                  "q_v": rng.uniform(1.0, 5.0)}  # fmt: skip
+        values = {
+            "T_prime": rng.uniform(0.03, 0.3),
+            "X_prime": rng.uniform(0.15, 0.6),
+            "C": rng.uniform(0.8, 0.97),
+            "M": rng.uniform(0.003, 0.015),
+            "T_m": rng.uniform(0.2, 0.7),
+            "p_v": rng.uniform(0.5, 2.5),
+            "q_v": rng.uniform(1.0, 5.0),
+        }
         try:
             answer = tractexp.simulate(
-                model, values, depth=rng.uniform(0.1, 0.5), duration=duration, start=BEGIN, length=LENGTH, rate=rate,
-                fall=0.02, recovery=rng.uniform(0.03, 0.1), Q0=rng.uniform(0.3, 0.7),
-            )  # fmt: skip
+                model,
+                values,
+                depth=rng.uniform(0.1, 0.5),
+                duration=duration,
+                start=BEGIN,
+                length=LENGTH,
+                rate=rate,
+                fall=0.02,
+                recovery=rng.uniform(0.03, 0.1),
+                Q0=rng.uniform(0.3, 0.7),
+            )
             break
         except UserError:
             continue
@@ -65,7 +83,11 @@ def plain(rng: np.random.Generator, noise: float) -> Drawn:
 def changed(drawn: Drawn, at: float, course: Course) -> Drawn:
     """The same with its load multiplied by a course of time, 1 right before the dip."""
     record = drawn.record
-    return replace(drawn, record=replace(record, P=record.P * course(record.t), Q=record.Q * course(record.t)), at=at)
+    return replace(
+        drawn,
+        record=replace(record, P=record.P * course(record.t), Q=record.Q * course(record.t)),
+        at=at,
+    )
 
 
 def step(drawn: Drawn, at: float, before: float, after: float) -> Drawn:
@@ -81,7 +103,9 @@ def factor(rng: np.random.Generator, low: float, high: float) -> float:
 def tap(drawn: Drawn, rng: np.random.Generator) -> Drawn:
     at, record = rng.uniform(1.2, 1.7), drawn.record
     ratio = factor(rng, 0.015, 0.028)
-    return replace(drawn, record=replace(record, U=record.U * np.where(record.t < at, ratio, 1.0)), at=at)
+    return replace(
+        drawn, record=replace(record, U=record.U * np.where(record.t < at, ratio, 1.0)), at=at
+    )
 
 
 def after(drawn: Drawn, rng: np.random.Generator, left: float) -> Drawn:
@@ -100,20 +124,32 @@ def slope(drawn: Drawn, rng: np.random.Generator) -> Drawn:
 
 KINDS: dict[str, Callable[[Drawn, np.random.Generator], Drawn]] = {
     "no change": lambda drawn, rng: drawn,
-    "step before, 6 to 10 %": lambda d, rng: step(d, rng.uniform(1.2, 1.7), factor(rng, 0.06, 0.1), 1.0),
-    "step before, 10 to 90 %": lambda d, rng: step(d, rng.uniform(1.2, 1.7), factor(rng, 0.1, 0.9), 1.0),
+    "step before, 6 to 10 %": lambda d, rng: step(
+        d, rng.uniform(1.2, 1.7), factor(rng, 0.06, 0.1), 1.0
+    ),
+    "step before, 10 to 90 %": lambda d, rng: step(
+        d, rng.uniform(1.2, 1.7), factor(rng, 0.1, 0.9), 1.0
+    ),
     "step of the voltage before, 1.5 to 2.8 %": tap,
     "rise or fall before, 10 to 30 % a second": slope,
     "swing before, 10 to 30 %, 0.8 to 4 Hz": sine,
     "switched off after": lambda d, rng: after(d, rng, 0.0),
     "step after, to 40 to 90 %": lambda d, rng: after(d, rng, rng.uniform(0.4, 0.9)),
-    "loss in the dip, to 0 to 40 %": lambda d, rng: step(d, rng.uniform(BEGIN + 0.03, d.end), 1.0, rng.uniform(0, 0.4)),
+    "loss in the dip, to 0 to 40 %": lambda d, rng: step(
+        d, rng.uniform(BEGIN + 0.03, d.end), 1.0, rng.uniform(0, 0.4)
+    ),
 }
-WORDS = {"rise": "not steady before the dip", "swing": "not steady before the dip", "loss": "% of its power in the dip"}
+WORDS = {
+    "rise": "not steady before the dip",
+    "swing": "not steady before the dip",
+    "loss": "% of its power in the dip",
+}
 
 
 def seen(kind: str, drawn: Drawn, event: Event) -> bool:
-    """Whether a record is treated as its kind asks: nothing noted, begun after, ended before, or the sentence said."""
+    """Whether a record is treated as its kind asks: nothing noted, begun after, ended before, or
+    the sentence said.
+    """
     record, said, cycle = (
         event.record,
         " ".join(event.record.notes),
@@ -125,7 +161,9 @@ def seen(kind: str, drawn: Drawn, event: Event) -> bool:
         return word in said
     if "after" in kind:
         return bool(drawn.at - 5 * cycle < record.t[-1] < drawn.at + cycle)
-    near = abs(complex(event.P0, event.Q0) - drawn.load) < NEAR * abs(drawn.load) + 3 * event.noise_P
+    near = (
+        abs(complex(event.P0, event.Q0) - drawn.load) < NEAR * abs(drawn.load) + 3 * event.noise_P
+    )
     return near and bool(drawn.at - cycle < record.t[event.steady.start] < drawn.at + 3 * cycle)
 
 
@@ -140,19 +178,32 @@ def right(kind: str, noise: float, k: int) -> bool:
 
 
 def row(kind: str, noise: float, drawn: int = COUNT) -> dict[str, object]:
-    return {"kind": kind, "noise": noise, "drawn": drawn, "right": sum(right(kind, noise, k) for k in range(drawn))}
+    return {
+        "kind": kind,
+        "noise": noise,
+        "drawn": drawn,
+        "right": sum(right(kind, noise, k) for k in range(drawn)),
+    }
 
 
 def table(stored: list[dict[str, float]]) -> str:
     head = ["what else happens", *(f"noise {100 * n:g} %" for n in NOISES)]
-    shares = {kind: [f"{r['right'] / r['drawn']:.1%}" for r in stored if r["kind"] == kind] for kind in KINDS}
+    shares = {
+        kind: [f"{r['right'] / r['drawn']:.1%}" for r in stored if r["kind"] == kind]
+        for kind in KINDS
+    }
     return marked.table(head, [[kind, *cells] for kind, cells in shares.items()])
 
 
 def main() -> int:
     if sys.argv[1:] != ["--tables"]:
-        files.write(STORED, json.dumps([row(kind, noise) for kind in KINDS for noise in NOISES], indent=1) + "\n")
-    marked.replace(PAGE, "benchmarks/steadiness.py", table(json.loads(STORED.read_text(encoding="utf-8"))))
+        files.write(
+            STORED,
+            json.dumps([row(kind, noise) for kind in KINDS for noise in NOISES], indent=1) + "\n",
+        )
+    marked.replace(
+        PAGE, "benchmarks/steadiness.py", table(json.loads(STORED.read_text(encoding="utf-8")))
+    )
     return 0
 
 

@@ -1,9 +1,11 @@
-"""Damage that knows the structure of a file: `python benchmarks/structured_damage.py [--count 10000] [--seed 1]`.
+"""Damage that knows the structure of a file: `python benchmarks/structured_damage.py [--count
+10000] [--seed 1]`.
 
-Links, counts, types and emptiness are changed, with all around them sound; what is allowed is as in mutated_files.py.
+Links, counts, types and emptiness are changed, with all around them sound; what is allowed is as in
+mutated_files.py.
 
-Bits that fall anywhere are mostly refused by the first check. These go behind it: compressed bodies are unpacked,
-changed and packed again, archives rewritten.
+Bits that fall anywhere are mostly refused by the first check. These go behind it: compressed bodies
+are unpacked, changed and packed again, archives rewritten.
 """
 
 import functools
@@ -19,7 +21,9 @@ COLLECTION = 1  # kind of an element
 
 
 def restructured(paths, folder, rng):
-    """The files of a record with one damaged structure in one of them; its path, and what was done."""
+    """The files of a record with one damaged structure in one of them; its path, and
+    what was done.
+    """
     for path in paths:
         (folder / path.name).write_bytes(path.read_bytes())
     target = paths[0 if len(paths) == 1 or rng.random() < 0.7 else 1]
@@ -33,10 +37,20 @@ def choose(rng, options):
 
 
 def damage(path, rng):
-    """(bytes of the damaged file, what was done) of a sound one, by its ending; None where nothing is known of it."""
+    """(bytes of the damaged file, what was done) of a sound one, by its ending; None where nothing
+    is known of it.
+    """
     data, ending = path.read_bytes(), path.suffix.lower()
-    ways = {".pqd": _pqdif, ".xlsx": _archive, ".ods": _archive, ".cfg": _header, ".cff": _header, ".dat": _samples,
-            ".cev": _report, ".parquet": _footer}  # fmt: skip
+    ways = {
+        ".pqd": _pqdif,
+        ".xlsx": _archive,
+        ".ods": _archive,
+        ".cfg": _header,
+        ".cff": _header,
+        ".dat": _samples,
+        ".cev": _report,
+        ".parquet": _footer,
+    }
     return ways[ending](data, rng) if ending in ways else None
 
 
@@ -54,7 +68,9 @@ def _pqdif(data, rng):
     if rng.random() < 0.4:
         field = choose(rng, [("header", 32), ("size", 36), ("link", 40), ("checksum", 44)])
         value = choose(rng, [*INTEGERS, *starts, at + 1, len(data), len(data) - 1])
-        return data[: at + field[1]] + struct.pack("<i", value) + data[at + field[1] + 4 :], f"{field[0]} {value}"
+        return data[: at + field[1]] + struct.pack("<i", value) + data[
+            at + field[1] + 4 :
+        ], f"{field[0]} {value}"
     header, size = HEADER.unpack_from(data, at)[2:4]
     content = data[at + header : at + header + size]
     packed = at > 0 and content[:1] == b"\x78"
@@ -70,7 +86,9 @@ def _pqdif(data, rng):
 
 
 def _element(body, rng):
-    """Change a count, or the kind, type, link or size of an element, somewhere in the tree of a body."""
+    """Change a count, or the kind, type, link or size of an element, somewhere in the tree of a
+    body.
+    """
     places, open_, seen = [], [0], set()
     while open_:
         at = open_.pop()
@@ -84,7 +102,12 @@ def _element(body, rng):
             if own + ENTRY.size > len(body):
                 break
             _, kind, _, _, link, _ = ENTRY.unpack_from(body, own)
-            places += [("kind", own + 16), ("type", own + 17), ("link", own + 20), ("size", own + 24)]
+            places += [
+                ("kind", own + 16),
+                ("type", own + 17),
+                ("link", own + 20),
+                ("size", own + 24),
+            ]
             places += [("vector", link)] * (kind == 3 and 0 <= link <= len(body) - 4)
             open_ += [link] * (kind == COLLECTION)
     what, at = choose(rng, places)
@@ -97,7 +120,9 @@ def _element(body, rng):
 
 
 def _archive(data, rng):
-    """A member of a workbook lost, empty, cut, doubled in place of another, or with a digit or a tag changed."""
+    """A member of a workbook lost, empty, cut, doubled in place of another, or with a digit or a
+    tag changed.
+    """
     with zipfile.ZipFile(io.BytesIO(data)) as book:
         members = {name: book.read(name) for name in book.namelist()}
     name = choose(rng, sorted(members))
@@ -132,7 +157,9 @@ def _header(data, rng):
     way = choose(rng, ["counts", "number", "rates", "no channels", "empty field"])
     if way == "counts":
         k = min(1, len(lines) - 1)
-        lines[k] = f"{choose(rng, INTEGERS)},{choose(rng, INTEGERS)}A,{choose(rng, INTEGERS)}D\r".encode()
+        lines[k] = (
+            f"{choose(rng, INTEGERS)},{choose(rng, INTEGERS)}A,{choose(rng, INTEGERS)}D\r".encode()
+        )
     elif way == "no channels":
         lines[2 : 2 + int(rng.integers(1, 8))] = []
     else:
@@ -147,7 +174,11 @@ def _header(data, rng):
 def _samples(data, rng):
     """The samples of a COMTRADE record: none, a part of one, or some over."""
     way = choose(rng, ["none", "part", "over"])
-    made = {"none": b"", "part": data[: int(rng.integers(1, 20))], "over": data + data[: int(rng.integers(1, 40))]}[way]
+    made = {
+        "none": b"",
+        "part": data[: int(rng.integers(1, 20))],
+        "over": data + data[: int(rng.integers(1, 40))],
+    }[way]
     return made, way
 
 
@@ -164,7 +195,9 @@ def _report(data, rng):
     elif way == "short line":
         fields = fields[: int(rng.integers(len(fields)))]
     elif way == "word":
-        fields[-2 if len(fields) > 1 else 0] = choose(rng, [b'"F"', b'"' + b"F" * 400 + b'"', b'"G0"', b'"0123"'])
+        fields[-2 if len(fields) > 1 else 0] = choose(
+            rng, [b'"F"', b'"' + b"F" * 400 + b'"', b'"G0"', b'"0123"']
+        )
     lines[k : k + 1] = [] if way == "no line" else [b",".join(fields)]
     return b"\n".join(lines), f"{way} in line {k + 1}"
 

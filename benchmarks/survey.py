@@ -1,8 +1,9 @@
 """Files a second of a survey: `python benchmarks/survey.py [files]` writes benchmarks/survey.json.
 
-The archive is generated: COMTRADE files of 1 s, of 6 to 12 channels at 3.2 to 4 kHz, binary and ASCII, with one dip
-each. Wall seconds are those of the whole call on two processes, their start included; CPU seconds are those of the
-whole tree of processes, so they hold on a shared machine too; the load average says how shared it was.
+The archive is generated: COMTRADE files of 1 s, of 6 to 12 channels at 3.2 to 4 kHz, binary and
+ASCII, with one dip each. Wall seconds are those of the whole call on two processes, their start
+included; CPU seconds are those of the whole tree of processes, so they hold on a shared machine
+too; the load average says how shared it was.
 """
 
 import argparse
@@ -31,14 +32,25 @@ def recording(rng: np.random.Generator) -> Recording:
     size = 1 - depth * ((t >= start) & (t < start + duration))
     turn = 2 * np.pi * 50 * t - 2 * np.pi / 3 * np.arange(3)[:, None]
     waves = [("U", "kV", 110 / np.sqrt(3), 0.0)]
-    waves += [(f"Q{k + 1} I", "kA", rng.uniform(0.1, 0.4), rng.uniform(0.2, 0.6)) for k in range(loads)]
+    waves += [
+        (f"Q{k + 1} I", "kA", rng.uniform(0.1, 0.4), rng.uniform(0.2, 0.6)) for k in range(loads)
+    ]
     channels = []
     for name, unit, level, lag in waves:
-        values = np.sqrt(2) * level * size * np.cos(turn - lag) + 1e-3 * level * rng.standard_normal(turn.shape)
+        values = np.sqrt(2) * level * size * np.cos(
+            turn - lag
+        ) + 1e-3 * level * rng.standard_normal(turn.shape)
         gain = float(np.abs(values).max() / 32000)
         quantity = "voltage" if unit == "kV" else "current"
         channels += [
-            Channel(f"{name}{phase}", np.round(row / gain).astype(np.int16), unit, quantity, phase, gain=gain)
+            Channel(
+                f"{name}{phase}",
+                np.round(row / gain).astype(np.int16),
+                unit,
+                quantity,
+                phase,
+                gain=gain,
+            )
             for phase, row in zip("ABC", values, strict=True)
         ]
     segment = Segment(0, len(t), rate, 0.0)
@@ -72,12 +84,18 @@ def main() -> None:
         tractexp.survey(folder, cores=CORES, keep=keep, progress=False)
         again = time.perf_counter() - started
     found = {
-        "files": count, "cores": CORES, "load_average": round(os.getloadavg()[0], 1),
-        "wall_seconds": round(wall, 2), "cpu_seconds": round(cpu, 2),
-        "files_per_second": round(count / wall, 1), "files_per_cpu_second": round(count / cpu, 1),
-        "again_seconds": round(again, 3), "rows": len(made.rows), "worth": sum(row["worth"] for row in made.rows),
+        "files": count,
+        "cores": CORES,
+        "load_average": round(os.getloadavg()[0], 1),
+        "wall_seconds": round(wall, 2),
+        "cpu_seconds": round(cpu, 2),
+        "files_per_second": round(count / wall, 1),
+        "files_per_cpu_second": round(count / cpu, 1),
+        "again_seconds": round(again, 3),
+        "rows": len(made.rows),
+        "worth": sum(row["worth"] for row in made.rows),
         "unread": len(made.unread),
-    }  # fmt: skip
+    }
     print(json.dumps(found, indent=2))
     Path(__file__).with_suffix(".json").write_text(json.dumps(found, indent=2) + "\n")
 

@@ -1,8 +1,9 @@
 """What a job of a sweep costs beyond its search: `python benchmarks/sweep.py [seeds]`.
 
-Runs optimizers x seeds as a logged sweep in an empty folder and then, in this process, the same searches by themselves.
-CPU seconds are those of the whole tree of processes, so they hold on a shared machine too; wall seconds do not. What
-every sweep spends once (start of the workers, the parent, the store) is measured by a sweep of one job per worker.
+Runs optimizers x seeds as a logged sweep in an empty folder and then, in this process, the same
+searches by themselves. CPU seconds are those of the whole tree of processes, so they hold on a
+shared machine too; wall seconds do not. What every sweep spends once (start of the workers, the
+parent, the store) is measured by a sweep of one job per worker.
 """
 
 import os
@@ -18,11 +19,21 @@ OPTIMIZERS, BUDGET, WORKERS = ("issa", "ssa", "pso"), 15000, 2
 
 def sweep(folder: Path, *arguments: str) -> tuple[float, float]:
     """Wall and CPU seconds of a sweep in `folder`."""
-    command = [sys.executable, "-m", "tractexp", "-m", f"hydra.launcher.n_jobs={WORKERS}", *arguments]
+    command = [
+        sys.executable,
+        "-m",
+        "tractexp",
+        "-m",
+        f"hydra.launcher.n_jobs={WORKERS}",
+        *arguments,
+    ]
     before, started = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
     subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.perf_counter() - started, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+    return (
+        time.perf_counter() - started,
+        after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime,
+    )
 
 
 def compute(folder: Path) -> float:
@@ -53,9 +64,14 @@ def main(seeds: int = 20) -> None:
         _, once = sweep(folder, "optimizer=pso,ssa", "budget=100", "hydra.sweep.dir=small")
         wall, cpu = sweep(folder, *swept, "hydra.sweep.dir=large")
         searched = compute(folder / "large")
-    print(f"{jobs} jobs of {BUDGET} simulations, {WORKERS} workers: {wall:.1f} s, {cpu:.1f} s of CPU")
+    print(
+        f"{jobs} jobs of {BUDGET} simulations, {WORKERS} workers: {wall:.1f} s, {cpu:.1f} s of CPU"
+    )
     beyond = (cpu - once - searched) / jobs
-    print(f"once per sweep {once:.1f} s of CPU; per job: search {searched / jobs:.3f} s, beyond it {beyond:.3f} s")
+    print(
+        f"once per sweep {once:.1f} s of CPU; per job: search {searched / jobs:.3f} s, beyond it"
+        f" {beyond:.3f} s"
+    )
 
 
 if __name__ == "__main__":

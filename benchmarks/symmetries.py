@@ -1,7 +1,9 @@
-"""Two motors that no record can tell from their likes: a T-circuit, and one with a rating of its own.
+"""Two motors that no record can tell from their likes: a T-circuit, and one with a rating of its
+own.
 
-Both are the third-order motor of the paper in other parameters, so that which directions are invisible is known:
-a T-circuit has four numbers for the three observables X, X' and T0', and a rating only scales the others.
+Both are the third-order motor of the paper in other parameters, so that which directions are
+invisible is known: a T-circuit has four numbers for the three observables X, X' and T0', and a
+rating only scales the others.
 """
 
 import dataclasses
@@ -27,9 +29,15 @@ def third_order(eq, T_prime, X_prime, C, M, T_m):
     E, omega = eq.flux("E", "E"), eq.speed()
     sine = 2 * T_m * X_prime / (C * U0**2)
     cosine = sympy.sqrt(sympy.Max(0, 1 - sine**2))
-    eq.moves(E, (C * U - E) / T_prime + I * (omega - eq.omega_s) * E, C * U0 / 2 * (1 + cosine - I * sine))
+    eq.moves(
+        E,
+        (C * U - E) / T_prime + I * (omega - eq.omega_s) * E,
+        C * U0 / 2 * (1 + cosine - I * sine),
+    )
     eq.moves(omega, (-U * im(E) / X_prime - T_m) / M, eq.omega_s0 - sine / (1 + cosine) / T_prime)
-    eq.require(1 - sympy.Abs(sine), "no steady state: |2 T_m X'/(C U0²)| is {value:.3g}", sympy.Abs(sine))
+    eq.require(
+        1 - sympy.Abs(sine), "no steady state: |2 T_m X'/(C U0²)| is {value:.3g}", sympy.Abs(sine)
+    )
     return (eq.V - E) / (I * X_prime)
 
 
@@ -50,7 +58,9 @@ class TCircuit(Motor):
 
 
 class Rated(Motor):
-    """The motor per unit of a rating that is a parameter of its own: reactances and inertia scale with it."""
+    """The motor per unit of a rating that is a parameter of its own: reactances and inertia scale
+    with it.
+    """
 
     T_prime = Parameter(0.1, (0.02, 0.3), "s", "transient time constant", HERE)
     x_prime = Parameter(0.2, (0.1, 0.5), "pu of the rating", "transient reactance", HERE)

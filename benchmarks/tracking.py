@@ -1,9 +1,10 @@
 """What one logged run costs: python benchmarks/tracking.py [--json] [--repeat 3]
 
-Each row is a fresh Python process that logs one run (60 parameters, two curves of 300 points, one artifact, the
-model) to SQLite. `fresh` creates the store, `existing` finds it, `second process` finds it and logs through
-`tractexp.tracking.process` beside a computation of 1.5 s, which is not counted. Seconds of wall time, the median
-of the repeats; `process` is the whole process from start to end, NumPy and the interpreter included.
+Each row is a fresh Python process that logs one run (60 parameters, two curves of 300 points, one
+artifact, the model) to SQLite. `fresh` creates the store, `existing` finds it, `second process`
+finds it and logs through `tractexp.tracking.process` beside a computation of 1.5 s, which is not
+counted. Seconds of wall time, the median of the repeats; `process` is the whole process from start
+to end, NumPy and the interpreter included.
 """
 
 import argparse
@@ -64,17 +65,32 @@ def once(folder: Path, compute: float) -> dict[str, float]:
     """One process, timed from outside and by its own laps, its computation left out."""
     started, before = time.perf_counter(), os.times()
     done = subprocess.run(
-        [sys.executable, "-c", JOB, str(folder), str(compute)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", JOB, str(folder), str(compute)],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     after = os.times()
-    cpu = after.children_user + after.children_system - before.children_user - before.children_system - compute
+    cpu = (
+        after.children_user
+        + after.children_system
+        - before.children_user
+        - before.children_system
+        - compute
+    )
     laps: dict[str, float] = json.loads(done.stdout)
     seconds = time.perf_counter() - started - compute
-    return laps | {"process": seconds, "logging": seconds - laps["import_tractexp"], "process_cpu": cpu}
+    return laps | {
+        "process": seconds,
+        "logging": seconds - laps["import_tractexp"],
+        "process_cpu": cpu,
+    }
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead of the table")
     parser.add_argument("--repeat", type=int, default=3, help="repetitions (default 3)")
     options = parser.parse_args()
@@ -84,14 +100,18 @@ def main() -> None:
             for store, compute in STORES.items():
                 rows[store].append(once(Path(folder), compute))
     table = {
-        store: {lap: statistics.median(run[lap] for run in runs) for lap in runs[0]} for store, runs in rows.items()
+        store: {lap: statistics.median(run[lap] for run in runs) for lap in runs[0]}
+        for store, runs in rows.items()
     }
     if options.json:
         print(json.dumps(table))
         return
     print(f"{'seconds':<16}" + "".join(f"{store:>16}" for store in table))
     for lap in table["fresh"]:
-        print(f"{lap:<16}" + "".join(f"{row[lap]:>16.3f}" if lap in row else " " * 16 for row in table.values()))
+        print(
+            f"{lap:<16}"
+            + "".join(f"{row[lap]:>16.3f}" if lap in row else " " * 16 for row in table.values())
+        )
 
 
 if __name__ == "__main__":

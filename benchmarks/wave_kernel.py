@@ -1,10 +1,12 @@
-"""Time of simulations and fits of waveforms: python benchmarks/wave_kernel.py [--rounds 100] [--store]
+"""Time of simulations and fits of waveforms: python benchmarks/wave_kernel.py [--rounds 100]
+[--store]
 
-Nanoseconds per Runge-Kutta step and candidate, objective included, of the usual model of waveforms beside the base
-model of phasors, in turns within one run, one thread, 200 candidates; the fastest round of each counts. Then a fit of
-about 1,300 samples from 20 starts on at most two cores, with the model's seven parameters and with twelve, and an
-investigation with the whole catalogue, its kernels compiled before. Processor seconds stand beside those of the clock:
-the latter mean little on a busy machine.
+Nanoseconds per Runge-Kutta step and candidate, objective included, of the usual model of waveforms
+beside the base model of phasors, in turns within one run, one thread, 200 candidates; the fastest
+round of each counts. Then a fit of about 1,300 samples from 20 starts on at most two cores, with
+the model's seven parameters and with twelve, and an investigation with the whole catalogue, its
+kernels compiled before. Processor seconds stand beside those of the clock: the latter mean little
+on a busy machine.
 """
 
 import argparse
@@ -32,13 +34,16 @@ from tractexp.record import in_waves
 
 STORED = Path(__file__).with_suffix(".json")
 CANDIDATES, STARTS, RATE = 200, 20, 1600.0  # Hz: some 1,300 samples
-EFFECTS = ("second_motor_group", "speed_dependent_torque", "shunt_capacitor", "magnetic_saturation")  # twelve in all
+# twelve in all
+EFFECTS = ("second_motor_group", "speed_dependent_torque", "shunt_capacitor", "magnetic_saturation")
 
 
 def model(*effects: str) -> Model:
     """The usual model of waveforms, extended."""
     extra = [get("effect", name)() for name in effects]
-    return compose(get("model/motor", "stator_flux")(), get("model/static", "branch")(), extra, domain="waves")
+    return compose(
+        get("model/motor", "stator_flux")(), get("model/static", "branch")(), extra, domain="waves"
+    )
 
 
 def recorded(seed: int = 5):
@@ -51,10 +56,14 @@ def recorded(seed: int = 5):
 def kernels(rounds: int) -> list[dict]:
     """Nanoseconds per step and candidate of both models, taking turns."""
     rng, event = np.random.default_rng(0), recorded()
-    phasors = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
+    phasors = compose(
+        get("model/motor", "electromechanical")(), get("model/static", "exponential")()
+    )
     prepared = []
     for load, driving in ((phasors, excitation()), (model(), domain_of(event).excitation(event))):
-        values = np.array([p.default for p in load.parameters]) * rng.uniform(0.97, 1.03, (CANDIDATES, len(load.names)))
+        values = np.array([p.default for p in load.parameters]) * rng.uniform(
+            0.97, 1.03, (CANDIDATES, len(load.names))
+        )
         drive, n = Drive.of([driving]), np.array([1 if load is phasors else 4])
         refused = load.errors(drive, values, n).refused.sum()
         if refused:
@@ -68,10 +77,15 @@ def kernels(rounds: int) -> list[dict]:
             load.errors(drive, values, n)
             fastest[k] = min(fastest[k], 1e9 * (time.perf_counter() - started) / steps)
     return [
-        {"model": load.title, "domain": load.domain, "parameters": len(load.names), "samples": drive.samples,
-         "nanoseconds_per_step": ns}
+        {
+            "model": load.title,
+            "domain": load.domain,
+            "parameters": len(load.names),
+            "samples": drive.samples,
+            "nanoseconds_per_step": ns,
+        }
         for (load, drive, *_), ns in zip(prepared, fastest, strict=True)
-    ]  # fmt: skip
+    ]
 
 
 def fits() -> list[dict]:
@@ -83,23 +97,33 @@ def fits() -> list[dict]:
     for extra in ((), EFFECTS):
         load = model(*extra)
         problem = Problem(load, [event])
-        problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))  # compiles
+        # compiles
+        problem.objective(problem.space.from_unit(np.full((1, problem.space.dimension), 0.5)))
         marks = [(time.perf_counter(), time.process_time())]
         found = search(problem, get("optimizer", "multistart_least_squares")(starts=STARTS), 0)
         marks.append((time.perf_counter(), time.process_time()))
         estimate(problem, found.values)
         marks.append((time.perf_counter(), time.process_time()))
-        rows.append({
-            "effects": list(extra), "parameters": problem.space.dimension, "samples": event.record.samples,
-            "substeps": problem.step.substeps.tolist(), "simulations": found.simulations,
-            "seconds": marks[1][0] - marks[0][0], "processor_seconds": marks[1][1] - marks[0][1],
-            "judgement_seconds": marks[2][0] - marks[1][0], "judgement_processor_seconds": marks[2][1] - marks[1][1],
-        })  # fmt: skip
+        rows.append(
+            {
+                "effects": list(extra),
+                "parameters": problem.space.dimension,
+                "samples": event.record.samples,
+                "substeps": problem.step.substeps.tolist(),
+                "simulations": found.simulations,
+                "seconds": marks[1][0] - marks[0][0],
+                "processor_seconds": marks[1][1] - marks[0][1],
+                "judgement_seconds": marks[2][0] - marks[1][0],
+                "judgement_processor_seconds": marks[2][1] - marks[1][1],
+            }
+        )
     return rows
 
 
 def investigation() -> dict:
-    """Seconds of an investigation of two dips, one held out, the second time: its kernels are compiled."""
+    """Seconds of an investigation of two dips, one held out, the second time: its kernels are
+    compiled.
+    """
     import tractexp
 
     _, events = waves.drawn_events([1, 5], dips=2)
@@ -107,8 +131,12 @@ def investigation() -> dict:
     for _ in range(2):
         clock, own = time.perf_counter(), time.process_time()
         found = tractexp.investigate(
-            events[:1], validate=events[1:], model="fifth_order_branch", domain="waves", progress=False
-        )  # fmt: skip
+            events[:1],
+            validate=events[1:],
+            model="fifth_order_branch",
+            domain="waves",
+            progress=False,
+        )
         spent.append((time.perf_counter() - clock, time.process_time() - own))
     return {
         "verdict": str(found.verdict),
@@ -125,7 +153,10 @@ def main() -> None:
     parser.add_argument("--store", action="store_true")
     chosen = parser.parse_args()
     made = {"kernels": lambda: kernels(chosen.rounds), "fits": fits, "investigation": investigation}
-    told = {part: made[part]() for part in chosen.parts} | {"load_average": os.getloadavg()[0], "cores": os.cpu_count()}
+    told = {part: made[part]() for part in chosen.parts} | {
+        "load_average": os.getloadavg()[0],
+        "cores": os.cpu_count(),
+    }
     print(json.dumps(told, indent=1))
     if chosen.store:
         kept = json.loads(STORED.read_text(encoding="utf-8")) if STORED.exists() else {}

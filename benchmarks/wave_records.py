@@ -1,4 +1,6 @@
-"""Recorded waveforms of known loads: drawn, simulated by `independent.circuit`, and made records of the product."""
+"""Recorded waveforms of known loads: drawn, simulated by `independent.circuit`, and made records of
+the product.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -20,7 +22,9 @@ ESTIMATOR = {"name": "one_cycle"}
 
 @dataclass(frozen=True)
 class Site:
-    """A load of devices: `group` the motors whose parameters are known, `more` what may be hidden beside."""
+    """A load of devices: `group` the motors whose parameters are known, `more` what may be hidden
+    beside.
+    """
 
     group: Group
     branch: Branch
@@ -56,17 +60,25 @@ def _log(rng: np.random.Generator, low: float, high: float) -> float:
 def site(rng: np.random.Generator) -> Site:
     """A motor group that takes 30 to 80 % of the power, a branch and a conductance for the rest."""
     machine = Machine(
-        Rs=_log(rng, 0.01, 0.05), Xs=rng.uniform(0.08, 0.15), Xm=rng.uniform(2.0, 3.5), Rr=_log(rng, 0.01, 0.03),
-        Xr=rng.uniform(0.08, 0.18), H=_log(rng, 0.3, 1.2),
-    )  # fmt: skip
+        Rs=_log(rng, 0.01, 0.05),
+        Xs=rng.uniform(0.08, 0.15),
+        Xm=rng.uniform(2.0, 3.5),
+        Rr=_log(rng, 0.01, 0.03),
+        Xr=rng.uniform(0.08, 0.18),
+        H=_log(rng, 0.3, 1.2),
+    )
     rating, torque = rng.uniform(0.35, 0.9), rng.uniform(0.5, 0.85)
     left, X = 1 - rating * torque, rng.uniform(2.0, 6.0)
     R = X * _log(rng, 0.1, 1.0)
-    return Site(Group(machine, rating, torque), Branch(R, X), Shunt(max(left - R / (R**2 + X**2), 0.02)))
+    return Site(
+        Group(machine, rating, torque), Branch(R, X), Shunt(max(left - R / (R**2 + X**2), 0.02))
+    )
 
 
 def fault(rng: np.random.Generator, kind: str | None = None) -> tuple[Fault, str]:
-    """A fault of two to eight cycles with a jump of phase, on a voltage with a fifth and a seventh harmonic."""
+    """A fault of two to eight cycles with a jump of phase, on a voltage with a fifth and a seventh
+    harmonic.
+    """
     kind = kind or str(rng.choice(KINDS))
     share, turn = rng.uniform(0.05, 0.7), rng.uniform(-0.35, 0.15)
     kept = share * np.exp(1j * turn)
@@ -81,22 +93,34 @@ def fault(rng: np.random.Generator, kind: str | None = None) -> tuple[Fault, str
     else:
         left = (kept * slight[0], kept * slight[1], kept * slight[2])
     made = Fault(
-        tuple(map(complex, left)), start=rng.uniform(0.12, 0.2), duration=rng.integers(4, 17) / 2 / NOMINAL,
-        voltage=rng.uniform(0.97, 1.04), frequency=NOMINAL + rng.uniform(-0.1, 0.1), angle=rng.uniform(-np.pi, np.pi),
-        edge=rng.uniform(0.6e-3, 2e-3), sag=rng.uniform(0, 0.25), settle=rng.uniform(0.04, 0.15),
-        harmonics=tuple((h, rng.uniform(0.3, 1) * 0.01, rng.uniform(-np.pi, np.pi)) for h in (5, 7)),
-    )  # fmt: skip
+        tuple(map(complex, left)),
+        start=rng.uniform(0.12, 0.2),
+        duration=rng.integers(4, 17) / 2 / NOMINAL,
+        voltage=rng.uniform(0.97, 1.04),
+        frequency=NOMINAL + rng.uniform(-0.1, 0.1),
+        angle=rng.uniform(-np.pi, np.pi),
+        edge=rng.uniform(0.6e-3, 2e-3),
+        sag=rng.uniform(0, 0.25),
+        settle=rng.uniform(0.04, 0.15),
+        harmonics=tuple(
+            (h, rng.uniform(0.3, 1) * 0.01, rng.uniform(-np.pi, np.pi)) for h in (5, 7)
+        ),
+    )
     return made, kind
 
 
 def sampler(rng: np.random.Generator) -> Sampler:
     """Any common rate, noise 60 dB below the signal, offsets of half a percent, 14 to 16 bits."""
     rate, bits = float(rng.choice(RATES)), int(rng.integers(14, 17))
-    return Sampler(rate, 1e-3, tuple((0.005 * rng.uniform(-1, 1, 6)).tolist()), bits, current_span=12.0)
+    return Sampler(
+        rate, 1e-3, tuple((0.005 * rng.uniform(-1, 1, 6)).tolist()), bits, current_span=12.0
+    )
 
 
 def case(seed: Sequence[int], dips: int = 1, kind: str | None = None) -> Case:
-    """A drawn case; one whose motors have no steady state, or stall, is drawn anew by `recorded`."""
+    """A drawn case; one whose motors have no steady state, or stall, is drawn anew
+    by `recorded`.
+    """
     rng = np.random.default_rng(list(seed))
     of = site(rng)
     faults = [fault(rng, kind) for _ in range(dips)]
@@ -114,7 +138,9 @@ def samples(case: Case, seed: Sequence[int]) -> list[np.ndarray]:
 
 
 def record(x: np.ndarray, rate: float, name: str):
-    """The product's record of samples (6, n) [pu]: phasors by its estimator, and the waveforms beside them."""
+    """The product's record of samples (6, n) [pu]: phasors by its estimator, and the waveforms
+    beside them.
+    """
     from tractexp.record import Record
     from tractexp.record.phasor import measure
     from tractexp.record.record import Base
@@ -134,8 +160,9 @@ def events(case: Case, seed: Sequence[int]) -> list:
     from tractexp.record import detect
 
     return [
-        detect(record(x, case.sampler.rate, f"dip {k}")) for k, x in enumerate(samples(case, seed), start=1)
-    ]  # fmt: skip
+        detect(record(x, case.sampler.rate, f"dip {k}"))
+        for k, x in enumerate(samples(case, seed), start=1)
+    ]
 
 
 def drawn_events(seed: Sequence[int], dips: int = 1, **changes) -> tuple[Case, list]:

@@ -1,10 +1,12 @@
-"""Are parameters of waveforms within their intervals, and the grades right? python benchmarks/waves.py [--count 60]
+"""Are parameters of waveforms within their intervals, and the grades right? python
+benchmarks/waves.py [--count 60]
 
-Drawn loads through drawn faults, sampled by a drawn recorder: `wave_records`, whose equations, frame and solver are
-not the product's. Nothing is missing, so every grade but `adequate` is wrong. Rows are appended to a file, so that a
-study goes on where it stopped; --store writes its summary beside this file. Seeds of `--series calibration`, on which
-thresholds may be looked at, are never those that are reported. Further parts: `lengths` (what dips of which length,
-depth and unbalance tell, in words of relative standard errors), `swapped` (one dip fitted and another held out, and the
+Drawn loads through drawn faults, sampled by a drawn recorder: `wave_records`, whose equations,
+frame and solver are not the product's. Nothing is missing, so every grade but `adequate` is wrong.
+Rows are appended to a file, so that a study goes on where it stopped; --store writes its summary
+beside this file. Seeds of `--series calibration`, on which thresholds may be looked at, are never
+those that are reported. Further parts: `lengths` (what dips of which length, depth and unbalance
+tell, in words of relative standard errors), `swapped` (one dip fitted and another held out, and the
 other way round), `clean` (no noise, no offsets: what equations and interpolation differ by).
 """
 
@@ -36,7 +38,7 @@ def identified(event):
 
     return tractexp.identify(
         event, model=MODEL, domain="waves", optimizer="multistart_least_squares", progress=False
-    )  # fmt: skip
+    )
 
 
 def truth_of(site: waves.Site, fit) -> dict[str, float]:
@@ -54,7 +56,11 @@ def judged(fit, site: waves.Site) -> dict:
         row["z"][name] = (result.parameters[name] - true) / error if error else None
         row["off"][name] = result.parameters[name] / true - 1
         row["wide"][name] = (high - low) / 2 / true
-    row |= {"grade": str(fit.grade), "p": result.adequacy["p"], "loudest": fit.details.estimation.surprise.loudest}
+    row |= {
+        "grade": str(fit.grade),
+        "p": result.adequacy["p"],
+        "loudest": fit.details.estimation.surprise.loudest,
+    }
     return row | {"epsilon_i": result.events[0]["epsilon_i"]}
 
 
@@ -64,24 +70,42 @@ def covered(series: str, seed: int) -> dict:
     case, events = waves.drawn_events([SERIES[series], seed])
     made = time.perf_counter()
     row = judged(identified(events[0]), case.site)
-    row |= {"kind": case.kinds[0], "rate": case.sampler.rate, "samples": events[0].record.waves.samples.shape[1]}
+    row |= {
+        "kind": case.kinds[0],
+        "rate": case.sampler.rate,
+        "samples": events[0].record.waves.samples.shape[1],
+    }
     return row | {"made": made - started, "seconds": time.perf_counter() - made}
 
 
 def clean(series: str, seed: int) -> dict:
-    """The same record without noise, offsets and quantization: errors of equations and interpolation alone."""
+    """The same record without noise, offsets and quantization: errors of equations and
+    interpolation alone.
+    """
     case, _ = waves.drawn_events([SERIES[series], seed])
     case = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
     row = judged(identified(waves.events(case, [SERIES[series], seed])[0]), case.site)
-    return {"off": row["off"], "epsilon_i": row["epsilon_i"], "rate": case.sampler.rate, "kind": case.kinds[0]}
+    return {
+        "off": row["off"],
+        "epsilon_i": row["epsilon_i"],
+        "rate": case.sampler.rate,
+        "kind": case.kinds[0],
+    }
 
 
 def swapped(series: str, seed: int) -> dict:
-    """Two dips of one load: either fitted, the other held out; how far apart, and how well it carries over."""
+    """Two dips of one load: either fitted, the other held out; how far apart, and how well it
+    carries over.
+    """
     import tractexp
 
     case, events = waves.drawn_events([SERIES[series], 5000 + seed], dips=2)
-    settings = {"model": MODEL, "domain": "waves", "optimizer": "multistart_least_squares", "progress": False}
+    settings = {
+        "model": MODEL,
+        "domain": "waves",
+        "optimizer": "multistart_least_squares",
+        "progress": False,
+    }
     fits = [tractexp.identify(events[k], validate=[events[1 - k]], **settings) for k in (0, 1)]
     one, two = (f.result for f in fits)
     row = {"z": {}, "overlap": {}, "held_out": [r.events[1]["epsilon_i"] for r in (one, two)]}
@@ -96,17 +120,23 @@ def swapped(series: str, seed: int) -> dict:
 
 
 def lengths(series: str, seed: int) -> dict:
-    """Relative standard errors at the truth over length, depth and kind of the fault, of one drawn load."""
+    """Relative standard errors at the truth over length, depth and kind of the fault, of one drawn
+    load.
+    """
     rng = np.random.default_rng([SERIES[series], 9000 + seed])
     of, rows = waves.site(rng), []
     recorder = replace(waves.sampler(rng), rate=3200.0, bits=16)
     for kind in waves.KINDS:
         for depth in DEPTHS:
             for cycles in LENGTHS:
-                fault = replace(waves.fault(rng, kind)[0], duration=cycles / waves.NOMINAL, sag=0.1, start=0.15)
+                fault = replace(
+                    waves.fault(rng, kind)[0], duration=cycles / waves.NOMINAL, sag=0.1, start=0.15
+                )
                 fault = replace(fault, left=left(kind, 1 - depth))
                 case = waves.Case(of, (fault,), recorder, (kind,))
-                errors = told_at_truth(waves.events(case, [SERIES[series], seed, cycles])[0], of.truth())
+                errors = told_at_truth(
+                    waves.events(case, [SERIES[series], seed, cycles])[0], of.truth()
+                )
                 rows.append({"kind": kind, "depth": depth, "cycles": cycles, "relative": errors})
     return {"rows": rows}
 
@@ -121,7 +151,9 @@ def told_at_truth(event, truth: dict[str, float]) -> dict[str, float]:
     from tractexp.model.model import compose
     from tractexp.plugin import get
 
-    load = compose(get("model/motor", "stator_flux")(), get("model/static", "branch")(), domain="waves")
+    load = compose(
+        get("model/motor", "stator_flux")(), get("model/static", "branch")(), domain="waves"
+    )
     observed = Observed.of(Problem(load, [event]))
     likelihood = Likelihood.of(observed.problem)
     values = np.array([truth[n] for n in observed.problem.space.names])
@@ -170,38 +202,70 @@ def summary(part: str, rows: list[dict]) -> dict:
         fine = [r for r in good if r["grade"] == "adequate"]
         told |= {
             "adequate": len(fine),
-            "others": [(r["seed"], r["grade"], r["p"], r["loudest"]) for r in good if r not in fine],
+            "others": [
+                (r["seed"], r["grade"], r["p"], r["loudest"]) for r in good if r not in fine
+            ],
         }
         told["coverage"] = {n: float(np.mean([r["inside"][n] for r in good])) for n in NAMES}
         told["coverage_of_all"] = float(np.mean([list(r["inside"].values()) for r in good]))
         told["coverage_where_adequate"] = float(np.mean([list(r["inside"].values()) for r in fine]))
         told["rms_z"] = {
-            n: float(np.sqrt(np.mean([r["z"][n] ** 2 for r in good if r["z"][n] is not None]))) for n in NAMES
+            n: float(np.sqrt(np.mean([r["z"][n] ** 2 for r in good if r["z"][n] is not None])))
+            for n in NAMES
         }
         told |= {"median_error": median("off"), "median_half_width": median("wide")}
         told["by_kind"] = {
-            k: float(np.mean([list(r["inside"].values()) for r in good if r["kind"] == k])) for k in waves.KINDS
-        }  # fmt: skip
+            k: float(np.mean([list(r["inside"].values()) for r in good if r["kind"] == k]))
+            for k in waves.KINDS
+        }
         told["by_rate"] = {
-            str(k): float(np.mean([list(r["inside"].values()) for r in good if r["rate"] == k])) for k in waves.RATES
-        }  # fmt: skip
-        told |= {key: float(np.median([r[key] for r in good])) for key in ("seconds", "samples", "epsilon_i")}
+            str(k): float(np.mean([list(r["inside"].values()) for r in good if r["rate"] == k]))
+            for k in waves.RATES
+        }
+        told |= {
+            key: float(np.median([r[key] for r in good]))
+            for key in ("seconds", "samples", "epsilon_i")
+        }
     elif part == "clean":
-        told |= {"median_error": median("off"), "epsilon_i": [float(np.median([r["epsilon_i"] for r in good])),
-                                                              max(r["epsilon_i"] for r in good)]}  # fmt: skip
+        told |= {
+            "median_error": median("off"),
+            "epsilon_i": [
+                float(np.median([r["epsilon_i"] for r in good])),
+                max(r["epsilon_i"] for r in good),
+            ],
+        }
         told["largest_error"] = {n: float(max(abs(r["off"][n]) for r in good)) for n in NAMES}
     elif part == "swapped":
         told["agree"] = {n: float(np.mean([r["overlap"][n] for r in good])) for n in NAMES}
-        told["within_1.96"] = {n: float(np.mean([abs(r["z"][n]) < 1.96 for r in good])) for n in NAMES}
+        told["within_1.96"] = {
+            n: float(np.mean([abs(r["z"][n]) < 1.96 for r in good])) for n in NAMES
+        }
         told["coverage"] = float(np.mean([list(r["inside"].values()) for r in good]))
         told |= {key: float(np.median([r[key] for r in good])) for key in ("held_out", "fitted")}
     else:
         told["median_relative_standard_error"] = [
-            {"kind": k, "depth": d, "cycles": c, "relative": {n: float(np.median(
-                [row["relative"][n] for r in good for row in r["rows"]
-                 if (row["kind"], row["depth"], row["cycles"]) == (k, d, c)])) for n in NAMES}}
-            for k in waves.KINDS for d in DEPTHS for c in LENGTHS
-        ]  # fmt: skip
+            {
+                "kind": k,
+                "depth": d,
+                "cycles": c,
+                "relative": {
+                    n: float(
+                        np.median(
+                            [
+                                row["relative"][n]
+                                for r in good
+                                for row in r["rows"]
+                                if (row["kind"], row["depth"], row["cycles"]) == (k, d, c)
+                            ]
+                        )
+                    )
+                    for n in NAMES
+                },
+            }
+            for k in waves.KINDS
+            for d in DEPTHS
+            for c in LENGTHS
+        ]
     return told
 
 
@@ -211,7 +275,9 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=60)
     parser.add_argument("--series", choices=list(SERIES), default="reported")
     parser.add_argument("--out", type=Path, default=Path("waves.jsonl"))
-    parser.add_argument("--store", action="store_true", help=f"write the summary into {STORED.name}")
+    parser.add_argument(
+        "--store", action="store_true", help=f"write the summary into {STORED.name}"
+    )
     chosen = parser.parse_args()
     rows = list(study(chosen.part, chosen.series, chosen.count, chosen.out))
     told = summary(chosen.part, rows)

@@ -1,10 +1,12 @@
-"""Are effects hidden in waveforms named, and nothing where nothing is? python benchmarks/waves_hidden.py [--count 3]
+"""Are effects hidden in waveforms named, and nothing where nothing is? python
+benchmarks/waves_hidden.py [--count 3]
 
-Loads of `wave_records` with one thing more, by laws of `independent.circuit`: two dips each, one held out, investigated
-by `domain="waves"` with the whole catalogue, or with `--few` what is hidden here. A law is the *same* as the plugin's
-(other equations, frame and solver) or an *other* one; sizes are those below, and a third and a tenth of them. Rows are
-appended to a file, so that a study goes on where it stopped; --store writes what was named beside this file.
-`--series calibration` has other seeds, on which thresholds may be looked at.
+Loads of `wave_records` with one thing more, by laws of `independent.circuit`: two dips each, one
+held out, investigated by `domain="waves"` with the whole catalogue, or with `--few` what is hidden
+here. A law is the *same* as the plugin's (other equations, frame and solver) or an *other* one;
+sizes are those below, and a third and a tenth of them. Rows are appended to a file, so that a study
+goes on where it stopped; --store writes what was named beside this file. `--series calibration` has
+other seeds, on which thresholds may be looked at.
 """
 
 import argparse
@@ -49,7 +51,9 @@ SAME, OTHER = "same", "other"
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: `put` gives a case with `size` of it; `law` tells whether the plugin has the same law."""
+    """What is hidden: `put` gives a case with `size` of it; `law` tells whether the plugin has the
+    same law.
+    """
 
     name: str
     law: str
@@ -77,7 +81,9 @@ def _lighter(case: waves.Case, size: float) -> waves.Case:
 
 
 def _another(case: waves.Case, size: float) -> waves.Case:
-    return _beside(Group(Machine(Rs=0.03, Xs=0.09, Xm=2.6, Rr=0.05, Xr=0.09, H=0.15), 0.4 * size, 0.6))(case)
+    return _beside(
+        Group(Machine(Rs=0.03, Xs=0.09, Xm=2.6, Rr=0.05, Xr=0.09, H=0.15), 0.4 * size, 0.6)
+    )(case)
 
 
 def _earthed(case: waves.Case, size: float) -> waves.Case:
@@ -86,7 +92,9 @@ def _earthed(case: waves.Case, size: float) -> waves.Case:
 
 
 def _saturating(case: waves.Case, size: float) -> waves.Case:
-    return replace(case, sampler=replace(case.sampler, transformer=CurrentTransformer(knee=2.5 * size**-0.3)))
+    return replace(
+        case, sampler=replace(case.sampler, transformer=CurrentTransformer(knee=2.5 * size**-0.3))
+    )
 
 
 RELAY = Relay(after=0.03, back=0.12)
@@ -96,17 +104,41 @@ HIDDEN = (
     Hidden("second_motor_group", OTHER, _another),
     Hidden("shunt_capacitor", SAME, lambda case, size: _beside(Shunt(B=0.3 * size))(case)),
     Hidden("zero_sequence_path", SAME, _earthed, ("phase to earth", "three phases")),
-    Hidden("negative_sequence_path", OTHER, lambda case, size: _beside(Held((0.3 + 0.05j) * size))(case)),
+    Hidden(
+        "negative_sequence_path",
+        OTHER,
+        lambda case, size: _beside(Held((0.3 + 0.05j) * size))(case),
+    ),
     Hidden("speed_dependent_torque", SAME, lambda case, size: _group(case, fan=size)),
     Hidden("magnetic_saturation", OTHER, lambda case, size: _group(case, saturation=0.8 * size)),
-    Hidden("transformer_saturation", OTHER, lambda case, size: _beside(Core(1.15, 0.6 / size, 0.02))(case)),
+    Hidden(
+        "transformer_saturation",
+        OTHER,
+        lambda case, size: _beside(Core(1.15, 0.6 / size, 0.02))(case),
+    ),
     Hidden("current_transformer_saturation", OTHER, _saturating),
-    Hidden("undervoltage_trip", SAME, lambda case, size: _beside(Breaker((0.4 * size,) * 3, RELAY))(case)),
-    Hidden("undervoltage_trip", OTHER, lambda case, size: _beside(Switched(Shunt(0.4 * size), 1.0, RELAY))(case)),
+    Hidden(
+        "undervoltage_trip",
+        SAME,
+        lambda case, size: _beside(Breaker((0.4 * size,) * 3, RELAY))(case),
+    ),
+    Hidden(
+        "undervoltage_trip",
+        OTHER,
+        lambda case, size: _beside(Switched(Shunt(0.4 * size), 1.0, RELAY))(case),
+    ),
     Hidden("fault_resistance", SAME, lambda case, size: _beside(Arc(0.5 * size))(case)),
-    Hidden("stuck_pole", SAME, lambda case, size: _beside(Breaker((0.0, 0.5 * size, 0.0), Relay(0.05)))(case)),
-    Hidden("harmonics_source", SAME, lambda case, size: _beside(Rectifier(0.06j * size, 0.03 * size))(case)),
-)  # fmt: skip
+    Hidden(
+        "stuck_pole",
+        SAME,
+        lambda case, size: _beside(Breaker((0.0, 0.5 * size, 0.0), Relay(0.05)))(case),
+    ),
+    Hidden(
+        "harmonics_source",
+        SAME,
+        lambda case, size: _beside(Rectifier(0.06j * size, 0.03 * size))(case),
+    ),
+)
 
 
 def events(hidden: Hidden, seed: Sequence[int], size: float = 1.0, rate: float = 3200.0):
@@ -139,10 +171,17 @@ def run(hidden: Hidden, seed: Sequence[int], size: float = 1.0, only: Sequence[s
         chosen = {"effects": [*only]} if only else {}
         found = tractexp.investigate(
             dips[:1], validate=dips[1:], model=MODEL, domain="waves", progress=False, **chosen
-        )  # fmt: skip
+        )
         near = found.content["nearest"] or {"effects": None, "gap": {"train": {"closed": None}}}
-        row |= {"verdict": str(found.verdict), "names": list(found.names), "sets": found.content["name_sets"]}
-        row |= {"nearest": [near["effects"], near["gap"]["train"]["closed"]], "p_left": found.content["left"]}
+        row |= {
+            "verdict": str(found.verdict),
+            "names": list(found.names),
+            "sets": found.content["name_sets"],
+        }
+        row |= {
+            "nearest": [near["effects"], near["gap"]["train"]["closed"]],
+            "p_left": found.content["left"],
+        }
         row |= {"gap": asdict(found.gap)}
     except (UserError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
         row["failed"] = f"{type(error).__name__}: {error}"
@@ -150,7 +189,9 @@ def run(hidden: Hidden, seed: Sequence[int], size: float = 1.0, only: Sequence[s
 
 
 def told(row: dict, name: str) -> str:
-    """What a row says of what is hidden: right, among, other names, nothing, unexplained or failed."""
+    """What a row says of what is hidden: right, among, other names, nothing,
+    unexplained or failed.
+    """
     if "failed" in row:
         return "failed"
     if row["verdict"] in ("none", "unexplained"):
@@ -163,15 +204,28 @@ def summary(rows: list[dict]) -> dict:
     said = {}
     for hidden in HIDDEN:
         for size in SIZES:
-            mine = [told(r, hidden.name) for r in rows if r["hidden"] == hidden.label and r["size"] == size]
+            mine = [
+                told(r, hidden.name)
+                for r in rows
+                if r["hidden"] == hidden.label and r["size"] == size
+            ]
             if mine:
-                said[f"{hidden.label}, size {size:g}"] = {word: mine.count(word) for word in sorted(set(mine))}
+                said[f"{hidden.label}, size {size:g}"] = {
+                    word: mine.count(word) for word in sorted(set(mine))
+                }
     done = [r for r in rows if "failed" not in r]
-    return {"loads": said, "median_seconds": float(np.median([r["seconds"] for r in done])) if done else None}
+    return {
+        "loads": said,
+        "median_seconds": float(np.median([r["seconds"] for r in done])) if done else None,
+    }
 
 
-def wanted(count: int, labels: Sequence[str], series: int) -> Iterator[tuple[Hidden, float, list[int]]]:
-    """What is investigated, one seed of everything after the other; nothing is as often as all sizes of a thing."""
+def wanted(
+    count: int, labels: Sequence[str], series: int
+) -> Iterator[tuple[Hidden, float, list[int]]]:
+    """What is investigated, one seed of everything after the other; nothing is as often as all
+    sizes of a thing.
+    """
     for seed in range(count):
         for hidden in HIDDEN:
             for k, size in enumerate(SIZES):
@@ -185,14 +239,26 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--count", type=int, default=3, help="seeds of each kind and size")
     parser.add_argument("--names", nargs="+", default=labels, choices=labels)
-    parser.add_argument("--few", action="store_true", help="only what is hidden here are candidates")
+    parser.add_argument(
+        "--few", action="store_true", help="only what is hidden here are candidates"
+    )
     parser.add_argument("--series", choices=list(SERIES), default="reported")
     parser.add_argument("--out", type=Path, default=Path("waves_hidden.jsonl"))
-    parser.add_argument("--store", action="store_true", help=f"write the summary into {STORED.name}")
+    parser.add_argument(
+        "--store", action="store_true", help=f"write the summary into {STORED.name}"
+    )
     chosen = parser.parse_args()
-    rows = [json.loads(line) for line in chosen.out.read_text().splitlines()] if chosen.out.exists() else []
+    rows = (
+        [json.loads(line) for line in chosen.out.read_text().splitlines()]
+        if chosen.out.exists()
+        else []
+    )
     done = {(r["hidden"], r["size"], tuple(r["seed"])) for r in rows}
-    few = sorted({hidden.name for hidden in HIDDEN} - {NULL, "harmonics_source"}) if chosen.few else ()
+    few = (
+        sorted({hidden.name for hidden in HIDDEN} - {NULL, "harmonics_source"})
+        if chosen.few
+        else ()
+    )
     with chosen.out.open("a") as file:
         for hidden, size, seed in wanted(chosen.count, chosen.names, SERIES[chosen.series]):
             if (hidden.label, size, tuple(seed)) in done:

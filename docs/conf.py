@@ -1,7 +1,8 @@
-"""The documentation site, built by `python -m sphinx -W -n docs build/site`; its pages are those beside this file.
+"""The documentation site, built by `python -m sphinx -W -n docs build/site`; its pages are those
+beside this file.
 
-What can be generated is: `site_pages` writes the catalogues, the pages of the tasks and the list of public calls into
-`docs/generated/` before the pages are read.
+What can be generated is: `site_pages` writes the catalogues, the pages of the tasks and the list of
+public calls into `docs/generated/` before the pages are read.
 """
 
 import sys
@@ -26,7 +27,8 @@ highlight_language = "none"  # what has no language is a terminal's answer
 default_role = "code"  # single backticks of docstrings
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
-nitpick_ignore_regex = [("py:.*", ".*")]  # types of signatures are no links; links of pages are checked all the same
+# types of signatures are no links; links of pages are checked all the same
+nitpick_ignore_regex = [("py:.*", ".*")]
 
 html_theme = "furo"
 html_title = "tractexp"

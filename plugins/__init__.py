@@ -1,1 +1,3 @@
-"""The built-in plugins: one file, one plugin. They enter by the entry point a stranger would use."""
+"""The built-in plugins: one file, one plugin. They enter by the entry point a
+stranger would use.
+"""

@@ -5,17 +5,32 @@ import subprocess
 
 WHEN_DRAWN = """const work = () => {%s};
     if (document.querySelector(".chart")) document.addEventListener("drawn", work); else work();"""
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
 
 def drawn(page, folder, *options):
-    """What a browser that reaches no other computer makes of a page: its elements, and what it complains of."""
+    """What a browser that reaches no other computer makes of a page: its elements, and what it
+    complains of.
+    """
     path = page.save(folder / "page.html")
     command = [
-        BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-background-networking",
-        f"--user-data-dir={folder / 'browser'}", "--host-resolver-rules=MAP * ~NOTFOUND", "--enable-logging=stderr",
-        "--v=0", "--virtual-time-budget=5000", *options, "--dump-dom", path.as_uri(),
-    ]  # fmt: skip
+        BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--no-first-run",
+        "--disable-background-networking",
+        f"--user-data-dir={folder / 'browser'}",
+        "--host-resolver-rules=MAP * ~NOTFOUND",
+        "--enable-logging=stderr",
+        "--v=0",
+        "--virtual-time-budget=5000",
+        *options,
+        "--dump-dom",
+        path.as_uri(),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     return done.stdout, [line for line in done.stderr.splitlines() if "CONSOLE" in line]
 
@@ -28,5 +43,9 @@ class Worked:
 
     def save(self, path):
         text = self.page.save(path).read_text(encoding="utf-8")
-        path.write_text(text.replace("</body>", f"<p id=told></p><script>{WHEN_DRAWN % self.script}</script></body>"))
+        path.write_text(
+            text.replace(
+                "</body>", f"<p id=told></p><script>{WHEN_DRAWN % self.script}</script></body>"
+            )
+        )
         return path

@@ -1,4 +1,6 @@
-"""`tractexp` as a person types it: in this process, or in one of its own where that is the point."""
+"""`tractexp` as a person types it: in this process, or in one of its own where that
+is the point.
+"""
 
 import contextlib
 import gc
@@ -23,7 +25,9 @@ def start_command(*arguments, cwd, **environment) -> subprocess.CompletedProcess
 
 
 def run_command(*arguments, cwd, **environment) -> subprocess.CompletedProcess:
-    """The same in this process, which is then as it was: for what is printed, written and refused."""
+    """The same in this process, which is then as it was: for what is printed, written
+    and refused.
+    """
     from tractexp.__main__ import main
 
     out, err = io.StringIO(), io.StringIO()
@@ -33,7 +37,9 @@ def run_command(*arguments, cwd, **environment) -> subprocess.CompletedProcess:
             code = main(arguments)
         except SystemExit as end:
             code = end.code
-    return subprocess.CompletedProcess(["tractexp", *arguments], code, out.getvalue(), err.getvalue())
+    return subprocess.CompletedProcess(
+        ["tractexp", *arguments], code, out.getvalue(), err.getvalue()
+    )
 
 
 def free_port() -> int:
@@ -45,7 +51,9 @@ def free_port() -> int:
 
 @contextlib.contextmanager
 def as_it_was(environment):
-    """Give back to the process what a command changes: surroundings, signals, warnings, loggers, garbage, Hydra."""
+    """Give back to the process what a command changes: surroundings, signals, warnings, loggers,
+    garbage, Hydra.
+    """
     from hydra.core.global_hydra import GlobalHydra
     from hydra.core.hydra_config import HydraConfig
 
@@ -53,7 +61,11 @@ def as_it_was(environment):
     from tractexp.sweep import identity
     from tractexp.tracking import process
 
-    root, thresholds, handler = logging.getLogger(), gc.get_threshold(), signal.getsignal(signal.SIGTERM)
+    root, thresholds, handler = (
+        logging.getLogger(),
+        gc.get_threshold(),
+        signal.getsignal(signal.SIGTERM),
+    )
     handlers, level = root.handlers[:], root.level
     surroundings = mock.patch.dict(os.environ, COLUMNS | environment)
     hydra = GlobalHydra.instance().hydra

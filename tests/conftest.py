@@ -9,19 +9,47 @@ import pytest
 import tractexp  # before NumPy: it keeps BLAS to one thread, as every command does
 
 LONG = (
-    "process/test_tutorial.py", "study/test_families.py", "process/test_sweep.py", "study/test_recovery.py",
-    "study/test_discrepancy.py", "study/test_prediction.py", "study/test_docs_run.py", "process/test_ten_minutes.py",
-    "study/test_proposals.py", "process/test_tracking.py", "process/test_hostile.py", "study/test_paper.py",
-    "study/test_orders.py", "process/test_commands.py", "process/test_compare_tracking.py", "process/test_signals.py",
-    "process/test_survey.py", "process/test_lost.py", "study/test_waves_evidence.py", "study/test_discrepancy_page.py",
-    "oracle/test_hidden_effects_generator.py", "study/test_recorder_window.py", "study/test_faults.py",
-    "model/test_uncertainty.py", "process/test_cli.py", "process/test_export.py",
-)  # fmt: skip
-MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+    "process/test_tutorial.py",
+    "study/test_families.py",
+    "process/test_sweep.py",
+    "study/test_recovery.py",
+    "study/test_discrepancy.py",
+    "study/test_prediction.py",
+    "study/test_docs_run.py",
+    "process/test_ten_minutes.py",
+    "study/test_proposals.py",
+    "process/test_tracking.py",
+    "process/test_hostile.py",
+    "study/test_paper.py",
+    "study/test_orders.py",
+    "process/test_commands.py",
+    "process/test_compare_tracking.py",
+    "process/test_signals.py",
+    "process/test_survey.py",
+    "process/test_lost.py",
+    "study/test_waves_evidence.py",
+    "study/test_discrepancy_page.py",
+    "oracle/test_hidden_effects_generator.py",
+    "study/test_recorder_window.py",
+    "study/test_faults.py",
+    "model/test_uncertainty.py",
+    "process/test_cli.py",
+    "process/test_export.py",
+)
+MOTOR = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 
 
 def pytest_configure(config):
-    """Files begin in the order they are collected in: xdist's own puts those of few tests, long ones, at the end.
+    """Files begin in the order they are collected in: xdist's own puts those of few tests, long
+    ones, at the end.
 
     What tests log goes to no store of the developer's own.
     """
@@ -40,7 +68,8 @@ def pytest_collection_modifyitems(items):
 def registry_as_it_was():
     """What a test registers is gone after it: the next one of this process finds what is installed.
 
-    For files that register; plugins are discovered once in a process, and a unit test that needs none imports none.
+    For files that register; plugins are discovered once in a process, and a unit test that needs
+    none imports none.
     """
     from tractexp.plugin import discover
 
@@ -53,13 +82,17 @@ def registry_as_it_was():
 
 @pytest.fixture(scope="session")
 def resistive_dips(tmp_path_factory) -> list[Path]:
-    """Three dips of a motor with a stator resistance of 0.02 pu and noise of 0.3 %, as CSV files."""
+    """Three dips of a motor with a stator resistance of 0.02 pu and noise of 0.3 %,
+    as CSV files.
+    """
     import numpy as np
 
     folder, noise = tmp_path_factory.mktemp("dips"), np.random.default_rng(7)
     load, paths = tractexp.compose(effects=["stator_resistance"]), []
     for depth, duration in ((0.3, 0.2), (0.5, 0.15), (0.4, 0.3)):
-        made = tractexp.simulate(load, MOTOR | {"R_s": 0.02}, depth=depth, duration=duration, rate=200, length=2)
+        made = tractexp.simulate(
+            load, MOTOR | {"R_s": 0.02}, depth=depth, duration=duration, rate=200, length=2
+        )
         frame = made.responses[0].to_frame()
         frame[["P", "Q"]] += 0.003 * noise.standard_normal((len(frame), 2))
         paths.append(folder / f"dip{len(paths) + 1}.csv")
@@ -69,7 +102,9 @@ def resistive_dips(tmp_path_factory) -> list[Path]:
 
 @pytest.fixture(scope="session")
 def planted():
-    """An investigation that names the stator resistance in two of three generated events: of a few effects."""
+    """An investigation that names the stator resistance in two of three generated events: of a few
+    effects.
+    """
     from test_discrepancy import FEW, base, events
 
     from tractexp.discrepancy.investigate import investigate
@@ -80,7 +115,9 @@ def planted():
 
 @pytest.fixture
 def no_proposal(monkeypatch):
-    """What nothing explains is left without a term, for tests that look at none: a search takes seconds."""
+    """What nothing explains is left without a term, for tests that look at none: a search takes
+    seconds.
+    """
     from tractexp.discrepancy.proposal.propose import ProposalResult
 
     result = ProposalResult(why="none is searched in this test")
@@ -101,11 +138,17 @@ def shared_data() -> Path:
 
 @pytest.fixture(scope="session")
 def empty_store(tmp_path_factory) -> Path:
-    """One migrated database, copied by the tests that do not care how it came about; workers side by side share it."""
+    """One migrated database, copied by the tests that do not care how it came about; workers side
+    by side share it.
+    """
     from tractexp import tracking
 
     side_by_side = "PYTEST_XDIST_WORKER" in os.environ
-    folder = tmp_path_factory.getbasetemp().parent / "store" if side_by_side else tmp_path_factory.mktemp("store")
+    folder = (
+        tmp_path_factory.getbasetemp().parent / "store"
+        if side_by_side
+        else tmp_path_factory.mktemp("store")
+    )
     tracking.open_store(tracking.default_uri(folder))
     return folder / "outputs" / "mlflow.db"
 

@@ -15,7 +15,9 @@ def phases(one, two=0.0, zero=0.0):
 
 
 def load(one, two=0.0, lag=np.pi / 6, exponent=2.0, two_lag=1.2, two_size=3.0):
-    """Currents (3, N) of a load of 0.2 kA: |P| and |Q| go as U^exponent, and I2 is that of its motors."""
+    """Currents (3, N) of a load of 0.2 kA: |P| and |Q| go as U^exponent, and I2 is that of its
+    motors.
+    """
     u = np.maximum(np.abs(one) / KV, 1e-9)
     first = KA * u ** (exponent - 1) * np.exp(1j * (np.angle(one) - lag))
     second = two_size * KA * np.asarray(two) / KV * np.exp(-1j * two_lag)
@@ -27,11 +29,22 @@ def wave(t, phasors, f=50.0):
     return np.sqrt(2) * (phasors * np.exp(2j * np.pi * f * t)).real
 
 
-def recording(waves, rate=3200.0, names=None, units=None, labels=None, frequency=50.0, source="made.cfg", **more):
+def recording(
+    waves,
+    rate=3200.0,
+    names=None,
+    units=None,
+    labels=None,
+    frequency=50.0,
+    source="made.cfg",
+    **more,
+):
     """A recording of waveforms (K, N) in kV and kA."""
     K = len(waves)
     names = names or ["Ua", "Ub", "Uc", "Ia", "Ib", "Ic"][:K]
-    units = units or ["kV" if name.lower().lstrip("0123456789-_f ")[:1] in "uv" else "kA" for name in names]
+    units = units or [
+        "kV" if name.lower().lstrip("0123456789-_f ")[:1] in "uv" else "kA" for name in names
+    ]
     quantity = {"kV": "voltage", "kA": "current"}
     channels = [
         Channel(name, np.asarray(x, dtype=float), unit, quantity.get(unit, ""), phase)

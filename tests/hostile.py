@@ -1,4 +1,6 @@
-"""Files and folders that nobody should give a command, each made in a folder of its own: a reading, or a sentence."""
+"""Files and folders that nobody should give a command, each made in a folder of its own: a reading,
+or a sentence.
+"""
 
 import contextlib
 import json
@@ -16,7 +18,15 @@ ROWS = 400
 ESCAPE = "\x1b]0;owned\x07\x1b[31m\x9b2J"  # sets a terminal's title, its colour, and clears it
 TABLE = "t,U,P,Q"
 NAMES = TABLE.split(",")
-MOTOR = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+MOTOR = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 
 
 def columns(step: float = 0.005, power: float = 1.0) -> np.ndarray:
@@ -39,10 +49,16 @@ def workbook(path: Path, cells: str, **more: str) -> Path:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
         root = f'<Relationship Id="rId1" Type="{kind}/officeDocument" Target="xl/workbook.xml"/>'
         book.writestr("_rels/.rels", f'<Relationships xmlns="{_RELATIONS}">{root}</Relationships>')
-        book.writestr("xl/workbook.xml", f'<workbook xmlns="{main}" xmlns:r="{kind}">{sheets}</workbook>')
-        book.writestr("xl/_rels/workbook.xml.rels", f'<Relationships xmlns="{_RELATIONS}">{link}</Relationships>')
         book.writestr(
-            "xl/worksheets/sheet1.xml", f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>'
+            "xl/workbook.xml", f'<workbook xmlns="{main}" xmlns:r="{kind}">{sheets}</workbook>'
+        )
+        book.writestr(
+            "xl/_rels/workbook.xml.rels",
+            f'<Relationships xmlns="{_RELATIONS}">{link}</Relationships>',
+        )
+        book.writestr(
+            "xl/worksheets/sheet1.xml",
+            f'<worksheet xmlns="{main}"><sheetData>{cells}</sheetData></worksheet>',
         )
     return path
 
@@ -59,8 +75,14 @@ def rows_of_cells(values: np.ndarray) -> str:
     def cell(k: int, n: int, value: float) -> str:
         return f'<c r="{"ABCD"[k]}{n}"><v>{float(value)!r}</v></c>'
 
-    heads = [f'<c r="{"ABCD"[k]}1" t="inlineStr"><is><t>{name}</t></is></c>' for k, name in enumerate(NAMES)]
-    body = [row(n, [cell(k, n, value) for k, value in enumerate(one)]) for n, one in enumerate(values, 2)]
+    heads = [
+        f'<c r="{"ABCD"[k]}1" t="inlineStr"><is><t>{name}</t></is></c>'
+        for k, name in enumerate(NAMES)
+    ]
+    body = [
+        row(n, [cell(k, n, value) for k, value in enumerate(one)])
+        for n, one in enumerate(values, 2)
+    ]
     return row(1, heads) + "".join(body)
 
 
@@ -69,21 +91,31 @@ def far_cell(path: Path) -> Path:
 
 
 def far_cell_of_a_table(path: Path) -> Path:
-    return workbook(path, rows_of_cells(columns()) + '<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>')
+    return workbook(
+        path, rows_of_cells(columns()) + '<row r="1048576"><c r="XFD1048576"><v>1</v></c></row>'
+    )
 
 
 def repeated_cells(path: Path) -> Path:
-    """An OpenDocument sheet of a few hundred bytes that stands for a million rows of 16,384 numbers."""
+    """An OpenDocument sheet of a few hundred bytes that stands for a million rows of 16,384
+    numbers.
+    """
     names = {"office": "office", "table": "table", "text": "text"}
-    spaces = " ".join(f'xmlns:{k}="urn:oasis:names:tc:opendocument:xmlns:{v}:1.0"' for k, v in names.items())
-    cell = '<table:table-cell table:number-columns-repeated="16384" office:value-type="float" office:value="1"/>'
+    spaces = " ".join(
+        f'xmlns:{k}="urn:oasis:names:tc:opendocument:xmlns:{v}:1.0"' for k, v in names.items()
+    )
+    cell = (
+        '<table:table-cell table:number-columns-repeated="16384" office:value-type="float"'
+        ' office:value="1"/>'
+    )
     row = f'<table:table-row table:number-rows-repeated="1048576">{cell}</table:table-row>'
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as book:
         book.writestr("mimetype", "application/vnd.oasis.opendocument.spreadsheet")
         book.writestr("META-INF/manifest.xml", "<manifest/>")
         book.writestr(
             "content.xml",
-            f'<office:document-content {spaces}><office:body><office:spreadsheet><table:table table:name="a">{row}'
+            f"<office:document-content {spaces}><office:body><office:spreadsheet><table:table"
+            f' table:name="a">{row}'
             "</table:table></office:spreadsheet></office:body></office:document-content>",
         )
     return path
@@ -179,11 +211,19 @@ def noisy(power: float) -> np.ndarray:
     return values
 
 
-def waves(step: float, current: float = 100.0, voltage: float = 10_000.0, far: float = 0.0) -> np.ndarray:
-    """Three phases at 50 Hz [V, A] in 20 samples a cycle, `step` apart; the last one is `far` away."""
+def waves(
+    step: float, current: float = 100.0, voltage: float = 10_000.0, far: float = 0.0
+) -> np.ndarray:
+    """Three phases at 50 Hz [V, A] in 20 samples a cycle, `step` apart; the last one
+    is `far` away.
+    """
     t = step * np.arange(ROWS)
     angle = 2 * np.pi * (np.arange(ROWS)[:, None] / 20 - np.arange(3) / 3)
-    U = np.where((np.arange(ROWS) > 200) & (np.arange(ROWS) < 260), 0.6, 1.0)[:, None] * voltage * np.sin(angle)
+    U = (
+        np.where((np.arange(ROWS) > 200) & (np.arange(ROWS) < 260), 0.6, 1.0)[:, None]
+        * voltage
+        * np.sin(angle)
+    )
     t[-1] += far
     return np.column_stack([t, U, current * np.sin(angle - 0.5)])
 
@@ -194,7 +234,9 @@ def far_time() -> np.ndarray:
     return values
 
 
-def comtrade(samples: str = "400", ratio: str = "1", name: str = "UA", rate: str = "1000") -> Callable[[Path], Path]:
+def comtrade(
+    samples: str = "400", ratio: str = "1", name: str = "UA", rate: str = "1000"
+) -> Callable[[Path], Path]:
     """A configuration and its samples, of which one number is odd."""
 
     def make(path: Path) -> Path:
@@ -217,7 +259,9 @@ def comtrade(samples: str = "400", ratio: str = "1", name: str = "UA", rate: str
         path.write_text("\r\n".join(lines) + "\r\n")
         angle = 2 * np.pi * (50 * np.arange(400)[:, None] / 1000 - np.arange(3) / 3)
         values = (10_000 * np.sin(np.hstack([angle, angle - 0.5]))).astype("<i2")
-        body = b"".join(struct.pack("<ii", k, 1000 * k) + row.tobytes() for k, row in enumerate(values))
+        body = b"".join(
+            struct.pack("<ii", k, 1000 * k) + row.tobytes() for k, row in enumerate(values)
+        )
         path.with_suffix(".dat").write_bytes(body)
         return path
 
@@ -227,13 +271,28 @@ def comtrade(samples: str = "400", ratio: str = "1", name: str = "UA", rate: str
 def result(**odd: object) -> str:
     """A result.json whose model is the usual one, but for what is odd."""
     content = {
-        "parameters": MOTOR, "objective": 1e-5, "epsilon_p": 0.01, "epsilon_q": 0.01, "simulations": 1, "refused": 0,
-        "iterations": 1, "seconds": 1.0, "status": "ended", "seed": 0, "events": [], "at_bound": [],
-        "units": {}, "bounds": {name: [0.5 * v, 2 * v] for name, v in MOTOR.items()},
-        "model": {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "effects": []},
+        "parameters": MOTOR,
+        "objective": 1e-5,
+        "epsilon_p": 0.01,
+        "epsilon_q": 0.01,
+        "simulations": 1,
+        "refused": 0,
+        "iterations": 1,
+        "seconds": 1.0,
+        "status": "ended",
+        "seed": 0,
+        "events": [],
+        "at_bound": [],
+        "units": {},
+        "bounds": {name: [0.5 * v, 2 * v] for name, v in MOTOR.items()},
+        "model": {
+            "motor": {"name": "electromechanical"},
+            "static": {"name": "exponential"},
+            "effects": [],
+        },
         "before": {"U0": 1.0, "P0": 0.8, "Q0": 0.6, "frequency": 50.0},
         "own_base": {"power": 1.0, "file_power": 1.0, "origin": "given"},
-    }  # fmt: skip
+    }
     return json.dumps(content | odd)
 
 
@@ -249,7 +308,9 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     "empty_zip.xlsx": empty_zip,
     "no_book.xlsx": written(b"PK\x03\x04" + bytes(200)),
     "no_book.xls": written(b"\xd0\xcf\x11\xe0" + bytes(600)),
-    "escapes.xlsx": lambda path: workbook(path, rows_of_cells(columns()).replace(">P<", ">P&#27;[31m<")),
+    "escapes.xlsx": lambda path: workbook(
+        path, rows_of_cells(columns()).replace(">P<", ">P&#27;[31m<")
+    ),
     # Parquet
     "lists.parquet": lambda path: parquet(path, P=[[1.0, 2.0]] * ROWS),
     "bytes.parquet": lambda path: parquet(path, Q=[b"\xff\x1b"] * ROWS),
@@ -316,7 +377,9 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     # beside a table
     "beside_deep.csv": lambda path: _beside(path, DEEP),
     "beside_list.csv": lambda path: _beside(path, "[1]"),
-    "beside_infinite.csv": lambda path: _beside(path, '{"base": {"power": 1e999}, "name": "\\u001b[31m"}'),
+    "beside_infinite.csv": lambda path: _beside(
+        path, '{"base": {"power": 1e999}, "name": "\\u001b[31m"}'
+    ),
     "beside_surrogate.csv": lambda path: _beside(path, '{"name": "\\udcff", "note": "\\ud800"}'),
     "beside_endless.csv": lambda path: _beside(path, '{"name": ' + "9" * 10_000 + "}"),
     # COMTRADE and other recorders' files
@@ -341,7 +404,9 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     "bare.json": written('{"parameters": {}}'),
     "kind.json": written('{"tractexp": "1", "kind": ["a"]}'),
     "no_kind.json": written('{"tractexp": "1"}'),
-    "look.json": written('{"tractexp": "1", "kind": "look", "sources": 3, "settings": 1, "content": null}'),
+    "look.json": written(
+        '{"tractexp": "1", "kind": "look", "sources": 3, "settings": 1, "content": null}'
+    ),
     "identify.json": written('{"tractexp": "1", "kind": "identify", "result": [[]]}'),
     "nested.json": written(result(parameters={"C": {"a": [1]}})),
     "texts.json": written(result(parameters={"C": "x"})),
@@ -353,7 +418,9 @@ INPUTS: dict[str, Callable[[Path], Path]] = {
     "list_model.json": written(result(model=[1])),
     "nested_model.json": written(result(model={"motor": {"name": {"a": 1}}, "static": 3})),
     "no_before.json": written(result(before={})),
-    "infinite_before.json": written(result(before={"U0": float("inf"), "P0": 1, "Q0": 1, "frequency": 50})),
+    "infinite_before.json": written(
+        result(before={"U0": float("inf"), "P0": 1, "Q0": 1, "frequency": 50})
+    ),
     "base.json": written(result(own_base={"power": 0, "file_power": 1.0, "origin": "given"})),
     "list_base.json": written(result(own_base=[1])),
     "database.csv": database,

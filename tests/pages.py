@@ -13,7 +13,9 @@ VOID = {"meta", "br", "img", "path", "use", "rect", "line"}
 
 
 class Reader(html.parser.HTMLParser):
-    """Checks that elements nest, and collects ids, references and what would be loaded from elsewhere."""
+    """Checks that elements nest, and collects ids, references and what would be loaded from
+    elsewhere.
+    """
 
     def __init__(self, text):
         super().__init__()
@@ -48,11 +50,15 @@ class Reader(html.parser.HTMLParser):
 
 def read(path) -> Reader:
     """A page read back, after checking that it is valid and self-contained."""
-    text = path.read_text(encoding="utf-8").replace(f"<script>{script()}</script>", "")  # our own, the only one
-    text = re.sub(r'<script type="application/json">[^<]*</script>', "", text)  # what charts draw: data, no program
+    # our own, the only one
+    text = path.read_text(encoding="utf-8").replace(f"<script>{script()}</script>", "")
+    # what charts draw: data, no program
+    text = re.sub(r'<script type="application/json">[^<]*</script>', "", text)
     reader = Reader(text)
     assert len(set(reader.ids)) == len(reader.ids)
-    assert all(reference.startswith("#") and reference[1:] in reader.ids for reference in reader.references)
+    assert all(
+        reference.startswith("#") and reference[1:] in reader.ids for reference in reader.references
+    )
     assert not re.search(r"https?://|//[a-z]|@import", text)
     assert not {"script", "link", "iframe", "img", "object", "embed", "metadata"} & set(reader.tags)
     return reader
@@ -60,7 +66,10 @@ def read(path) -> Reader:
 
 def charts(text):
     """What the charts of a page's text draw, from the top."""
-    return [json.loads(data) for data in re.findall(r'<script type="application/json">([^<]*)</script>', text)]
+    return [
+        json.loads(data)
+        for data in re.findall(r'<script type="application/json">([^<]*)</script>', text)
+    ]
 
 
 def unpacked(packed):

@@ -7,10 +7,23 @@ from tractexp.model.drive import WaveformDrive
 OMEGA = 2 * np.pi * 50.0
 
 
-def event(u, u_zero=None, rate=5000.0, length=0.5, f0=50.0, angle=0.0, U0=1.0, P0=1.0, Q0=0.6, omega_n=OMEGA):
-    """The voltage u(t) [pu] in the stationary frame, sampled; the cycle before t = 0 is U0 exp(j 2 pi f0 t).
+def event(
+    u,
+    u_zero=None,
+    rate=5000.0,
+    length=0.5,
+    f0=50.0,
+    angle=0.0,
+    U0=1.0,
+    P0=1.0,
+    Q0=0.6,
+    omega_n=OMEGA,
+):
+    """The voltage u(t) [pu] in the stationary frame, sampled; the cycle before t = 0 is U0 exp(j 2
+    pi f0 t).
 
-    All of it is turned by `angle` [rad]. u_zero(t) is its zero sequence. Every current is compared with 0.
+    All of it is turned by `angle` [rad]. u_zero(t) is its zero sequence. Every current is compared
+    with 0.
     """
     t = np.arange(round((length + 1 / f0) * rate) + 1) / rate - 1 / f0
     turn = np.exp(2j * np.pi * f0 * t)
@@ -18,10 +31,19 @@ def event(u, u_zero=None, rate=5000.0, length=0.5, f0=50.0, angle=0.0, U0=1.0, P
     turn = turn * np.exp(1j * angle)
     zero = np.zeros(len(t)) if u_zero is None else np.where(t < 0, 0.0, u_zero(t))
     return WaveformDrive(
-        step=1 / rate, v=v, v_zero=zero, turn=turn, currents=np.zeros((3, len(t))), U=_slow(v, rate, f0),
-        U2=_slow(np.conj(v * turn) / turn, rate, f0), U0=U0, P0=P0, Q0=Q0, omega_s0=2 * np.pi * f0 - omega_n,
+        step=1 / rate,
+        v=v,
+        v_zero=zero,
+        turn=turn,
+        currents=np.zeros((3, len(t))),
+        U=_slow(v, rate, f0),
+        U2=_slow(np.conj(v * turn) / turn, rate, f0),
+        U0=U0,
+        P0=P0,
+        Q0=Q0,
+        omega_s0=2 * np.pi * f0 - omega_n,
         omega_n=omega_n,
-    )  # fmt: skip
+    )
 
 
 def times(made):
@@ -35,12 +57,16 @@ def smooth(x):
 
 
 def dip(depth=0.4, jump=0.0, negative=0.0, end=0.1, edge=0.004, f0=50.0, U0=1.0):
-    """A dip of the positive sequence with a jump of its angle [rad], and a negative sequence as long as it lasts."""
+    """A dip of the positive sequence with a jump of its angle [rad], and a negative sequence as
+    long as it lasts.
+    """
 
     def u(t):
         there = smooth(t / edge) - smooth((t - end) / edge)
         turn = np.exp(2j * np.pi * f0 * t)
-        return U0 * (1 - depth * there) * np.exp(1j * jump * there) * turn + negative * there * np.conj(turn)
+        return U0 * (1 - depth * there) * np.exp(
+            1j * jump * there
+        ) * turn + negative * there * np.conj(turn)
 
     return u
 

@@ -36,8 +36,9 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
 
     __version__: str
 
-# Our matrices have a dozen columns: BLAS threads only wait for each other (a hundredfold under load), and their
-# number would change the last bits of a result. This must stand before NumPy is imported.
+# Our matrices have a dozen columns: BLAS threads only wait for each other (a hundredfold under
+# load), and their number would change the last bits of a result. This must stand before NumPy is
+# imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 PUBLIC = {

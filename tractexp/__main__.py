@@ -1,10 +1,17 @@
-"""Command line: compose the configuration, run the task, end with a sentence where the input is wrong."""
+"""Command line: compose the configuration, run the task, end with a sentence where the input is
+wrong.
+"""
 
 import os
 import sys
 
-# `python -m tractexp` would look for modules beside the records first. A clone that is run where it lies needs that.
-if __name__ == "__main__" and not sys.flags.safe_path and not __file__.startswith(os.path.join(sys.path[0], "")):
+# `python -m tractexp` would look for modules beside the records first. A clone that is run where it
+# lies needs that.
+if (
+    __name__ == "__main__"
+    and not sys.flags.safe_path
+    and not __file__.startswith(os.path.join(sys.path[0], ""))
+):
     del sys.path[0]
 
 import gc
@@ -12,8 +19,9 @@ import importlib
 import signal
 from collections.abc import Sequence
 
-# The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy cores), and the
-# cores are for the jobs of a sweep. Set before NumPy is imported; an explicit choice of the user's stands.
+# The matrices of a fit are small: threads of a BLAS cost more than they bring (30 times on two busy
+# cores), and the cores are for the jobs of a sweep. Set before NumPy is imported; an explicit
+# choice of the user's stands.
 for library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
@@ -24,23 +32,33 @@ from tractexp.wording import one_line  # noqa: E402
 
 # what no single job that is logged has: maybe
 UNLOGGED = ("-", "tracking.enabled=", "task=export", "experiment=", "hydra.mode=")
-SELDOM = (50_000, 20, 50)  # what is imported stays: to look for garbage in it takes a quarter of a short job
+# what is imported stays: to look for garbage in it takes a quarter of a short job
+SELDOM = (50_000, 20, 50)
 COMMANDS = {  # beside the tasks: where each is
-    "ui": "tractexp.cli.ui:ui", "look": "tractexp.cli.look:look", "sync": "tractexp.cli.sync:sync",
-    "doctor": "tractexp.cli.doctor:doctor", "list": "tractexp.usage:listed", "new": "tractexp.cli.new:new",
-}  # fmt: skip
+    "ui": "tractexp.cli.ui:ui",
+    "look": "tractexp.cli.look:look",
+    "sync": "tractexp.cli.sync:sync",
+    "doctor": "tractexp.cli.doctor:doctor",
+    "list": "tractexp.usage:listed",
+    "new": "tractexp.cli.new:new",
+}
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Entry point of `tractexp` and `python -m tractexp`; returns the exit code. `argv` is by default the process's."""
+    """Entry point of `tractexp` and `python -m tractexp`; returns the exit code. `argv` is by
+    default the process's.
+    """
     arguments = sys.argv[1:] if argv is None else [*argv]
     gc.set_threshold(*SELDOM)
     try:
         with outlet() as out, interpreter.safe_path():
             code = _run_with_refusals(arguments)
         if out and out.lost:
-            return _print_refusal(f"what was to be printed could not be written ({out.lost}); files are whole", code or 2)
+            return _print_refusal(
+                f"what was to be printed could not be written ({out.lost}); files are whole",
+                code or 2,
+            )
         return code
     finally:
         gc.freeze()  # nor at the end, when everything goes anyway
@@ -58,9 +76,13 @@ def _run_with_refusals(arguments: list[str]) -> int:
         if traceback:
             raise
         if isinstance(error, MemoryError):
-            return _print_refusal("this takes more memory than there is; ask for less, such as a smaller population")
+            return _print_refusal(
+                "this takes more memory than there is; ask for less, such as a smaller population"
+            )
         if isinstance(error, OSError):
-            return _print_refusal(f"{error.filename or 'a file'} cannot be used: {error.strerror or error}")
+            return _print_refusal(
+                f"{error.filename or 'a file'} cannot be used: {error.strerror or error}"
+            )
         return _print_refusal(str(error))
     except Exception as error:
         if traceback:
@@ -68,8 +90,14 @@ def _run_with_refusals(arguments: list[str]) -> int:
         from tractexp.plugin import place_in_plugin
 
         place = place_in_plugin(error)
-        whose = f"the plugin fails in {place}" if place else "the program failed, which is its own mistake"
-        return _print_refusal(f"{whose}: {type(error).__name__}: {error}; {FULL_ERROR}=1 shows where", 1)
+        whose = (
+            f"the plugin fails in {place}"
+            if place
+            else "the program failed, which is its own mistake"
+        )
+        return _print_refusal(
+            f"{whose}: {type(error).__name__}: {error}; {FULL_ERROR}=1 shows where", 1
+        )
 
 
 def _print_refusal(sentence: str, code: int = 2) -> int:
@@ -119,7 +147,9 @@ def _is_file(argument: str) -> bool:
 
 
 def end_on_signal(*_: object) -> None:
-    """End what runs in an orderly way when the system asks for it, as at a batch system's time limit."""
+    """End what runs in an orderly way when the system asks for it, as at a batch system's time
+    limit.
+    """
     raise Stopped("ended by SIGTERM; nothing was logged for this run", code=143)
 
 

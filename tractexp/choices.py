@@ -1,8 +1,9 @@
 """What can be chosen in each group, read from the files that declare it.
 
-Nothing is imported, so that `--help` takes no time and a plugin that cannot be imported hides none of the others. A
-plugin is a class decorated with `@plugin` in a module of a plugin package, in the group that its bases declare; a
-configuration is a YAML file in a package's `conf/` folder. Names that start with an underscore are nobody's choice.
+Nothing is imported, so that `--help` takes no time and a plugin that cannot be imported hides none
+of the others. A plugin is a class decorated with `@plugin` in a module of a plugin package, in the
+group that its bases declare; a configuration is a YAML file in a package's `conf/` folder. Names
+that start with an underscore are nobody's choice.
 """
 
 import ast
@@ -21,12 +22,15 @@ from tractexp.errors import nearest
 ENTRY_POINTS = "tractexp.plugins"
 FEWEST_VARIANTS = 3  # of a plugin that are told as a number
 HERE = Path(__file__).resolve().parent
-CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())  # in a wheel, in a clone
+# in a wheel, in a clone
+CONF = next(p for p in (HERE / "conf", HERE.parent / "conf") if (p / "config.yaml").is_file())
 
 
 @dataclass(frozen=True)
 class Option:
-    """A name that a group offers: what it is, in a sentence, and the module of its class ("" for a configuration)."""
+    """A name that a group offers: what it is, in a sentence, and the module of its class ("" for a
+    configuration).
+    """
 
     name: str
     about: str
@@ -34,7 +38,8 @@ class Option:
 
 
 def choices(own: Iterable[Path] = ()) -> dict[str, dict[str, Option]]:
-    """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading comment.
+    """{group: {name: option}}. Its sentence is a plugin's docstring, or a configuration's leading
+    comment.
 
     `own` are further folders of configurations, as Hydra's `-cd` names one.
     """
@@ -58,13 +63,26 @@ def defaults() -> dict[str, str]:
     import yaml
 
     content = yaml.safe_load((CONF / "config.yaml").read_text(encoding="utf-8"))
-    return {group: name for item in content["defaults"] if isinstance(item, dict) for group, name in item.items()}
+    return {
+        group: name
+        for item in content["defaults"]
+        if isinstance(item, dict)
+        for group, name in item.items()
+    }
 
 
 def elsewhere(group: str, name: str) -> str:
-    """The end of a sentence on a name that is another group's: ", but there is task=plan"; "" where it is none's."""
-    holders = [g for g, names in choices().items() if name in names and g != group and (g in defaults() or "/" in g)]
-    return f", but there is {' and '.join(f'{g}={name}' for g in sorted(holders))}" if holders else ""
+    """The end of a sentence on a name that is another group's: ", but there is task=plan"; "" where
+    it is none's.
+    """
+    holders = [
+        g
+        for g, names in choices().items()
+        if name in names and g != group and (g in defaults() or "/" in g)
+    ]
+    return (
+        f", but there is {' and '.join(f'{g}={name}' for g in sorted(holders))}" if holders else ""
+    )
 
 
 @functools.cache
@@ -74,12 +92,16 @@ def read_replacements(group: str, name: str) -> dict[str, str]:
 
     content = yaml.safe_load((CONF / group / f"{name}.yaml").read_text(encoding="utf-8"))
     items = [item for item in content.get("defaults", ()) if isinstance(item, dict)]
-    return {key.removeprefix("override /"): chosen for item in items for key, chosen in item.items()}
+    return {
+        key.removeprefix("override /"): chosen for item in items for key, chosen in item.items()
+    }
 
 
 @functools.cache
 def set_holding(sources: tuple[str, ...]) -> str:
-    """The shipped choice of data that fits these files and holds further ones out; "" where there is none."""
+    """The shipped choice of data that fits these files and holds further ones out; "" where there
+    is none.
+    """
     import yaml
 
     for file in sorted((CONF / "data").glob("*.yaml")):
@@ -124,13 +146,18 @@ def describe_available(group: str, name: str, names: Iterable[str]) -> str:
     names = sorted(names)
     plugins = choices().get(group, {})
     grouped = group_variants({name: plugins.get(name, Option(name, "")) for name in names})
-    parts = [f"{base} and {len(varied)} variants" if varied else base for base, varied in sorted(grouped.items())]
+    parts = [
+        f"{base} and {len(varied)} variants" if varied else base
+        for base, varied in sorted(grouped.items())
+    ]
     return f"{nearest(name, names) or '.'} Available: {', '.join(parts) or 'none'}"
 
 
 def entry_points() -> list[importlib.metadata.EntryPoint]:
     """The plugin packages that are installed, in order of name."""
-    return sorted(importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value))
+    return sorted(
+        importlib.metadata.entry_points(group=ENTRY_POINTS), key=lambda p: (p.name, p.value)
+    )
 
 
 @functools.cache
@@ -141,7 +168,9 @@ def plugin_folders() -> tuple[tuple[str, Path], ...]:
 
 
 def configuration_folders() -> list[Path]:
-    """The `conf/` folders of the plugin packages, of which the last that has a file is the one that is read."""
+    """The `conf/` folders of the plugin packages, of which the last that has a file is the one that
+    is read.
+    """
     return [folder / "conf" for _, folder in plugin_folders() if (folder / "conf").is_dir()]
 
 
@@ -162,7 +191,9 @@ def sentence(text: str) -> str:
 
 
 def _comment(file: Path) -> str:
-    """The first sentence of the comment a file begins with, beyond Hydra's directives and the command it stands for."""
+    """The first sentence of the comment a file begins with, beyond Hydra's directives and the
+    command it stands for.
+    """
     lines = []
     for line in file.read_text(encoding="utf-8").splitlines():
         if not line.startswith("#"):
@@ -176,14 +207,19 @@ def _comment(file: Path) -> str:
 def _list_declared_plugins(module: str) -> Iterator[tuple[str, str]]:
     """(group, first sentence) of the plugins that a module declares."""
     for node in _tree(module).body:
-        if not (isinstance(node, ast.ClassDef) and any(_last(d) == "plugin" for d in node.decorator_list)):
+        if not (
+            isinstance(node, ast.ClassDef)
+            and any(_last(d) == "plugin" for d in node.decorator_list)
+        ):
             continue
         if group := _group(node, module, ()):
             yield group, sentence(ast.get_docstring(node) or "")
 
 
 def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) -> str:
-    """The group that a class or its first base to know declares; "" where the bases lead nowhere."""
+    """The group that a class or its first base to know declares; "" where the bases
+    lead nowhere.
+    """
     for item in node.body:
         if isinstance(item, ast.AnnAssign | ast.Assign) and isinstance(item.value, ast.Constant):
             targets = item.targets if isinstance(item, ast.Assign) else [item.target]
@@ -191,18 +227,28 @@ def _group(node: ast.ClassDef, module: str, passed: tuple[ast.ClassDef, ...]) ->
                 return str(item.value.value)
     for base in node.bases:
         met, there = _class(_last(base), module, {module})
-        if met is not None and met not in (node, *passed) and (group := _group(met, there, (*passed, node))):
+        if (
+            met is not None
+            and met not in (node, *passed)
+            and (group := _group(met, there, (*passed, node)))
+        ):
             return group
     return ""
 
 
 def _class(name: str, module: str, visited: set[str]) -> tuple[ast.ClassDef | None, str]:
-    """The class that a module calls by this name, and its module: followed through `from ... import`, as by Python."""
+    """The class that a module calls by this name, and its module: followed through `from ...
+    import`, as by Python.
+    """
     for node in _tree(module).body:
         if isinstance(node, ast.ClassDef) and node.name == name:
             return node, module
         if isinstance(node, ast.ImportFrom):
-            package = module.split(".")[: -node.level + bool(_folders(module)) or None] if node.level else []
+            package = (
+                module.split(".")[: -node.level + bool(_folders(module)) or None]
+                if node.level
+                else []
+            )
             there = ".".join([*package, *([node.module] if node.module else [])])
             for alias in node.names:
                 if (alias.asname or alias.name) == name and there not in visited:
@@ -214,12 +260,20 @@ def _last(node: ast.expr) -> str:
     """`plugin` of `@plugin`, of `@extend.plugin` and of `@plugin()`."""
     if isinstance(node, ast.Call):
         node = node.func
-    return node.attr if isinstance(node, ast.Attribute) else node.id if isinstance(node, ast.Name) else ""
+    return (
+        node.attr
+        if isinstance(node, ast.Attribute)
+        else node.id
+        if isinstance(node, ast.Name)
+        else ""
+    )
 
 
 @functools.cache
 def _tree(module: str) -> ast.Module:
-    """A module parsed; an empty one where it cannot be, for then Python says why when it is imported."""
+    """A module parsed; an empty one where it cannot be, for then Python says why when it is
+    imported.
+    """
     file = _source(module)
     try:
         return ast.parse(file.read_bytes()) if file else ast.Module([], [])
@@ -230,16 +284,28 @@ def _tree(module: str) -> ast.Module:
 def _source(module: str) -> Path | None:
     package, _, name = module.rpartition(".")
     own = [folder / "__init__.py" for folder in _folders(module)]
-    return next((f for f in (*own, *(folder / f"{name}.py" for folder in _folders(package))) if f.is_file()), None)
+    return next(
+        (
+            f
+            for f in (*own, *(folder / f"{name}.py" for folder in _folders(package)))
+            if f.is_file()
+        ),
+        None,
+    )
 
 
 @functools.cache
 def _folders(package: str) -> tuple[Path, ...]:
-    """The folders of a package; none where there is none. Only the topmost is looked up, so that no code runs."""
+    """The folders of a package; none where there is none. Only the topmost is looked up, so that no
+    code runs.
+    """
     top, _, rest = package.partition(".")
     try:
         spec = importlib.util.find_spec(top) if top else None
     except (ImportError, ValueError):
         return ()
-    paths = (Path(p, *rest.split(".")) if rest else Path(p) for p in (spec and spec.submodule_search_locations) or ())
+    paths = (
+        Path(p, *rest.split(".")) if rest else Path(p)
+        for p in (spec and spec.submodule_search_locations) or ()
+    )
     return tuple(folder for folder in paths if folder.is_dir())

@@ -1,7 +1,8 @@
-"""Configuration files read without Hydra, which takes half a second: a choice of a group, and what an experiment sets.
+"""Configuration files read without Hydra, which takes half a second: a choice of a group, and what
+an experiment sets.
 
-A file's `defaults` name other choices, of the same group, of a group below it, or overrides of any group; what the
-file says itself comes last.
+A file's `defaults` name other choices, of the same group, of a group below it, or overrides of any
+group; what the file says itself comes last.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -17,7 +18,8 @@ MODEL = "model"  # the group
 
 
 def read_choice(group: str, name: str) -> dict[str, Any]:
-    """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's, else of a plugin.
+    """The content of a choice of a group: of `conf/GROUP/NAME.yaml`, ours or a plugin package's,
+    else of a plugin.
 
     A model may be the path of a file of one.
 
@@ -39,7 +41,9 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
             composed[part] = read_choice(f"{group}/{part}", chosen)
         elif item != "_self_":
             place, _, chosen = item.partition("@")[0].rpartition("/")
-            composed |= read_choice(place.removeprefix("/").removeprefix("schema/") or group, chosen)
+            composed |= read_choice(
+                place.removeprefix("/").removeprefix("schema/") or group, chosen
+            )
     for key, value in content.items():
         nested = isinstance(value, dict) and isinstance(composed.get(key), dict)
         composed[key] = {**composed[key], **value} if nested else value
@@ -47,7 +51,9 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
 
 
 def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:
-    """{"task": "paper", "task.parts": "['table1']"}: what an experiment's file and those that it builds on set."""
+    """{"task": "paper", "task.parts": "['table1']"}: what an experiment's file and those that it
+    builds on set.
+    """
     file = _file("experiment", name, places)
     if file is None:
         return {}
@@ -55,7 +61,10 @@ def set_by_experiment(name: str, places: Sequence[Path]) -> dict[str, str]:
     values: dict[str, str] = {}
     for item in content.pop("defaults", []):
         if isinstance(item, dict):
-            values |= {key.removeprefix("override ").strip("/").replace("/", "."): str(v) for key, v in item.items()}
+            values |= {
+                key.removeprefix("override ").strip("/").replace("/", "."): str(v)
+                for key, v in item.items()
+            }
         elif item != "_self_":
             values |= set_by_experiment(item.rpartition("/")[2], places)
     content.pop("hydra", None)  # of the run, not of the task

@@ -22,7 +22,8 @@ from tractexp.schema import Config
 
 
 class PluginSearchPath(SearchPathPlugin):
-    """Puts the `conf/` folder of every installed plugin package before ours, and the user's own before all.
+    """Puts the `conf/` folder of every installed plugin package before ours, and the user's own
+    before all.
 
     A file of the same name replaces ours.
     """
@@ -38,7 +39,9 @@ class PluginSearchPath(SearchPathPlugin):
 
 
 class ModelFiles(ConfigSource):
-    """The models that are chosen by the path of a file, `model=/path/extended.yaml`; read as `model_file` says."""
+    """The models that are chosen by the path of a file, `model=/path/extended.yaml`; read as
+    `model_file` says.
+    """
 
     @staticmethod
     def scheme() -> str:
@@ -63,7 +66,9 @@ class ModelFiles(ConfigSource):
 
 
 def register(arguments: Sequence[str] = ()) -> None:
-    """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that cannot be loaded."""
+    """Discover all plugins and give Hydra their schemas. Raises `UserError` for a plugin that
+    cannot be loaded.
+    """
     PluginSearchPath.own = _own_folders(arguments)
     from tractexp.sweep.launcher import Cores, CoresConfig
     from tractexp.sweep.sweeper import Grid, GridConfig
@@ -96,17 +101,23 @@ def _own_folders(arguments: Sequence[str]) -> list[Path]:
 
 
 def _is_configured(group: str, name: str) -> bool:
-    """Whether a file gives this plugin its defaults: it begins with the schema, as conf/task/export.yaml does."""
+    """Whether a file gives this plugin its defaults: it begins with the schema, as
+    conf/task/export.yaml does.
+    """
     folders = (plugin.CONF, *plugin.configuration_folders(), *PluginSearchPath.own)
     return any((folder / group / f"{name}.yaml").is_file() for folder in folders)
 
 
 def _fingerprint(overrides: Any) -> str:
-    """Eight letters that stand for a sweep's overrides: the same command writes to the same folder."""
+    """Eight letters that stand for a sweep's overrides: the same command writes to the
+    same folder.
+    """
     return hashlib.sha256("\n".join(overrides).encode()).hexdigest()[:8]
 
 
 def _folder_name(path: Any) -> str:
-    """A folder's name, and letters that stand for its whole path: the same folder, the same name."""
+    """A folder's name, and letters that stand for its whole path: the same folder,
+    the same name.
+    """
     whole = Path(str(path)).absolute()
     return f"{whole.name}_{hashlib.sha256(str(whole).encode()).hexdigest()[:8]}"

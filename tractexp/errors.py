@@ -1,4 +1,6 @@
-"""Errors for users: a sentence that says what, where, the value, what is allowed and how to mend it; and a stop."""
+"""Errors for users: a sentence that says what, where, the value, what is allowed and how to mend
+it; and a stop.
+"""
 
 import difflib
 import math
@@ -14,15 +16,19 @@ _spelling: ContextVar[Callable[[str], str]] = ContextVar("spelling", default=str
 
 
 def setting(key: str) -> str:
-    """A key of the configuration, "model.bounds.C", as the user writes it: in Python the argument, "bounds.C"."""
+    """A key of the configuration, "model.bounds.C", as the user writes it: in Python the argument,
+    "bounds.C".
+    """
     return _spelling.get()(key)
 
 
 @contextmanager
 def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator[None]:
-    """Within it, keys of task, model and data that are among the arguments of a call are spelled as those.
+    """Within it, keys of task, model and data that are among the arguments of a call are spelled as
+    those.
 
-    The events to fit, `data.train`, are the argument `records` of a call that has it, and `task=NAME` is the call.
+    The events to fit, `data.train`, are the argument `records` of a call that has it, and
+    `task=NAME` is the call.
     """
     outer = _spelling.get()
 
@@ -43,7 +49,9 @@ def settings_as(call: str, arguments: Callable[[], Collection[str]]) -> Iterator
 
 @dataclass(frozen=True)
 class Section:
-    """A section of the configuration, to name its settings in sentences: `{DATA.units}` is `setting("data.units")`."""
+    """A section of the configuration, to name its settings in sentences: `{DATA.units}` is
+    `setting("data.units")`.
+    """
 
     name: str
 
@@ -61,11 +69,14 @@ class UserError(Exception):
 
 
 class Unfit(UserError):
-    """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it asks `eq` for."""
+    """Why an effect makes no sense for a model: what it asks for is not there. Raised by what it
+    asks `eq` for.
+    """
 
 
 class Stopped(KeyboardInterrupt):
-    """The user or the system ends what runs. `code` is the exit code, `result` the result so far, or None.
+    """The user or the system ends what runs. `code` is the exit code, `result` the result so far,
+    or None.
 
     `state` is that of the search loop at its end, or None.
     """
@@ -117,11 +128,15 @@ def check_choice(where: str, value: object, allowed: Iterable[object]) -> None:
     if value not in allowed:
         names = tuple(map(str, allowed))
         text = " ".join(str(value).split())
-        raise UserError(f"{setting(where)}={text} is not one of {', '.join(names)}{nearest(str(value), names)}")
+        raise UserError(
+            f"{setting(where)}={text} is not one of {', '.join(names)}{nearest(str(value), names)}"
+        )
 
 
 def check_distinct(where: str, values: Iterable[object]) -> None:
-    """Raise `UserError` for no values, or for one that is there twice; `where` is the setting's full key."""
+    """Raise `UserError` for no values, or for one that is there twice; `where` is the setting's
+    full key.
+    """
     values = list(values)
     if not values:
         raise UserError(f"{setting(where)} is empty; give at least one")
@@ -130,8 +145,17 @@ def check_distinct(where: str, values: Iterable[object]) -> None:
             raise UserError(f"{setting(where)} names {value} twice; name each once")
 
 
-def check_range(where: str, value: float | None, low: float = float("-inf"), high: float = float("inf")) -> None:
-    """Raise `UserError` unless low <= value <= high and it is finite, or None; `where` is the setting's full key."""
+def check_range(
+    where: str, value: float | None, low: float = float("-inf"), high: float = float("inf")
+) -> None:
+    """Raise `UserError` unless low <= value <= high and it is finite, or None; `where` is the
+    setting's full key.
+    """
     if value is not None and (not low <= value <= high or math.isinf(value)):
-        limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (high < float("inf"))
-        raise UserError(f"{setting(where)}={value} is out of range: it must be {' and '.join(limits) or 'finite'}")
+        limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (
+            high < float("inf")
+        )
+        raise UserError(
+            f"{setting(where)}={value} is out of range: it must be"
+            f" {' and '.join(limits) or 'finite'}"
+        )

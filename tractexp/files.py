@@ -1,6 +1,8 @@
-"""Paths of files, how others' files are read, and the only way in which the package writes: whole, or not at all.
+"""Paths of files, how others' files are read, and the only way in which the package writes: whole,
+or not at all.
 
-Nothing else in the package opens a file to write. What a job prints, which grows, has its own way in.
+Nothing else in the package opens a file to write. What a job prints, which grows, has its own way
+in.
 """
 
 import contextlib
@@ -24,15 +26,23 @@ from tractexp.errors import UserError
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".tractexp.part"  # ends the name of a file that is being written
-OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)  # that name: nobody else gives a file such a one
+# that name: nobody else gives a file such a one
+OWN = re.compile(r"\..*\.[a-z0-9_]{8}" + re.escape(PART), re.DOTALL)
 LARGEST = 2 << 30  # bytes of a file that is read at once: a record
 CONFIGURATION, RESULT = 4 << 20, 128 << 20  # bytes of what a run reads, and leaves
 MOST_NODES, DEEPEST = 100_000, 50  # values of a configuration, and how deep within one another
-ODD = {stat.S_IFIFO: "a named pipe", stat.S_IFSOCK: "a socket", stat.S_IFCHR: "a device", stat.S_IFBLK: "a device"}
+ODD = {
+    stat.S_IFIFO: "a named pipe",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
 
 
 def locate_file(path: str) -> Path:
-    """The path of a file that may be named as `pkg://package/file`; raises `UserError` for an unknown package."""
+    """The path of a file that may be named as `pkg://package/file`; raises `UserError` for an
+    unknown package.
+    """
     if not path.startswith(PACKAGE):
         return Path(path)
     package, _, name = path.removeprefix(PACKAGE).partition("/")
@@ -48,9 +58,11 @@ def read_packaged_text(name: str) -> str:
 
 
 def there(path: Path | str) -> bool:
-    """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for no name of a file.
+    """Whether there is an ordinary file; raises `UserError` for what only seems to be one, and for
+    no name of a file.
 
-    To open a named pipe waits for ever, a device may have no end, and a name that is no text can be stored nowhere.
+    To open a named pipe waits for ever, a device may have no end, and a name that is no text can be
+    stored nowhere.
     """
     name = str(path)
     if len(name.splitlines()) > 1:
@@ -65,29 +77,37 @@ def there(path: Path | str) -> bool:
             raise UserError(f"{name} is a link that leads nowhere; give the file itself") from None
         return False
     except (OSError, ValueError) as error:
-        raise UserError(f"{name:.200} cannot be read: {getattr(error, 'strerror', None) or error}") from error
+        raise UserError(
+            f"{name:.200} cannot be read: {getattr(error, 'strerror', None) or error}"
+        ) from error
     if kind in ODD:
-        raise UserError(f"{name} is {ODD[kind]}, no ordinary file; write what it holds to a file, and give that")
+        raise UserError(
+            f"{name} is {ODD[kind]}, no ordinary file; write what it holds to a file, and give that"
+        )
     return kind == stat.S_IFREG
 
 
 def check_there(path: Path) -> None:
     """Raise `UserError` where there is no ordinary file."""
     if not there(path):
-        raise UserError(f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file")
+        raise UserError(
+            f"{path} is a folder, not a file" if path.is_dir() else f"{path}: there is no such file"
+        )
 
 
 def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) -> bytes:
     """The content of an ordinary file, or its first bytes to a limit.
 
-    Raises `UserError` for what is none, has more bytes than `largest` or cannot be read, `FileNotFoundError` where it
-    is missing.
+    Raises `UserError` for what is none, has more bytes than `largest` or cannot be read,
+    `FileNotFoundError` where it is missing.
     """
     try:
         with open_ordinary_file(path) as file:
             size = os.fstat(file.fileno()).st_size
             if limit is None and size > largest:
-                size_and_most = f"{size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB"
+                size_and_most = (
+                    f"{size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB"
+                )
                 raise UserError(f"{path} has {size_and_most}: give a part")
             return file.read(-1 if limit is None else limit)
     except FileNotFoundError:
@@ -98,7 +118,9 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
 
 @contextlib.contextmanager
 def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
-    """An ordinary file, open to be read. Raises `UserError` for what only seems to be one, `OSError` as `open`."""
+    """An ordinary file, open to be read. Raises `UserError` for what only seems to be one,
+    `OSError` as `open`.
+    """
     there(path)
     with open(path, "rb", opener=_open_at_once) as file:
         kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
@@ -125,7 +147,9 @@ def read_json(path: Path | str, largest: int = RESULT) -> Any:
     try:
         text = read(path, largest=largest).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8") from error
+        raise UserError(
+            f"{path}: byte {error.start + 1} is not UTF-8 text; JSON is written in UTF-8"
+        ) from error
     return parse_json(text, path)
 
 
@@ -136,16 +160,19 @@ def parse_json(text: str, path: Path | str) -> Any:
     except json.JSONDecodeError as error:
         raise UserError(f"{path}: line {error.lineno}: not valid JSON ({error.msg})") from error
     except RecursionError as error:
-        raise UserError(f"{path}: its brackets lie deeper within one another than can be read") from error
+        raise UserError(
+            f"{path}: its brackets lie deeper within one another than can be read"
+        ) from error
     except ValueError as error:  # what Python's reader of whole numbers refuses
         raise UserError(f"{path}: a whole number in it has more digits than can be read") from error
 
 
 def read_yaml(path: Path | str) -> Any:
-    """What a configuration in YAML holds: plain data. Raises `UserError` for what is none, and as `read`.
+    """What a configuration in YAML holds: plain data. Raises `UserError` for what is none, and as
+    `read`.
 
-    An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory. What they come to
-    is counted before anything is made of it.
+    An alias repeats what it stands for, so that a few lines of aliases of aliases fill any memory.
+    What they come to is counted before anything is made of it.
     """
     import yaml
 
@@ -155,41 +182,56 @@ def read_yaml(path: Path | str) -> Any:
         return yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
     except yaml.MarkedYAMLError as error:
         line = f"line {error.problem_mark.line + 1}: " if error.problem_mark else ""
-        raise UserError(f"{path}: {line}not valid YAML ({error.problem or error.context})") from error
-    except (yaml.YAMLError, ValueError) as error:  # a sign that YAML has not, a date that the calendar has not
+        raise UserError(
+            f"{path}: {line}not valid YAML ({error.problem or error.context})"
+        ) from error
+    # a sign that YAML has not, a date that the calendar has not
+    except (yaml.YAMLError, ValueError) as error:
         raise UserError(f"{path}: not valid YAML ({str(error).splitlines()[0]:.200})") from error
 
 
 def _count_nodes(text: str, path: Path | str) -> None:
-    """Raise `UserError` where YAML holds more, or nests deeper, than any configuration, its aliases written out."""
+    """Raise `UserError` where YAML holds more, or nests deeper, than any configuration, its aliases
+    written out.
+    """
     import yaml
 
     sizes: dict[str, int] = {}
-    within: list[tuple[str | None, int]] = [(None, 0)]  # collections that are open: anchor, nodes so far
+    # collections that are open: anchor, nodes so far
+    within: list[tuple[str | None, int]] = [(None, 0)]
     for event in yaml.parse(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader)):
         if isinstance(event, yaml.CollectionStartEvent):
             within.append((event.anchor, 1))
         elif isinstance(event, yaml.NodeEvent | yaml.CollectionEndEvent):
             if isinstance(event, yaml.AliasEvent):
-                anchor, size = None, sizes.get(event.anchor, MOST_NODES + 1)  # one that is open: it holds itself
+                # one that is open: it holds itself
+                anchor, size = None, sizes.get(event.anchor, MOST_NODES + 1)
             else:
-                anchor, size = within.pop() if isinstance(event, yaml.CollectionEndEvent) else (event.anchor, 1)
+                anchor, size = (
+                    within.pop()
+                    if isinstance(event, yaml.CollectionEndEvent)
+                    else (event.anchor, 1)
+                )
             if anchor is not None:
                 sizes[anchor] = size
             within[-1] = within[-1][0], within[-1][1] + size
         if len(within) > DEEPEST or within[-1][1] > MOST_NODES:
             raise UserError(
-                f"{path} holds more than {MOST_NODES} values, aliases written out, or nests them more than {DEEPEST}"
+                f"{path} holds more than {MOST_NODES} values, aliases written out, or nests them"
+                f" more than {DEEPEST}"
                 " deep, which no configuration does"
             )
 
 
-def write(path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False) -> Path:
-    """Write a file in one move and return its path: a reader never sees half of it, a full disk leaves none.
+def write(
+    path: Path | str, content: str | bytes, *, lasting: bool = True, private: bool = False
+) -> Path:
+    """Write a file in one move and return its path: a reader never sees half of it, a full disk
+    leaves none.
 
-    What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache or a log need not
-    wait for that. What is `private` nobody else can read. Raises `UserError` where the folder or the file cannot be
-    written.
+    What is `lasting` has reached the disk when this returns, and outlives a loss of power; a cache
+    or a log need not wait for that. What is `private` nobody else can read. Raises `UserError`
+    where the folder or the file cannot be written.
     """
     path = Path(path)
     with _as_user_error(path), _make_part_file(path) as temporary:
@@ -213,7 +255,9 @@ def copy(source: Path | str, target: Path | str) -> Path:
 
 
 def move(source: Path | str, target: Path | str) -> Path:
-    """Give a file that is whole its place, in one move within a disk. Raises `UserError` where that is impossible."""
+    """Give a file that is whole its place, in one move within a disk. Raises `UserError` where that
+    is impossible.
+    """
     target = Path(target)
     with _as_user_error(target):
         os.replace(source, target)
@@ -222,7 +266,9 @@ def move(source: Path | str, target: Path | str) -> Path:
 
 
 class Transcript(io.TextIOBase):
-    """A program's output, into a file: where that cannot be written, as on a full disk, only the output is lost."""
+    """A program's output, into a file: where that cannot be written, as on a full disk, only the
+    output is lost.
+    """
 
     def __init__(self, path: Path):
         super().__init__()
@@ -267,7 +313,8 @@ def lock_file(path: Path, seconds: float) -> Iterator[None]:
 
 @contextlib.contextmanager
 def claim_file(path: Path, claimant: str) -> Iterator[None]:
-    """Hold the file `path`, which says by whom, and remove it at the end; a process that dies lets go of it.
+    """Hold the file `path`, which says by whom, and remove it at the end; a process that dies lets
+    go of it.
 
     Raises `UserError` where another process holds it. A file system without locks holds nothing.
     """
@@ -286,7 +333,9 @@ def claim_file(path: Path, claimant: str) -> Iterator[None]:
 
 
 def _take_lock(path: Path) -> IO[bytes]:
-    """The file of a lock, locked. What was removed between opening and locking it is none any more."""
+    """The file of a lock, locked. What was removed between opening and locking it is
+    none any more.
+    """
     while True:
         there(path)
         file = path.open("a+b")
@@ -294,10 +343,13 @@ def _take_lock(path: Path) -> IO[bytes]:
             if not _try_lock(file):
                 file.seek(0)
                 raise UserError(
-                    f"{path.parent} is in use by {file.read(200).decode(errors='replace') or 'another process'}: wait"
+                    f"{path.parent} is in use by"
+                    f" {file.read(200).decode(errors='replace') or 'another process'}: wait"
                     " until that has ended, or give another folder"
                 )
-            if os.name == "nt" or (path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))):
+            if os.name == "nt" or (
+                path.exists() and os.path.samestat(os.fstat(file.fileno()), os.stat(path))
+            ):
                 return file
         except BaseException:
             file.close()
@@ -306,7 +358,9 @@ def _take_lock(path: Path) -> IO[bytes]:
 
 
 def new_folder(path: Path) -> Path:
-    """A folder that was not there: of this name, or with a number behind it. Raises `UserError` where it cannot be."""
+    """A folder that was not there: of this name, or with a number behind it. Raises `UserError`
+    where it cannot be.
+    """
     with _as_user_error(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         for k in itertools.count(1):
@@ -331,23 +385,30 @@ def _try_lock(file: IO[bytes]) -> bool:
     except OSError as error:
         if error.errno in (errno.EACCES, errno.EAGAIN, errno.EDEADLK):
             return False
-        if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):  # a file system that knows no locks
+        # a file system that knows no locks
+        if error.errno not in (errno.ENOLCK, errno.ENOTSUP, errno.ENOSYS):
             raise
     return True
 
 
 def inside(path: Path, folder: Path) -> bool:
-    """Whether a file or folder, with everything below it, lies below `folder`, wherever links lead; no pipes."""
+    """Whether a file or folder, with everything below it, lies below `folder`, wherever links lead;
+    no pipes.
+    """
     whole = folder.resolve()
     try:
         every = [path, *path.rglob("*")] if path.is_dir() else [path]
-        return all(one.resolve().is_relative_to(whole) and (one.is_file() or one.is_dir()) for one in every)
+        return all(
+            one.resolve().is_relative_to(whole) and (one.is_file() or one.is_dir()) for one in every
+        )
     except (OSError, RuntimeError, ValueError):  # a link to itself; a name that is none
         return False
 
 
 def leftovers(folder: Path) -> list[Path]:
-    """Partial files of killed processes of ours in `folder` and below, those of the last hour apart."""
+    """Partial files of killed processes of ours in `folder` and below, those of the last hour
+    apart.
+    """
     now = time.time()
     halves = []
     for path in folder.rglob(f"*{PART}"):
@@ -368,7 +429,9 @@ def _as_user_error(path: Path) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _make_part_file(path: Path) -> Iterator[Path]:
-    """A new file in the folder of `path`, which is created if need be; the file is removed at the end."""
+    """A new file in the folder of `path`, which is created if need be; the file is removed at the
+    end.
+    """
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name[:100]}.", suffix=PART)
     os.close(handle)
@@ -397,7 +460,8 @@ def _settle(folder: Path) -> None:
     try:
         os.fsync(handle)
     except OSError as error:
-        if error.errno not in (errno.EINVAL, errno.ENOTSUP):  # a file system that knows no such thing
+        # a file system that knows no such thing
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP):
             raise
     finally:
         os.close(handle)
@@ -410,7 +474,9 @@ def write_json(path: Path | str, content: Any, *, private: bool = False) -> Path
 
 
 def plain(content: Any) -> Any:
-    """Content as JSON knows it: dataclasses, NumPy's arrays, tuples and paths turned into plain ones, nan into None."""
+    """Content as JSON knows it: dataclasses, NumPy's arrays, tuples and paths turned into plain
+    ones, nan into None.
+    """
     if isinstance(content, dict):
         return {str(key): plain(value) for key, value in content.items()}
     if isinstance(content, list | tuple):

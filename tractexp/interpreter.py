@@ -1,4 +1,6 @@
-"""How another Python is started: never with the folder of the records among those that modules are looked for in."""
+"""How another Python is started: never with the folder of the records among those that modules are
+looked for in.
+"""
 
 import contextlib
 import os
@@ -9,13 +11,17 @@ SAFE_PATH = "PYTHONSAFEPATH"  # what -P says, for a Python that another package 
 
 
 def command(*arguments: str) -> list[str]:
-    """The command that runs Python with these arguments; `-c` and `-m` would put the current folder first."""
+    """The command that runs Python with these arguments; `-c` and `-m` would put the current folder
+    first.
+    """
     return [sys.executable, "-P", *arguments]
 
 
 @contextlib.contextmanager
 def safe_path() -> Iterator[None]:
-    """Within, every Python that this process starts, by whatever package, leaves the current folder out."""
+    """Within, every Python that this process starts, by whatever package, leaves the current folder
+    out.
+    """
     before = os.environ.get(SAFE_PATH)
     os.environ[SAFE_PATH] = "1"
     try:

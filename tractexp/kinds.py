@@ -1,4 +1,6 @@
-"""Values checked against annotations: what a person or a file gave, and what it must be, in words."""
+"""Values checked against annotations: what a person or a file gave, and what it must
+be, in words.
+"""
 
 import types
 from collections.abc import Mapping, Sequence
@@ -9,19 +11,34 @@ from typing import Any, Union, get_args, get_origin
 from tractexp.errors import UserError, setting
 
 WORDS: Mapping[Any, str] = {
-    int: "a whole number", float: "a number", bool: "True or False", str: "a text", type(None): "None", Any: "anything",
-}  # fmt: skip
+    int: "a whole number",
+    float: "a number",
+    bool: "True or False",
+    str: "a text",
+    type(None): "None",
+    Any: "anything",
+}
 GIVEN: Mapping[Any, str] = {
-    bool: "a truth value", type(None): "nothing", dict: "a mapping", list: "a list", tuple: "a list",
-}  # fmt: skip
+    bool: "a truth value",
+    type(None): "nothing",
+    dict: "a mapping",
+    list: "a list",
+    tuple: "a list",
+}
 
 
 def check_kind(name: str, value: Any, annotation: Any) -> None:
     """Raise `UserError` where a value is not of the kind an annotation says."""
     if not _is(value, annotation):
-        kinds = get_args(annotation) if get_origin(annotation) in (Union, types.UnionType) else (annotation,)
+        kinds = (
+            get_args(annotation)
+            if get_origin(annotation) in (Union, types.UnionType)
+            else (annotation,)
+        )
         allowed = " or ".join(dict.fromkeys(_word(kind) for kind in kinds))
-        raise UserError(f"{setting(name)}={value!r:.60} is {_kind(value)}, but it must be {allowed}")
+        raise UserError(
+            f"{setting(name)}={value!r:.60} is {_kind(value)}, but it must be {allowed}"
+        )
 
 
 def _is(value: Any, kind: Any) -> bool:

@@ -1,8 +1,9 @@
 """A file of a load model, whoever wrote it: its values are read, and nothing in it is obeyed.
 
-Hydra does as the files that it composes say: `@package` in a first line, `defaults` that reach any group, references
-that a resolver fills in. A model's file may come from a stranger. So it is read here for both the command line
-(`tractexp.config`) and Python (`tractexp.composition`): keys of a model, names of its parts, and values.
+Hydra does as the files that it composes say: `@package` in a first line, `defaults` that reach any
+group, references that a resolver fills in. A model's file may come from a stranger. So it is read
+here for both the command line (`tractexp.config`) and Python (`tractexp.composition`): keys of a
+model, names of its parts, and values.
 """
 
 import functools
@@ -20,7 +21,8 @@ from tractexp.schema import ModelConfig
 ENDINGS = (".yaml", ".yml")
 LARGEST = 1 << 20  # bytes
 DEEPEST_VALUES = 20  # levels of values within one another
-LONGEST_CHOICE_NAME = 100  # characters of the name of a choice: a system takes no file's name of more than some 250
+# characters of the name of a choice: a system takes no file's name of more than some 250
+LONGEST_CHOICE_NAME = 100
 DEFAULTS, SELF = "defaults", "_self_"
 PARTS = ("motor", "static")
 NAME = re.compile(r"[^\W_]\w*(-\w+)*")  # of a choice: no path, no package, no other group
@@ -33,9 +35,11 @@ def is_model_path(name: str) -> bool:
 
 
 def read_model_file(path: Path | str) -> dict[str, Any]:
-    """The content of a model's file: keys of a model, and `defaults` that name its parts or a choice it begins with.
+    """The content of a model's file: keys of a model, and `defaults` that name its parts or a
+    choice it begins with.
 
-    Raises `UserError` where the file is missing, too large, not YAML, or holds anything else than values of a model.
+    Raises `UserError` where the file is missing, too large, not YAML, or holds anything else than
+    values of a model.
     """
     content = _parse(path, _read_text(path))
     keys = [DEFAULTS, *(field.name for field in fields(ModelConfig))]
@@ -56,7 +60,9 @@ def _read_text(path: Path | str) -> str:
     except FileNotFoundError:
         raise UserError(f"model={path}: there is no such file") from None
     except UnicodeDecodeError as error:
-        raise UserError(f"{path}: byte {error.start + 1} is not UTF-8 text; a model's file is YAML in UTF-8") from error
+        raise UserError(
+            f"{path}: byte {error.start + 1} is not UTF-8 text; a model's file is YAML in UTF-8"
+        ) from error
 
 
 def _parse(path: Path | str, text: str) -> dict[str, Any]:
@@ -65,7 +71,9 @@ def _parse(path: Path | str, text: str) -> dict[str, Any]:
     try:
         content = yaml.load(text, Loader=_loader()) or {}
     except yaml.YAMLError as error:
-        raise UserError(f"{path} is not the YAML of a model: {' '.join(str(error).split()):.200}") from error
+        raise UserError(
+            f"{path} is not the YAML of a model: {' '.join(str(error).split()):.200}"
+        ) from error
     except ValueError as error:  # what Python's reader of numbers and dates refuses
         raise UserError(f"{path}: it holds a value that cannot be read ({error})") from error
     if not isinstance(content, dict):
@@ -75,7 +83,9 @@ def _parse(path: Path | str, text: str) -> dict[str, Any]:
 
 @functools.cache
 def _loader() -> Any:
-    """YAML's safe loader, for values that stand where they are written, few levels deep; 1e-3 is a number."""
+    """YAML's safe loader, for values that stand where they are written, few levels deep; 1e-3 is a
+    number.
+    """
     import yaml
 
     class Loader(yaml.SafeLoader):
@@ -85,7 +95,9 @@ def _loader() -> Any:
             if self.check_event(yaml.AliasEvent):
                 raise yaml.YAMLError("it has an alias (*name); write the value itself")
             if self.level > DEEPEST_VALUES:
-                raise yaml.YAMLError(f"its values lie more than {DEEPEST_VALUES} levels within one another")
+                raise yaml.YAMLError(
+                    f"its values lie more than {DEEPEST_VALUES} levels within one another"
+                )
             self.level += 1
             node = super().compose_node(parent, index)
             self.level -= 1
@@ -97,13 +109,22 @@ def _loader() -> Any:
 
 
 def _check_defaults(path: Path | str, defaults: Any) -> list[Any]:
-    """The list as it stands: a choice to begin with, the names of a motor and of a static load, and `_self_`."""
+    """The list as it stands: a choice to begin with, the names of a motor and of a static load, and
+    `_self_`.
+    """
     for item in defaults if isinstance(defaults, list) else [defaults]:
-        (group, name) = next(iter(item.items())) if isinstance(item, Mapping) and len(item) == 1 else ("", item)
-        named = isinstance(name, str) and len(name) <= LONGEST_CHOICE_NAME and (name == SELF or NAME.fullmatch(name))
+        (group, name) = (
+            next(iter(item.items())) if isinstance(item, Mapping) and len(item) == 1 else ("", item)
+        )
+        named = (
+            isinstance(name, str)
+            and len(name) <= LONGEST_CHOICE_NAME
+            and (name == SELF or NAME.fullmatch(name))
+        )
         if not named or (isinstance(item, Mapping) and group not in PARTS):
             raise UserError(
-                f"{path}: its defaults have {item!s:.80}; they may name a choice of a model, {SELF},"
+                f"{path}: its defaults have {item!s:.80}; they may name a choice of a model,"
+                f" {SELF},"
                 " or a part: motor: NAME, static: NAME"
             )
     return list(defaults) if isinstance(defaults, list) else [defaults]
@@ -120,4 +141,7 @@ def _check_values(path: Path | str, key: str, value: Any) -> None:
         for inner in value:
             _check_values(path, key, inner)
     elif isinstance(value, str) and any(mark in value for mark in REFERENCES):
-        raise UserError(f"{path}: {key} is {value:.60}; a model's file holds values, and no references to others")
+        raise UserError(
+            f"{path}: {key} is {value:.60}; a model's file holds values, and no references to"
+            " others"
+        )

@@ -1,8 +1,10 @@
-"""What every public call returns: a result that prints, tabulates, saves and loads, and is written into a folder.
+"""What every public call returns: a result that prints, tabulates, saves and loads, and is written
+into a folder.
 
-A result is the call that made it (records and settings) and what that call found, both as plain data. What is heavy,
-such as the figures of a page, is computed again from the call where it is asked of a result that was loaded: a call
-with the same records, settings and seed gives the same bits.
+A result is the call that made it (records and settings) and what that call found, both as plain
+data. What is heavy, such as the figures of a page, is computed again from the call where it is
+asked of a result that was loaded: a call with the same records, settings and seed gives the same
+bits.
 """
 
 import tempfile
@@ -17,7 +19,8 @@ from tractexp.errors import UserError
 from tractexp.progress import say
 
 MARK = "tractexp"  # the key by which a saved result is known
-FORMS: dict[Any, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {}  # of types of fields: to plain data, and back
+# of types of fields: to plain data, and back
+FORMS: dict[Any, tuple[Callable[[Any], Any], Callable[[Any], Any]]] = {}
 Drawing = Callable[[Path], Path]  # makes the file of this path
 
 
@@ -44,7 +47,8 @@ class Tabulated:
 
 
 class Plain:
-    """Base of dataclasses that are saved: plain data by their fields, and made again by the types of these.
+    """Base of dataclasses that are saved: plain data by their fields, and made again by the types
+    of these.
 
     A field whose type stands in quotes holds what is behind the others, and is computed again.
     """
@@ -56,7 +60,11 @@ class Plain:
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         """What `to_dict` gave."""
-        required = [f for f in _list_saved_fields(cls) if f.name in content or (f.default is f.default_factory is MISSING)]
+        required = [
+            f
+            for f in _list_saved_fields(cls)
+            if f.name in content or (f.default is f.default_factory is MISSING)
+        ]
         return cls(**{f.name: _form(f)[1](content[f.name]) for f in required})
 
 
@@ -96,7 +104,9 @@ class Outcome(Plain, Tabulated):
             return cls.from_dict(content)
         except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
             reason = f"it lacks {error}" if isinstance(error, KeyError) else str(error)
-            raise UserError(f"this is not a whole saved {cls.kind}: {reason}; save it again") from error
+            raise UserError(
+                f"this is not a whole saved {cls.kind}: {reason}; save it again"
+            ) from error
 
     def save(self, path: Path | str) -> Path:
         """Write the result as one JSON file, whole or not at all; `tractexp.load` reads it back."""
@@ -106,15 +116,22 @@ class Outcome(Plain, Tabulated):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """The saved result. Raises `UserError` where the file is missing, damaged or of another kind."""
+        """The saved result. Raises `UserError` where the file is missing, damaged or of another
+        kind.
+        """
         content = read_saved_result(path)
         if content["kind"] != cls.kind:
-            raise UserError(f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by load()")
+            raise UserError(
+                f"{path} holds a result of kind '{content['kind']}', not '{cls.kind}'; read it by"
+                " load()"
+            )
         return cls.revived(content)
 
 
 class Written(Outcome):
-    """Base of the results that are written into a folder: files for machines first, then pages and figures."""
+    """Base of the results that are written into a folder: files for machines first, then pages and
+    figures.
+    """
 
     page: ClassVar[str] = ""  # file of the page; "" for none
     content: Mapping[str, Any]  # for machines
@@ -134,7 +151,8 @@ class Written(Outcome):
         return report
 
     def write_results(self, folder: Path) -> list[Path]:
-        """Write what cannot be had again without the computation; the paths. Raises `UserError` where it cannot.
+        """Write what cannot be had again without the computation; the paths. Raises `UserError`
+        where it cannot.
 
         By default the result's `content`, beside its page.
         """
@@ -145,15 +163,18 @@ class Written(Outcome):
         return {self.page: lambda path: self.report().save(path)} if self.page else {}
 
     def write(self, folder: Path | str) -> list[Path]:
-        """Write everything into a folder, and return the paths: files for machines first, then pages and figures.
+        """Write everything into a folder, and return the paths: files for machines first, then
+        pages and figures.
 
-        Raises `UserError` where the results cannot be written. A page or a figure that fails is a sentence on the
-        terminal, for the results are on the disk by then.
+        Raises `UserError` where the results cannot be written. A page or a figure that fails is a
+        sentence on the terminal, for the results are on the disk by then.
         """
         return [*self.write_results(Path(folder)), *self.write_drawings(folder)]
 
     def write_drawings(self, folder: Path | str) -> list[Path]:
-        """Write pages and figures; the paths of those that could be made. A sentence says why another could not."""
+        """Write pages and figures; the paths of those that could be made. A sentence says why
+        another could not.
+        """
         paths = []
         for name, draw in self.drawings().items():
             try:
@@ -165,18 +186,30 @@ class Written(Outcome):
 
 def not_drawn(path: Path, error: Exception) -> str:
     """Why a page or a figure is missing, as a sentence."""
-    reason = str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".strip()
-    return f"{path.name} could not be made, while the results are whole ({reason.partition(chr(10))[0]})"
+    reason = (
+        str(error) if isinstance(error, UserError) else f"{type(error).__name__}: {error}".strip()
+    )
+    return (
+        f"{path.name} could not be made, while the results are whole"
+        f" ({reason.partition(chr(10))[0]})"
+    )
 
 
 def read_saved_result(path: Path | str) -> dict[str, Any]:
-    """The content of a saved result, its kind checked to be there. Raises `UserError` where it is none."""
+    """The content of a saved result, its kind checked to be there. Raises `UserError` where it is
+    none.
+    """
     try:
         content = files.read_json(path)
     except FileNotFoundError as error:
-        raise UserError(f"{path} cannot be read: {error.strerror}; give a file written by save()") from error
+        raise UserError(
+            f"{path} cannot be read: {error.strerror}; give a file written by save()"
+        ) from error
     except UserError as error:
         raise UserError(f"{error}: this is not a saved result") from error
     if not (isinstance(content, dict) and MARK in content and isinstance(content.get("kind"), str)):
-        raise UserError(f"{path} is not a saved result: it lacks the keys '{MARK}' and 'kind', which save() writes")
+        raise UserError(
+            f"{path} is not a saved result: it lacks the keys '{MARK}' and 'kind', which save()"
+            " writes"
+        )
     return content

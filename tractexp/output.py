@@ -1,4 +1,6 @@
-"""What a command prints: where it cannot be written, as into a pipe that nobody reads any more, the work goes on."""
+"""What a command prints: where it cannot be written, as into a pipe that nobody reads any more, the
+work goes on.
+"""
 
 import io
 import os
@@ -9,7 +11,9 @@ from typing import Any
 
 
 class Outlet(io.FileIO):
-    """A stream of bytes that ends nobody: after its first fault, which it keeps, it drops what is written."""
+    """A stream of bytes that ends nobody: after its first fault, which it keeps, it drops what is
+    written.
+    """
 
     fault: OSError | None = None
 
@@ -24,12 +28,17 @@ class Outlet(io.FileIO):
     @property
     def lost(self) -> str:
         """Why something could not be printed; "" where all was, or its reader did not want more."""
-        return "" if self.fault is None or isinstance(self.fault, BrokenPipeError) else str(self.fault.strerror)
+        return (
+            ""
+            if self.fault is None or isinstance(self.fault, BrokenPipeError)
+            else str(self.fault.strerror)
+        )
 
 
 @contextmanager
 def outlet() -> Iterator[Outlet | None]:
-    """Print by an `Outlet` within; None where the process's own output is redirected, closed, or Windows'.
+    """Print by an `Outlet` within; None where the process's own output is redirected, closed, or
+    Windows'.
 
     Characters that the encoding of the output lacks are written as escapes.
     """
@@ -41,7 +50,11 @@ def outlet() -> Iterator[Outlet | None]:
     raw = Outlet(usual.fileno(), "w", closefd=False)
     lines, through = usual.line_buffering, usual.write_through
     stream = io.TextIOWrapper(
-        io.BufferedWriter(raw), usual.encoding, "backslashreplace", line_buffering=lines, write_through=through
+        io.BufferedWriter(raw),
+        usual.encoding,
+        "backslashreplace",
+        line_buffering=lines,
+        write_through=through,
     )
     with redirect_stdout(stream):
         try:

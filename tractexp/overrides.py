@@ -12,17 +12,36 @@ from tractexp.model_file import is_model_path
 
 # settings that take names of their own
 OPEN = (
-    "model.bounds.", "model.fixed.", "task.values", "task.criteria.", "hydra.sweeper.comparison.", "data.columns",
+    "model.bounds.",
+    "model.fixed.",
+    "task.values",
+    "task.criteria.",
+    "hydra.sweeper.comparison.",
+    "data.columns",
     "data.units",
-)  # fmt: skip
-NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")  # settings that name files and channels
+)
+# settings that name files and channels
+NAMING = ("data.", "task.", "tracking.", "hydra.run.dir", "hydra.sweep.dir")
 MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
 MODEL = "model"  # the group
 OPTIONS = ("-", "~", "+", "")  # what begins an argument that needs no value
 CONFIG_FOLDER = ("--config-dir", "-cd")
 DEEPEST_BRACKETS = 20  # brackets within one another
-NEEDED = ("seed", "budget", "time_limit", "target", "task", "model", "optimizer", "data", "objective", "tracking")
-NO_NAME = re.compile(r"(?!\[.*\],\[)\[.*\]|[-+.]?[\d_]+[\d_.e+-]*|[-+]?(nan|inf)|null|true|false", re.IGNORECASE)
+NEEDED = (
+    "seed",
+    "budget",
+    "time_limit",
+    "target",
+    "task",
+    "model",
+    "optimizer",
+    "data",
+    "objective",
+    "tracking",
+)
+NO_NAME = re.compile(
+    r"(?!\[.*\],\[)\[.*\]|[-+.]?[\d_]+[\d_.e+-]*|[-+]?(nan|inf)|null|true|false", re.IGNORECASE
+)
 MARKS = set(",'\"[](){}\\")  # which a name within a list cannot have as it stands
 WORD = re.compile(r"[^\W\d_].*[^\W\d_]|[^\w.+\-]")  # in what is no number
 PLAIN = re.compile(r"[A-Za-z0-9_./:\-]*", re.ASCII)  # what Hydra's grammar takes as it stands
@@ -49,39 +68,61 @@ def overrides(arguments: Iterable[str]) -> list[str]:
 
 
 def _refuse_word(word: str) -> None:
-    """Raise `UserError` for an argument that is neither KEY=VALUE nor anything else that could be meant."""
+    """Raise `UserError` for an argument that is neither KEY=VALUE nor anything else that could be
+    meant.
+    """
     from tractexp.choices import elsewhere
 
     raise UserError(
-        f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or folder that is"
+        f"{' '.join(word.split()):.200} is no setting (KEY=VALUE), no command, and no file or"
+        " folder that is"
         f" there{elsewhere('', word)}; tractexp --help shows what there is"
     )
 
 
 def _without_plus(argument: str) -> str:
-    """`+experiment=x` as `experiment=x`: the group is there already, and Hydra would refuse to add it twice."""
+    """`+experiment=x` as `experiment=x`: the group is there already, and Hydra would refuse to add
+    it twice.
+    """
     key = argument.partition("=")[0]
     return argument[1:] if key[:1] == "+" and key[1:] in groups() else argument
 
 
 def _check(argument: str, key: str, value: str) -> None:
-    """Raise `UserError` for what Hydra takes without a word, or refuses in words of its own code."""
+    """Raise `UserError` for what Hydra takes without a word, or refuses in words of
+    its own code.
+    """
     depth = max(itertools.accumulate((c in "[({") - (c in "])}") for c in value), default=0)
     if depth > DEEPEST_BRACKETS:
-        raise UserError(f"{key:.80} has brackets {depth} deep within one another; no setting needs more than {DEEPEST_BRACKETS}")
+        raise UserError(
+            f"{key:.80} has brackets {depth} deep within one another; no setting needs more than"
+            f" {DEEPEST_BRACKETS}"
+        )
     if not argument.isprintable():
-        raise UserError(f"{' '.join(argument.split()):.80} has a line break or another sign that cannot be printed")
+        raise UserError(
+            f"{' '.join(argument.split()):.80} has a line break or another sign that cannot be"
+            " printed"
+        )
     if MISSING.search(value):
-        raise UserError(f"{argument:.200}: ??? stands for a value that is missing; give one, or leave the setting out")
+        raise UserError(
+            f"{argument:.200}: ??? stands for a value that is missing; give one, or leave the"
+            " setting out"
+        )
     if key[:1] == "~" and key[1:] in NEEDED:
-        raise UserError(f"{argument:.200} takes out what every run needs; give {key[1:]} a value, or leave it as it is")
+        raise UserError(
+            f"{argument:.200} takes out what every run needs; give {key[1:]} a value, or leave it"
+            " as it is"
+        )
     group = key.lstrip("+").partition("@")[0].replace("model.", "model/")
     if NO_NAME.fullmatch(value) and group in groups():
-        raise UserError(f"{group}={value:.80}: what is chosen there has a name; tractexp --help shows the names")
+        raise UserError(
+            f"{group}={value:.80}: what is chosen there has a name; tractexp --help shows the names"
+        )
 
 
 def _name_model_file(arguments: list[str]) -> list[str]:
-    """The arguments with a model of a folder, `--config-dir CONF model=NAME`, as the path of its file.
+    """The arguments with a model of a folder, `--config-dir CONF model=NAME`, as the path of its
+    file.
 
     A folder that holds models only is then left out: nothing else in it is looked at.
     """
@@ -98,14 +139,20 @@ def _name_model_file(arguments: list[str]) -> list[str]:
 
 
 def _take_config_folder(arguments: list[str]) -> tuple[list[str], Path | None, list[str]]:
-    """Hydra's option for a further folder of configurations as it was given, that folder, and the other arguments."""
+    """Hydra's option for a further folder of configurations as it was given, that folder, and the
+    other arguments.
+    """
     for k, argument in enumerate(arguments):
         option, equals, value = argument.partition("=")
         if option not in CONFIG_FOLDER:
             continue
         end = k + 1 if equals else k + 2
         folder = value if equals else "".join(arguments[k + 1 : end])
-        return arguments[k:end], Path(folder) if folder else None, [*arguments[:k], *arguments[end:]]
+        return (
+            arguments[k:end],
+            Path(folder) if folder else None,
+            [*arguments[:k], *arguments[end:]],
+        )
     return [], None, arguments
 
 
@@ -126,9 +173,12 @@ def _several(group: str, value: str) -> list[str]:
     node = of_several(group, [part.strip() for part in listed])
     name, ((setting, names),) = node.pop("name"), node.items()
     key = f"{group.replace('/', '.')}.{setting}"
-    if not (value.strip().startswith("[") and value.strip().endswith("]")) or any("[" in part for part in listed):
+    if not (value.strip().startswith("[") and value.strip().endswith("]")) or any(
+        "[" in part for part in listed
+    ):
         raise UserError(
-            f"{group}={value} is not one list of names; a sweep over lists is written {group}={name} {key}=[a,b],[c,d]"
+            f"{group}={value} is not one list of names; a sweep over lists is written"
+            f" {group}={name} {key}=[a,b],[c,d]"
         )
     return [f"{group}={name}", f"{key}=[{','.join(names)}]"]
 
@@ -136,8 +186,9 @@ def _several(group: str, value: str) -> list[str]:
 def override(argument: str) -> str:
     """An argument as Hydra reads it.
 
-    `model.bounds.C=[0.5,0.9]` adds the entry it names, for which Hydra would ask a plus sign. Names of files and
-    channels with spaces, brackets or letters of any script are quoted, for which Hydra would ask inner quotes.
+    `model.bounds.C=[0.5,0.9]` adds the entry it names, for which Hydra would ask a plus sign. Names
+    of files and channels with spaces, brackets or letters of any script are quoted, for which Hydra
+    would ask inner quotes.
     """
     key, equals, value = argument.partition("=")
     if equals and key == MODEL:
@@ -149,7 +200,9 @@ def override(argument: str) -> str:
 
 
 def _model_choice(name: str) -> str:
-    """A choice of a model as Hydra reads it: the path of a file whole and in quotes, another name as it stands."""
+    """A choice of a model as Hydra reads it: the path of a file whole and in quotes, another name
+    as it stands.
+    """
     if not is_model_path(name):
         return name
     file = Path(name).absolute()
@@ -158,9 +211,14 @@ def _model_choice(name: str) -> str:
 
 
 def build_typed_command(data: Mapping[str, object], *more: str) -> str:
-    """The command, as a shell takes it, that reads records by these settings (`name` and the reader's own)."""
+    """The command, as a shell takes it, that reads records by these settings (`name` and the
+    reader's own).
+    """
     settings = dict(data)
-    words = [f"data={settings.pop('name')}", *(format_assignment(f"data.{key}", value) for key, value in settings.items())]
+    words = [
+        f"data={settings.pop('name')}",
+        *(format_assignment(f"data.{key}", value) for key, value in settings.items()),
+    ]
     return quoting.shell("tractexp", *more, *words)
 
 
@@ -170,7 +228,9 @@ def survey_of(folder: str) -> str:
 
 
 def format_assignment(key: str, value: object) -> str:
-    """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of them."""
+    """KEY=VALUE as `override` and Hydra read it back: numbers, texts, true and false, and lists of
+    them.
+    """
     if isinstance(value, list | tuple):
         return f"{key}=[{','.join(map(_plain, value))}]"
     return f"{key}={value if isinstance(value, str) and _bare(value) else _plain(value)}"
@@ -187,7 +247,9 @@ def _plain(value: object) -> str:
     if isinstance(value, str):
         plain = WORD.search(value) and value == value.strip() and not NO_NAME.fullmatch(value)
         return value if plain and not set(value) & MARKS else quoting.hydra(value)
-    return "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+    return (
+        "null" if value is None else str(value).lower() if isinstance(value, bool) else str(value)
+    )
 
 
 def _read_by_hydra(argument: str, value: str) -> bool:

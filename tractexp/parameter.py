@@ -1,4 +1,6 @@
-"""A model parameter, declared once beside the equation that uses it, and the box a search works in."""
+"""A model parameter, declared once beside the equation that uses it, and the box a
+search works in.
+"""
 
 from dataclasses import dataclass, field
 
@@ -12,9 +14,10 @@ class Parameter:
     """One number to identify: its default, bounds, unit, meaning and source.
 
     The attribute a plugin assigns it to is its name. `null`, if any, is the value at which the
-    equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value goes with
-    the base of power, whatever its unit: on a base of a k-th of the MVA the same load has k^power_exponent times the
-    value. A power, a torque, an inertia or an admittance has 1, an impedance -1; shares, times and voltages have 0.
+    equations are as if the term were absent. `symbol` is LaTeX. `power_exponent` says how the value
+    goes with the base of power, whatever its unit: on a base of a k-th of the MVA the same load has
+    k^power_exponent times the value. A power, a torque, an inertia or an admittance has 1, an
+    impedance -1; shares, times and voltages have 0.
     """
 
     default: float
@@ -39,20 +42,32 @@ class Parameter:
             object.__setattr__(self, "symbol", self.symbol or name)
 
     def check(self, where: str) -> None:
-        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and no text is empty."""
+        """Raise `UserError` unless low <= default, null <= high, low < high, all finite, and no
+        text is empty.
+        """
         for what in ("unit", "about", "source"):
             if not getattr(self, what).strip():
-                raise UserError(f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)")
+                raise UserError(
+                    f"{where}: the parameter has no {what}; say it ('1' where a number has no unit)"
+                )
         low, high = self.bounds
         if not (np.isfinite([low, high]).all() and low < high):
-            raise UserError(f"{where}: bounds [{low:g}, {high:g}] must be two finite numbers, the lower one first")
+            raise UserError(
+                f"{where}: bounds [{low:g}, {high:g}] must be two finite numbers, the lower one"
+                " first"
+            )
         if not low <= self.default <= high:
-            raise UserError(f"{where}: the default {self.default:g} is outside the bounds [{low:g}, {high:g}]")
+            raise UserError(
+                f"{where}: the default {self.default:g} is outside the bounds [{low:g}, {high:g}]"
+            )
         if self.null is not None and not low <= self.null <= high:
-            raise UserError(f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]")
+            raise UserError(
+                f"{where}: the null {self.null:g} is outside the bounds [{low:g}, {high:g}]"
+            )
         if not isinstance(self.power_exponent, int):
             raise UserError(
-                f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a power or an"
+                f"{where}: power_exponent={self.power_exponent!r} must be a whole number: 1 of a"
+                " power or an"
                 " admittance, -1 of an impedance, 0 of what no base of power changes"
             )
 
@@ -61,8 +76,8 @@ class Parameter:
 class Box:
     """What a search may try: bounds (d,), and the way to the unit cube and back.
 
-    A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or the problem's
-    bounds where the optimizer asks for `space="raw"`.
+    A problem's box has the names of its columns. An optimizer's has none: it is the unit cube, or
+    the problem's bounds where the optimizer asks for `space="raw"`.
     """
 
     lower: np.ndarray  # (d,)
@@ -96,7 +111,9 @@ class Box:
         return self.from_unit(rng.random((n, self.dimension)))
 
     def from_unit(self, unit: np.ndarray) -> np.ndarray:
-        """Points (..., d) of the unit cube in this box's coordinates, never outside the bounds by rounding."""
+        """Points (..., d) of the unit cube in this box's coordinates, never outside the bounds by
+        rounding.
+        """
         return self.clip(self.lower + self.width * unit)
 
     def to_unit(self, x: np.ndarray) -> np.ndarray:
@@ -106,26 +123,35 @@ class Box:
     def index(self, name: str) -> int:
         """The column of a name. Raises `UserError` for one there is not."""
         if name not in self.names:
-            raise UserError(f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}")
+            raise UserError(
+                f"this model has no parameter '{name}'{among(name, self.names, 'Parameters')}"
+            )
         return self.names.index(name)
 
 
 def even(n: int, d: int) -> np.ndarray:
-    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence R_d."""
+    """(n, d) points that fill the unit cube evenly. Source: Roberts 2018, the additive sequence
+    R_d.
+    """
     ratio = 2.0
     for _ in range(60):  # the root above 1 of x^(d + 1) = x + 1
         ratio = (1 + ratio) ** (1 / (d + 1))
     return (0.5 + np.outer(np.arange(1, n + 1), ratio ** -np.arange(1.0, d + 1))) % 1
 
 
-def best_distinct(unit: np.ndarray, f: np.ndarray, distance: float, count: int, norm: float = np.inf) -> np.ndarray:
-    """Indices of at most `count` points, best first, each further than `distance` from every better one chosen.
+def best_distinct(
+    unit: np.ndarray, f: np.ndarray, distance: float, count: int, norm: float = np.inf
+) -> np.ndarray:
+    """Indices of at most `count` points, best first, each further than `distance` from every better
+    one chosen.
 
-    `unit` (n, d) in the unit cube, `f` (n,) objectives, lower is better. `norm` is the order of the distance's norm:
-    `np.inf` takes the coordinate that differs most, 2 is Euclid's.
+    `unit` (n, d) in the unit cube, `f` (n,) objectives, lower is better. `norm` is the order of the
+    distance's norm: `np.inf` takes the coordinate that differs most, 2 is Euclid's.
     """
     remaining, chosen = np.argsort(f, kind="stable"), []
     while len(remaining) and len(chosen) < count:
         chosen.append(remaining[0])
-        remaining = remaining[np.linalg.norm(unit[remaining] - unit[remaining[0]], norm, axis=1) > distance]
+        remaining = remaining[
+            np.linalg.norm(unit[remaining] - unit[remaining[0]], norm, axis=1) > distance
+        ]
     return np.array(chosen, dtype=int)

@@ -1,13 +1,14 @@
 """Plugins: one file, one class, one registered name.
 
-A plugin subclasses one of the framework's bases (`Motor`, `Static`, `Optimizer`, `Reader`, ...), is decorated
-with `@plugin`, and is chosen in YAML or on the command line by its file's name. Its annotated fields are its
-settings: from them the Hydra schema is derived, so unknown keys and wrong types are refused when the
-configuration is composed. Its `Parameter` attributes are what an identification may estimate.
+A plugin subclasses one of the framework's bases (`Motor`, `Static`, `Optimizer`, `Reader`, ...), is
+decorated with `@plugin`, and is chosen in YAML or on the command line by its file's name. Its
+annotated fields are its settings: from them the Hydra schema is derived, so unknown keys and wrong
+types are refused when the configuration is composed. Its `Parameter` attributes are what an
+identification may estimate.
 
-Packages are found through the entry point group `tractexp.plugins`; every module of such a package that does
-not start with an underscore is imported, and its `conf/` folder, if any, joins Hydra's search path. The
-built-in plugins come in by that same door.
+Packages are found through the entry point group `tractexp.plugins`; every module of such a package
+that does not start with an underscore is imported, and its `conf/` folder, if any, joins Hydra's
+search path. The built-in plugins come in by that same door.
 """
 
 import dataclasses
@@ -41,7 +42,8 @@ class Plugin:
     chosen: ClassVar[bool] = True  # by a Hydra group; False: by names within a setting
     sourced: ClassVar[bool] = True  # the docstring must say where the equations come from
     members: "tuple[Plugin, ...]" = ()  # plugins that it is made of
-    listed: ClassVar[str] = ""  # its setting that takes the names, where a list is chosen in its group
+    # its setting that takes the names, where a list is chosen in its group
+    listed: ClassVar[str] = ""
 
     @property
     def label(self) -> str:
@@ -53,7 +55,9 @@ class Plugin:
 
     @classmethod
     def check_class(cls, where: str) -> None:
-        """Raise `UserError`, starting with `where`, for what is declared wrongly. Called at registration."""
+        """Raise `UserError`, starting with `where`, for what is declared wrongly. Called at
+        registration.
+        """
 
 
 Class = TypeVar("Class", bound=type[Plugin])
@@ -65,9 +69,9 @@ _schemas: dict[type[Plugin], type] = {}
 def plugin(cls: Class) -> Class:
     """Register a plugin class under its module's name, in its base's group.
 
-    Raises `UserError` when the name is taken, when the class belongs to no group or lacks a method its base leaves to
-    it, when its docstring does not say where its equations come from (a line starting with "Source:"), and for what its
-    base and its parameters find declared wrongly.
+    Raises `UserError` when the name is taken, when the class belongs to no group or lacks a method
+    its base leaves to it, when its docstring does not say where its equations come from (a line
+    starting with "Source:"), and for what its base and its parameters find declared wrongly.
     """
     name = cls.__module__.rpartition(".")[2]
     where = f"plugin {cls.__module__}.{cls.__qualname__}"
@@ -75,18 +79,30 @@ def plugin(cls: Class) -> Class:
         where += f" ({Path(file).name})"
     group = getattr(cls, "group", None)
     if group is None:
-        raise UserError(f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader, ...)")
+        raise UserError(
+            f"{where} must subclass one of the framework's bases (Motor, Static, Optimizer, Reader,"
+            " ...)"
+        )
     if cls.sourced and "Source:" not in (cls.__doc__ or ""):
         if sys.flags.optimize > 1:
-            raise UserError("python -OO takes away the docstrings in which plugins name their sources; run without -OO")
+            raise UserError(
+                "python -OO takes away the docstrings in which plugins name their sources; run"
+                " without -OO"
+            )
         raise UserError(f"{where} needs a docstring with a line 'Source: author year, equation'")
     others = _registry.setdefault(group, {})
     if name in others and others[name].__module__ != cls.__module__:
         raise UserError(
-            f"{where}: the name '{name}' in group '{group}' is taken by {others[name].__module__}; rename the file"
+            f"{where}: the name '{name}' in group '{group}' is taken by {others[name].__module__};"
+            " rename the file"
         )
-    if missing := sorted(n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)):
-        raise UserError(f"{where} lacks what every plugin of group '{group}' must do: define {' and '.join(missing)}")
+    if missing := sorted(
+        n for n in dir(cls) if getattr(getattr(cls, n), "__isabstractmethod__", False)
+    ):
+        raise UserError(
+            f"{where} lacks what every plugin of group '{group}' must do: define"
+            f" {' and '.join(missing)}"
+        )
     plugin_class = dataclasses.dataclass(frozen=True, kw_only=True)(cls)
     plugin_class.name = name
     plugin_class.parameters = _parameters(plugin_class, where)
@@ -96,7 +112,8 @@ def plugin(cls: Class) -> Class:
 
 
 def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
-    """The parameters of a class, inherited ones first, by name: its own replaces an inherited one of that name.
+    """The parameters of a class, inherited ones first, by name: its own replaces an inherited one
+    of that name.
 
     Raises `UserError` for one that is declared wrongly.
     """
@@ -106,7 +123,8 @@ def _parameters(cls: type[Plugin], where: str) -> tuple[Parameter, ...]:
             if isinstance(parameter, Parameter):
                 if parameter.name != name:
                     raise UserError(
-                        f"{where}: '{name}' is the parameter '{parameter.name}' again, and a parameter has one name;"
+                        f"{where}: '{name}' is the parameter '{parameter.name}' again, and a"
+                        " parameter has one name;"
                         " write it out a second time"
                     )
                 parameter.check(f"{where}: {name}")
@@ -139,8 +157,14 @@ def place_in_plugin(error: BaseException) -> str:
     """
     others = [package for package in packages() if not package.__name__.startswith("tractexp.")]
     folders = [Path(path) for package in others for path in package.__path__]
-    frames = [(frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)]
-    inside = [(name, line) for name, line in frames if any(Path(name).is_relative_to(folder) for folder in folders)]
+    frames = [
+        (frame.f_code.co_filename, line) for frame, line in traceback.walk_tb(error.__traceback__)
+    ]
+    inside = [
+        (name, line)
+        for name, line in frames
+        if any(Path(name).is_relative_to(folder) for folder in folders)
+    ]
     return f"{inside[-1][0]}, line {inside[-1][1]}" if inside else ""
 
 
@@ -154,16 +178,22 @@ def discover() -> Mapping[str, Mapping[str, type[Plugin]]]:
 def import_all(packages: Iterable[ModuleType]) -> None:
     """Import every module of some packages that does not start with an underscore.
 
-    Raises `UserError` with file and line for a module that cannot be imported, and for a class in it that is not
-    decorated with `@plugin`.
+    Raises `UserError` with file and line for a module that cannot be imported, and for a class in
+    it that is not decorated with `@plugin`.
     """
-    imported = [_module(name) for package in packages for name in modules(package.__name__, package.__path__)]
+    imported = [
+        _module(name)
+        for package in packages
+        for name in modules(package.__name__, package.__path__)
+    ]
     for module in imported:
         _check_decorated(module)
 
 
 def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, str]]:
-    """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each tried by itself."""
+    """What can be used, as `discover`, and {package or module: the sentence on why it cannot}, each
+    tried by itself.
+    """
     refused: dict[str, str] = {}
 
     def tried(name: str, function: Callable[[Any], Any], argument: Any) -> list[Any]:
@@ -173,7 +203,9 @@ def register_all() -> tuple[Mapping[str, Mapping[str, type[Plugin]]], dict[str, 
             refused[name] = str(error)
             return []
 
-    packages = [package for point in entry_points() for package in tried(point.module, _package, point)]
+    packages = [
+        package for point in entry_points() for package in tried(point.module, _package, point)
+    ]
     names = [name for package in packages for name in modules(package.__name__, package.__path__)]
     for module in [module for name in names for module in tried(name, _module, name)]:
         tried(module.__name__, _check_decorated, module)
@@ -185,7 +217,10 @@ def _package(point: "EntryPoint") -> ModuleType:
     with _import_error(what):
         package = point.load()
     if not hasattr(package, "__path__"):
-        raise UserError(f"{what} is a single file; make it a folder with an __init__.py and a file for each plugin")
+        raise UserError(
+            f"{what} is a single file; make it a folder with an __init__.py and a file for each"
+            " plugin"
+        )
     return package
 
 
@@ -202,16 +237,26 @@ def _check_decorated(module: ModuleType) -> None:
             base = next(b for b in cls.__mro__ if "group" in vars(b))
             raise UserError(
                 f"{module.__file__}, line {inspect.getsourcelines(cls)[1]}: the class"
-                f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can choose it; write"
+                f" {cls.__name__}({base.__name__}) is not decorated with @plugin, so nothing can"
+                " choose it; write"
                 " @plugin above it, or let its name start with an underscore"
             )
 
 
 def _forgotten(cls: Any, module: str, classes: tuple[type, ...]) -> bool:
     """Whether a class of a module is neither a plugin, nor what plugins are made from."""
-    if not (isinstance(cls, type) and issubclass(cls, Plugin) and cls.__module__ == module and hasattr(cls, "group")):
+    if not (
+        isinstance(cls, type)
+        and issubclass(cls, Plugin)
+        and cls.__module__ == module
+        and hasattr(cls, "group")
+    ):
         return False
-    return not (cls.__name__.startswith("_") or "name" in vars(cls) or any(issubclass(k, cls) for k in classes))
+    return not (
+        cls.__name__.startswith("_")
+        or "name" in vars(cls)
+        or any(issubclass(k, cls) for k in classes)
+    )
 
 
 @contextmanager
@@ -223,11 +268,15 @@ def _import_error(what: str) -> Iterator[None]:
         if isinstance(error, UserError) and not isinstance(error, Unknown):
             raise  # it names the class and the file by itself
         why = error.msg if isinstance(error, SyntaxError) else error
-        raise UserError(f"{what} cannot be imported: {_place(error)}{type(error).__name__}: {why}") from error
+        raise UserError(
+            f"{what} cannot be imported: {_place(error)}{type(error).__name__}: {why}"
+        ) from error
 
 
 def _place(error: Exception) -> str:
-    """File and line of an error in what was imported, not in a library it called; "" where nothing was imported."""
+    """File and line of an error in what was imported, not in a library it called; "" where nothing
+    was imported.
+    """
     if isinstance(error, SyntaxError):
         return f"{error.filename}, line {error.lineno}: "
     frames = traceback.extract_tb(error.__traceback__)
@@ -237,7 +286,9 @@ def _place(error: Exception) -> str:
 
 
 def get(group: str, name: str) -> type[Any]:
-    """The plugin class registered as `name` in `group`; raises `UserError` with the nearest name."""
+    """The plugin class registered as `name` in `group`; raises `UserError` with the
+    nearest name.
+    """
     classes = discover().get(group, {})
     if name not in classes:
         raise UserError(f"there is no {group} '{name}'{among(name, classes)}")
@@ -245,7 +296,9 @@ def get(group: str, name: str) -> type[Any]:
 
 
 def build(group: str, settings: Mapping[str, Any]) -> Any:
-    """The plugin described by a configuration node: `name` chooses the class, the rest are its settings."""
+    """The plugin described by a configuration node: `name` chooses the class, the rest are its
+    settings.
+    """
     chosen = dict(settings) if isinstance(settings, Mapping) else {}
     name = chosen.pop("name", None)
     if not isinstance(name, str):
@@ -254,14 +307,18 @@ def build(group: str, settings: Mapping[str, Any]) -> Any:
     allowed = [item.name for item in dataclasses.fields(cls)]
     for key in chosen:
         if key not in allowed:
-            raise UserError(f"{group} '{cls.name}' has no setting '{key}'{among(key, allowed, 'Settings')}")
+            raise UserError(
+                f"{group} '{cls.name}' has no setting '{key}'{among(key, allowed, 'Settings')}"
+            )
     instance = cls(**chosen)
     instance.check()
     return instance
 
 
 def of_several(group: str, given: Sequence[Any]) -> dict[str, Any]:
-    """The node that a list of choices in one group stands for. Raises `UserError` in a group of which one is chosen."""
+    """The node that a list of choices in one group stands for. Raises `UserError` in a group of
+    which one is chosen.
+    """
     for name, cls in discover().get(group, {}).items():
         if cls.listed:
             return {"name": name, cls.listed: list(given)}
@@ -273,5 +330,8 @@ def chosen(group: str, given: Any) -> Any:
     if isinstance(given, str):
         return build(group, {"name": given})
     if not isinstance(given, Mapping) or "name" not in given:
-        raise UserError(f"{setting(f'data.{group}')}={given!r:.60} must be a name, or a mapping of 'name' and settings")
+        raise UserError(
+            f"{setting(f'data.{group}')}={given!r:.60} must be a name, or a mapping of 'name' and"
+            " settings"
+        )
     return build(group, given)

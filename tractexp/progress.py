@@ -1,7 +1,7 @@
 """Progress of a call: lines, and one live line, on a terminal, in a notebook or in a log file.
 
-All by rich. In a notebook its own live display asks for ipywidgets; the same bar is shown by IPython's display
-instead, which every notebook has.
+All by rich. In a notebook its own live display asks for ipywidgets; the same bar is shown by
+IPython's display instead, which every notebook has.
 """
 
 import functools
@@ -15,13 +15,16 @@ from typing import Any
 from tractexp.wording import one_line
 
 LOG_WIDTH = 120  # characters a table may take in a log file
-FIRST_LINE, NEXT_LINES = 2.0, 10.0  # s: a log file gets a progress line after so long, then every so often
+# s: a log file gets a progress line after so long, then every so often
+FIRST_LINE, NEXT_LINES = 2.0, 10.0
 BLINK = 0.15  # s between two pictures of a bar in a notebook
 
-Progress = Callable[[str], None] | bool | None  # of a call: None shows it, False does not, a callable gets each line
+# of a call: None shows it, False does not, a callable gets each line
+Progress = Callable[[str], None] | bool | None
 
 
-Counting = AbstractContextManager[Callable[[], None]]  # gives what is to be called at the end of each part
+# gives what is to be called at the end of each part
+Counting = AbstractContextManager[Callable[[], None]]
 
 
 def make_silent_counter(total: int) -> Counting:
@@ -45,8 +48,12 @@ def say(text: str = "") -> None:
 
 
 @contextmanager
-def report_search(iterations: int | None, budget: int | None, progress: Progress = None) -> Iterator[Any]:
-    """Yield the search loop's progress callback: a live line, or a line now and then in a log file; None for False."""
+def report_search(
+    iterations: int | None, budget: int | None, progress: Progress = None
+) -> Iterator[Any]:
+    """Yield the search loop's progress callback: a live line, or a line now and then in a log file;
+    None for False.
+    """
     from rich.progress import BarColumn, TextColumn
 
     if progress is False:
@@ -57,8 +64,13 @@ def report_search(iterations: int | None, budget: int | None, progress: Progress
 
         def line(iteration: int, best: float, simulations: int) -> None:
             if spent := pace():
-                rest = describe_remaining_time(spent, share(iteration, simulations, iterations, budget))
-                say(f"  iteration {iteration}: {simulations} simulations, best objective {best:.4g}{rest}")
+                rest = describe_remaining_time(
+                    spent, share(iteration, simulations, iterations, budget)
+                )
+                say(
+                    f"  iteration {iteration}: {simulations} simulations, best objective"
+                    f" {best:.4g}{rest}"
+                )
                 sys.stdout.flush()
 
         yield line
@@ -66,7 +78,10 @@ def report_search(iterations: int | None, budget: int | None, progress: Progress
     columns = [
         TextColumn("  searching"),
         BarColumn(bar_width=24),
-        TextColumn("{task.fields[simulations]} simulations, best objective {task.fields[best]:.4g}{task.fields[rest]}"),
+        TextColumn(
+            "{task.fields[simulations]} simulations, best objective"
+            " {task.fields[best]:.4g}{task.fields[rest]}"
+        ),
     ]
     started, total = time.perf_counter(), 1.0 if iterations or budget else None
     with _live(columns, total, simulations=0, best=float("nan"), rest="") as update:
@@ -81,7 +96,8 @@ def report_search(iterations: int | None, budget: int | None, progress: Progress
 
 @contextmanager
 def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Callable[[], None]]:
-    """Yield a function to call at the end of each of `total` parts: a bar, or a line now and then in a log file.
+    """Yield a function to call at the end of each of `total` parts: a bar, or a line now and then
+    in a log file.
 
     A callable gets a line for each.
     """
@@ -95,7 +111,12 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
         yield lambda: progress(f"{next(ended)} of {total} {what}")
         return
     if _lively():
-        columns = [TextColumn(f"  {what}"), BarColumn(bar_width=30), MofNCompleteColumn(), TimeRemainingColumn()]
+        columns = [
+            TextColumn(f"  {what}"),
+            BarColumn(bar_width=30),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+        ]
         with _live(columns, total) as update:
             yield lambda: update(advance=1)
         return
@@ -113,19 +134,25 @@ def count_parts(what: str, total: int, progress: Progress = None) -> Iterator[Ca
 
 
 def counter(what: str, progress: Progress = None) -> Callable[[int], Counting]:
-    """`counting` of as many parts as will be said; a callable, which is told what begins, is told of none."""
+    """`counting` of as many parts as will be said; a callable, which is told what begins, is told
+    of none.
+    """
     return lambda total: count_parts(what, total, None if callable(progress) else progress)
 
 
 @contextmanager
 def tell_stages(progress: Progress) -> Iterator[Callable[[str], None]]:
-    """Yield a function for the lines of the stages: the newest stands on a live line; a log file has each."""
+    """Yield a function for the lines of the stages: the newest stands on a live line; a log file
+    has each.
+    """
     from rich.progress import SpinnerColumn, TextColumn
 
     if callable(progress) or progress is False:
         yield progress or (lambda line: None)
     elif _lively():
-        with _live([SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage="") as update:
+        with _live(
+            [SpinnerColumn(), TextColumn("{task.fields[stage]}", markup=False)], None, stage=""
+        ) as update:
             yield lambda line: update(stage=one_line(line))
     else:
         yield lambda line: say(f"  {line}")
@@ -157,12 +184,19 @@ def tell(progress: Progress, lines: Iterable[str]) -> None:
             progress(line)
 
 
-def share(iteration: int, simulations: int, iterations: int | None, budget: int | None) -> float | None:
-    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither is set.
+def share(
+    iteration: int, simulations: int, iterations: int | None, budget: int | None
+) -> float | None:
+    """How much of the search is done, in [0, 1], by whichever end comes first; None where neither
+    is set.
 
     An end that the search has passed, as an optimizer may pass its own `iterations`, was none.
     """
-    parts = [done / end for done, end in ((iteration, iterations), (simulations, budget)) if end and done <= end]
+    parts = [
+        done / end
+        for done, end in ((iteration, iterations), (simulations, budget))
+        if end and done <= end
+    ]
     return max(parts, default=None)
 
 
@@ -172,7 +206,9 @@ def describe_remaining_time(spent: float, done: float | None) -> str:
 
 
 class Pace:
-    """When a log file gets its lines: each call gives the seconds since the start where one is due, else 0."""
+    """When a log file gets its lines: each call gives the seconds since the start where one is due,
+    else 0.
+    """
 
     def __init__(self, first: float | None = None):
         self.started, self.due = time.perf_counter(), FIRST_LINE if first is None else first

@@ -1,4 +1,6 @@
-"""Where a result comes from: the version, commit and code of this package, and digests of the records."""
+"""Where a result comes from: the version, commit and code of this package, and digests of the
+records.
+"""
 
 import functools
 import hashlib
@@ -27,9 +29,11 @@ def version() -> str:
 
 @functools.cache
 def commit(folder: Path = PACKAGE) -> str:
-    """The commit of the repository that keeps the files of `folder`; "" where none does, as for an installed wheel.
+    """The commit of the repository that keeps the files of `folder`; "" where none does, as for an
+    installed wheel.
 
-    By default that of this package, wherever the process runs. Uncommitted changes to tracked files add "-dirty".
+    By default that of this package, wherever the process runs. Uncommitted changes to tracked files
+    add "-dirty".
     """
     try:
         if not _git(folder, "ls-files", "--", "."):
@@ -40,13 +44,17 @@ def commit(folder: Path = PACKAGE) -> str:
 
 
 def _git(folder: Path, *command: str) -> str:
-    done = subprocess.run(["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True)
+    done = subprocess.run(
+        ["git", *command], cwd=folder, capture_output=True, text=True, timeout=5, check=True
+    )
     return done.stdout.strip()
 
 
 @functools.cache
 def code() -> str:
-    """SHA-256 of the installed code, plugins of all packages included: what is computed by the same is the same."""
+    """SHA-256 of the installed code, plugins of all packages included: what is computed by the same
+    is the same.
+    """
     total = hashlib.sha256()
     for file in sorted({file for folder in folders() for file in folder.rglob("*.py")}):
         total.update(hashlib.sha256(file.read_bytes()).digest())
@@ -61,7 +69,9 @@ def folders() -> set[Path]:
 
 
 def digest(record: Any) -> str:
-    """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever the file is called."""
+    """SHA-256 of the channels of a `Record` as they were read: equal for equal numbers, whatever
+    the file is called.
+    """
     if record.digest:
         return record.digest
 
@@ -94,20 +104,24 @@ def remember_folder(folder: Path) -> None:
 
 
 def build_again_command(*settings: str, of: Collection[str] = OF_LOAD) -> str:
-    """The command that does something else with the settings of this run in some groups: its records and its load.
+    """The command that does something else with the settings of this run in some groups: its
+    records and its load.
 
-    Whole, or by the folder of this run where that is shorter. The command line of a sweep has several of each, so that
-    its jobs repeat none.
+    Whole, or by the folder of this run where that is shorter. The command line of a sweep has
+    several of each, so that its jobs repeat none.
     """
     whole = _repeat_settings(settings, of)
     possible = of == OF_LOAD and not any(map(_not_taken_over, _started[1:]))
-    by_folder = [quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible]
+    by_folder = [
+        quoting.shell("tractexp", "again", str(folder), *settings) for folder in _placed if possible
+    ]
     return min(whole, *by_folder, key=len) if by_folder else whole
 
 
 def _not_taken_over(argument: str) -> bool:
     """Whether an argument keeps `tractexp again` from repeating this run by its folder."""
-    if group_of(argument) == "hydra" or "=" not in argument:  # which is none of the settings that a folder keeps
+    # which is none of the settings that a folder keeps
+    if group_of(argument) == "hydra" or "=" not in argument:
         return argument.startswith("--config-dir")
     return bool(repeatable.refusal(argument))
 

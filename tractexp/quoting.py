@@ -1,4 +1,5 @@
-"""Text of others, such as names in records, as it stands in what is read as code: one function for each language.
+"""Text of others, such as names in records, as it stands in what is read as code: one function for
+each language.
 
 Whatever the text holds, what is read back is the text, and nothing of it is obeyed.
 """
@@ -10,22 +11,33 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
-INTERPOLATION = re.compile(r"(\\*)\$\{")  # what OmegaConf replaces, and the backslashes that keep it from that
+# what OmegaConf replaces, and the backslashes that keep it from that
+INTERPOLATION = re.compile(r"(\\*)\$\{")
 MARKDOWN = frozenset("\\`*_<>[]|$~&#")
-FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")  # what begins a formula where a spreadsheet opens a table
+# what begins a formula where a spreadsheet opens a table
+FORMULA = ("=", "+", "-", "@", "\t", "\r", "\n")
 
 
 def python(text: str) -> str:
-    """The inside of a string literal of Python that is not raw, whatever its quotes: of a docstring, too.
+    """The inside of a string literal of Python that is not raw, whatever its quotes: of a
+    docstring, too.
 
     What is no character, as in the name of a file that is no UTF-8, is read back as its escape.
     """
     text = text.encode(errors="backslashreplace").decode()
-    return "".join(f"\\{c}" if c in "\\\"'" else c if c.isprintable() else _code(ord(c)) for c in text)
+    return "".join(
+        f"\\{c}" if c in "\\\"'" else c if c.isprintable() else _code(ord(c)) for c in text
+    )
 
 
 def _code(point: int) -> str:
-    return f"\\x{point:02x}" if point < 0x100 else f"\\u{point:04x}" if point < 0x10000 else f"\\U{point:08x}"
+    return (
+        f"\\x{point:02x}"
+        if point < 0x100
+        else f"\\u{point:04x}"
+        if point < 0x10000
+        else f"\\U{point:08x}"
+    )
 
 
 def modelica(text: str) -> str:
@@ -40,7 +52,9 @@ def html(text: str) -> str:
 
 def script(data: Any) -> str:
     """JSON within a <script> element, which no text in it ends."""
-    return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    return json.dumps(data, ensure_ascii=False, allow_nan=False, separators=(",", ":")).replace(
+        "<", "\\u003c"
+    )
 
 
 def markdown(text: str) -> str:
@@ -49,7 +63,9 @@ def markdown(text: str) -> str:
 
 
 def markdown_again(text: str) -> str:
-    """Markdown that somebody else may have written, as what `markdown` makes of its text: no link, no picture."""
+    """Markdown that somebody else may have written, as what `markdown` makes of its text: no link,
+    no picture.
+    """
     return markdown(re.sub(r"\\([\\`*_<>\[\]|$~&#])", r"\1", text))
 
 
@@ -60,8 +76,12 @@ def fence_markdown(text: str) -> str:
 
 
 def hydra(text: str, *, literal: bool = True) -> str:
-    """A value of Hydra's grammar in quotes; where it is `literal`, an interpolation within it is text, too."""
-    return "'" + re.sub(r"\\*('|$)", _double_backslashes, omegaconf(text) if literal else text) + "'"
+    """A value of Hydra's grammar in quotes; where it is `literal`, an interpolation within it is
+    text, too.
+    """
+    return (
+        "'" + re.sub(r"\\*('|$)", _double_backslashes, omegaconf(text) if literal else text) + "'"
+    )
 
 
 def _double_backslashes(match: re.Match[str]) -> str:
@@ -107,5 +127,7 @@ def csv(text: str) -> str:
 
 
 def cell(text: str) -> str:
-    """The content of such a cell: where a spreadsheet would take it for a formula, an apostrophe makes it text."""
+    """The content of such a cell: where a spreadsheet would take it for a formula, an apostrophe
+    makes it text.
+    """
     return f"'{text}" if text.startswith(FORMULA) else text

@@ -12,14 +12,23 @@ from tractexp.choices import describe_available, elsewhere
 from tractexp.errors import UserError, among
 
 HYDRA = ("hydra", "omegaconf", "antlr4")  # whose code composes configurations
-KINDS = {"Integer": "a whole number", "Float": "a number", "Boolean": "true or false", "String": "a text"}
-PYTHON = re.compile(r"Config\b|Exception|Error:|\btype '|\b(?:dict|list|tuple|int|str|float|None\w*)\b|__")
+KINDS = {
+    "Integer": "a whole number",
+    "Float": "a number",
+    "Boolean": "true or false",
+    "String": "a text",
+}
+PYTHON = re.compile(
+    r"Config\b|Exception|Error:|\btype '|\b(?:dict|list|tuple|int|str|float|None\w*)\b|__"
+)
 LONGEST_REPEATED_VALUE = 80  # characters of a value that are repeated
 
 
 @contextmanager
 def explain_errors() -> Iterator[None]:
-    """Turn Hydra's and OmegaConf's exceptions into `UserError`, unforeseen ones from their code too."""
+    """Turn Hydra's and OmegaConf's exceptions into `UserError`, unforeseen ones from their code
+    too.
+    """
     from hydra.errors import HydraException, MissingConfigException
     from omegaconf.errors import OmegaConfBaseException
 
@@ -35,7 +44,8 @@ def explain_errors() -> Iterator[None]:
         if not _of_hydra(error):
             raise
         raise UserError(
-            f"{error.filename} cannot be created ({error.strerror}); choose another folder for hydra.run.dir"
+            f"{error.filename} cannot be created ({error.strerror}); choose another folder for"
+            " hydra.run.dir"
         ) from error
     except Exception as error:
         if not _of_hydra(error):
@@ -44,7 +54,9 @@ def explain_errors() -> Iterator[None]:
 
 
 def _of_hydra(error: BaseException) -> bool:
-    """Whether an exception comes from what composes configurations: Python's own library apart, it is the last one."""
+    """Whether an exception comes from what composes configurations: Python's own library apart, it
+    is the last one.
+    """
     own = sysconfig.get_path("stdlib")
     files = [Path(frame.f_code.co_filename) for frame, _ in traceback.walk_tb(error.__traceback__)]
     foreign = [f for f in files if "site-packages" in f.parts or not f.is_relative_to(own)]
@@ -53,11 +65,20 @@ def _of_hydra(error: BaseException) -> bool:
 
 def _unforeseen(error: BaseException) -> str:
     if isinstance(error, RecursionError):
-        return "an argument has brackets within brackets, or a reference to itself, deeper than can be read"
+        return (
+            "an argument has brackets within brackets, or a reference to itself, deeper than can be"
+            " read"
+        )
     argument = _argument(error)
     if argument is None:
-        return "the arguments make no configuration: one names a part of a value that has no parts, or a wrong value"
-    return f"{argument}: no such value can be set there; it may name a part of a value that has no parts"
+        return (
+            "the arguments make no configuration: one names a part of a value that has no parts, or"
+            " a wrong value"
+        )
+    return (
+        f"{argument}: no such value can be set there; it may name a part of a value that has no"
+        " parts"
+    )
 
 
 def _argument(error: BaseException | None) -> str | None:
@@ -82,12 +103,17 @@ def _describe_missing_choice(error: Any) -> str:
     if not group or not options:
         return _plain(error)
     where = elsewhere(group, choice)
-    return f"{group}={choice}: there is no such choice{where or describe_available(group, choice, options)}"
+    return (
+        f"{group}={choice}: there is no such"
+        f" choice{where or describe_available(group, choice, options)}"
+    )
 
 
 def _sentence(error: BaseException) -> str:
     chain = [error]
-    while (cause := chain[-1].__cause__ or chain[-1].__context__) is not None and cause not in chain:
+    while (
+        cause := chain[-1].__cause__ or chain[-1].__context__
+    ) is not None and cause not in chain:
         chain.append(cause)
     for link in chain:
         key = getattr(link, "full_key", None)
@@ -109,7 +135,9 @@ def _key_of(error: BaseException) -> str:
 
 def _wrong_value(key: str, text: str) -> str:
     """The sentence about a value of another kind than its setting; "" for another exception."""
-    if match := re.search(r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL):
+    if match := re.search(
+        r"[Vv]alue '(.*)' of type '.*' could not be converted to (\w+)", text, re.DOTALL
+    ):
         return f"{key}={_short(match[1])} is not {KINDS.get(match[2], 'what this setting takes')}"
     if "is not a ListConfig" in text:
         return f"{key} takes a list, such as {key}=[a,b]"
@@ -119,14 +147,17 @@ def _wrong_value(key: str, text: str) -> str:
 # What Hydra says of an option or an argument, and our sentence with the parts it names
 SENTENCES = {
     r"Cannot find primary config '(.*)'\.": (
-        "-cn {0}: there is no such configuration; give the folder of yours, too: -cd FOLDER, with {0}.yaml in it"
+        "-cn {0}: there is no such configuration; give the folder of yours, too: -cd FOLDER, with"
+        " {0}.yaml in it"
     ),
     r"Additional config directory '(.*)' not found": "-cd {0}: there is no such folder",
     r"Primary config directory not found": (
         "-cp names no folder; -cd FOLDER adds configurations of yours to those that are here"
     ),
-    r"Could not delete from config\. '(.*)' does not exist": "~{0}: there is no such setting to take out",
-    r"Could not delete\. No match for '(.*)' in the defaults list": "~{0}: nothing is chosen there to take out",
+    r"Could not delete from config\. '(.*)' does not exist": "~{0}: there is no such setting to"
+    " take out",
+    r"Could not delete\. No match for '(.*)' in the defaults list": "~{0}: nothing is chosen there"
+    " to take out",
     r"Multiple values for (\S+)\. To override a value use 'override \1: (.*)'": (
         "{0} is chosen already; within a file of configurations write 'override {0}: {1}'"
     ),
@@ -135,17 +166,23 @@ SENTENCES = {
 
 
 def _plain(error: BaseException) -> str:
-    """The first line of an exception where it is in plain words, else what can be said in its place."""
+    """The first line of an exception where it is in plain words, else what can be said in its
+    place.
+    """
     text = _first_line(error)
     for pattern, sentence in SENTENCES.items():
         if match := re.match(pattern, text):
             return sentence.format(*map(_short, match.groups()))
     if match := re.match(r"LexerNoViableAltException: (.*)", text, re.DOTALL):
         return (
-            f"{_short(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in quotes: KEY='a \"b\"'"
+            f"{_short(match[1])} cannot be read; an argument is KEY=VALUE, and other signs go in"
+            " quotes: KEY='a \"b\"'"
         )
     if match := re.match(r"Error merging override (.*)", text, re.DOTALL):
-        return f"{_short(match[1])} cannot be applied: every run may need that setting, or it holds no such value"
+        return (
+            f"{_short(match[1])} cannot be applied: every run may need that setting, or it holds no"
+            " such value"
+        )
     return text if not PYTHON.search(text) else _unforeseen(error)
 
 

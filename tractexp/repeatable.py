@@ -1,12 +1,23 @@
-"""Which settings `tractexp again` takes over from the folder of a run, which somebody else may have written.
+"""Which settings `tractexp again` takes over from the folder of a run, which somebody else may have
+written.
 
-They choose what is computed. What says where anything is written or sent, what is asked of another computer, or what is
-called, is the user's to say. So is what is not listed here.
+They choose what is computed. What says where anything is written or sent, what is asked of another
+computer, or what is called, is the user's to say. So is what is not listed here.
 """
 
 import re
 
-CHOICES = ("data", "domain", "experiment", "model", "model/motor", "model/static", "objective", "optimizer", "task")
+CHOICES = (
+    "data",
+    "domain",
+    "experiment",
+    "model",
+    "model/motor",
+    "model/static",
+    "objective",
+    "optimizer",
+    "task",
+)
 PARTS = ("data.", "model.", "objective.", "optimizer.", "task.")  # settings of what is chosen
 VALUES = ("seed", "budget", "time_limit", "target", "tracking.enabled")
 READ = ("task.parameters", "task.values", "task.rivals")  # of a task: files that it reads
@@ -23,7 +34,11 @@ def refusal(setting: str) -> str:
         return "it says more than what is computed"
     if "${" in value:
         return "its value refers to something else"
-    if match[1] in CHOICES and not NAMES.fullmatch(value) and not (match[1] == "model" and MODEL.fullmatch(value)):
+    if (
+        match[1] in CHOICES
+        and not NAMES.fullmatch(value)
+        and not (match[1] == "model" and MODEL.fullmatch(value))
+    ):
         return "what is chosen there has a name"
     if key.startswith("task.") and key not in READ and set(value) & set("/\\"):
         return "it names a folder"

@@ -1,9 +1,11 @@
-"""The folder of one run: an earlier whole run stays in it until a newer one is whole, whatever ends the process.
+"""The folder of one run: an earlier whole run stays in it until a newer one is whole, whatever ends
+the process.
 
-A run writes into a folder of its own within, named after its process. When that is whole it is renamed to `WHOLE`: this
-one move is the moment at which the newer run counts. Its files then take their places one by one, `RESULTS` last, and
-what is left of the earlier run goes at the end. Who is killed meanwhile leaves `WHOLE`, and the next command that looks
-at the folder goes on with it. A lock keeps two runs from one folder.
+A run writes into a folder of its own within, named after its process. When that is whole it is
+renamed to `WHOLE`: this one move is the moment at which the newer run counts. Its files then take
+their places one by one, `RESULTS` last, and what is left of the earlier run goes at the end. Who is
+killed meanwhile leaves `WHOLE`, and the next command that looks at the folder goes on with it. A
+lock keeps two runs from one folder.
 """
 
 import contextlib
@@ -20,16 +22,37 @@ from tractexp import files
 from tractexp.errors import UserError
 
 CONFIGURATION, RESULT = ".hydra", "result.json"
-WHOLE, NEXT, LOCK, GOES = ".tractexp.whole", ".tractexp.next", ".tractexp.next.lock", ".tractexp.goes"
+WHOLE, NEXT, LOCK, GOES = (
+    ".tractexp.whole",
+    ".tractexp.next",
+    ".tractexp.next.lock",
+    ".tractexp.goes",
+)
 KINDS = (
-    "discrepancy", "generalise", "linear_network", "posterior", "plan", "profile", "survey", "benchmark", "comparison",
+    "discrepancy",
+    "generalise",
+    "linear_network",
+    "posterior",
+    "plan",
+    "profile",
+    "survey",
+    "benchmark",
+    "comparison",
     "paper",
-)  # fmt: skip
+)
 RESULTS = (
-    "history.csv", "interrupted.json", "report.html", "posterior.npz", "unexplained.csv", "survey.csv",
-    "survey.parquet", "paper.md", "mlflow.json",
-    *(f"{kind}{ending}" for kind in KINDS for ending in (".json", ".html")), RESULT,
-)  # fmt: skip
+    "history.csv",
+    "interrupted.json",
+    "report.html",
+    "posterior.npz",
+    "unexplained.csv",
+    "survey.csv",
+    "survey.parquet",
+    "paper.md",
+    "mlflow.json",
+    *(f"{kind}{ending}" for kind in KINDS for ending in (".json", ".html")),
+    RESULT,
+)
 Write: TypeAlias = Callable[[Path], list[Path]]
 
 
@@ -37,7 +60,9 @@ class RunFolder:
     """The folder in which this process writes a run; make it by `run_folder`."""
 
     def __init__(self, folder: Path, configuration: Mapping[str, str], read: frozenset[Path]):
-        """`configuration` is what lies beside the results, {name of a file: text}; `read` are files the run needs."""
+        """`configuration` is what lies beside the results, {name of a file: text}; `read` are files
+        the run needs.
+        """
         self.folder, self.read = folder, read
         self.next = folder / f"{NEXT}.{os.getpid()}.{uuid.uuid4().hex[:8]}"
         earlier = any((folder / name).exists() for name in (CONFIGURATION, *RESULTS))
@@ -49,8 +74,9 @@ class RunFolder:
     def place(self, write: Write) -> list[Path]:
         """Let `write` fill a folder with results, and give them their places; their paths.
 
-        Raises `UserError` where that is impossible: the earlier run is there then, or the newer one is whole and the
-        next command goes on. Where there is no earlier run a result is kept without what should have followed it.
+        Raises `UserError` where that is impossible: the earlier run is there then, or the newer one
+        is whole and the next command goes on. Where there is no earlier run a result is kept
+        without what should have followed it.
         """
         self.next.mkdir(exist_ok=True)
         try:
@@ -63,14 +89,21 @@ class RunFolder:
         return paths
 
     def conclude(self) -> None:
-        """What a task leaves that writes files for others, but no result: results that are there keep their own."""
+        """What a task leaves that writes files for others, but no result: results that are there
+        keep their own.
+        """
         if self.next.exists() and not any((self.folder / name).exists() for name in RESULTS):
             self._commit()
 
     def forget(self) -> None:
-        """Remove the folder of a run that was refused or stopped, where it came about for it and holds no result."""
+        """Remove the folder of a run that was refused or stopped, where it came about for it and
+        holds no result.
+        """
         shutil.rmtree(self.next, ignore_errors=True)
-        if self.begun_empty and {path.name for path in self.folder.iterdir()} <= {CONFIGURATION, LOCK}:
+        if self.begun_empty and {path.name for path in self.folder.iterdir()} <= {
+            CONFIGURATION,
+            LOCK,
+        }:
             shutil.rmtree(self.folder, ignore_errors=True)
 
     def _commit(self) -> None:
@@ -84,8 +117,11 @@ class RunFolder:
 
 
 @contextlib.contextmanager
-def run_folder(folder: Path, configuration: Mapping[str, str], read: frozenset[Path]) -> Iterator[RunFolder]:
-    """The folder for one run of this process alone. Raises `UserError` where another one is at work there.
+def run_folder(
+    folder: Path, configuration: Mapping[str, str], read: frozenset[Path]
+) -> Iterator[RunFolder]:
+    """The folder for one run of this process alone. Raises `UserError` where another one is at work
+    there.
 
     What an ended process left is mended first; what this one leaves is removed at the end.
     """
@@ -105,7 +141,8 @@ def run_folder(folder: Path, configuration: Mapping[str, str], read: frozenset[P
 
 
 def settle(folder: Path) -> bool:
-    """Give the files of a run that is whole their places, where a process was ended before it had; whether it was so.
+    """Give the files of a run that is whole their places, where a process was ended before it had;
+    whether it was so.
 
     Raises `UserError` where they cannot be moved, or a process is about it.
     """
@@ -117,10 +154,14 @@ def settle(folder: Path) -> bool:
 
 @contextlib.contextmanager
 def hold(folder: Path) -> Iterator[None]:
-    """Hold a folder, created where there is none, for this process alone. Raises `UserError` where another does."""
+    """Hold a folder, created where there is none, for this process alone. Raises `UserError` where
+    another does.
+    """
     since = time.strftime("%Y-%m-%d %H:%M:%S")
     try:
-        with files.claim_file(folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"):
+        with files.claim_file(
+            folder / LOCK, f"process {os.getpid()} on {socket.gethostname()}, since {since}"
+        ):
             yield
     finally:
         with contextlib.suppress(OSError):  # where it is not empty
@@ -128,7 +169,8 @@ def hold(folder: Path) -> Iterator[None]:
 
 
 def _settle(folder: Path) -> bool:
-    """As `settle`, of a folder that is held. That of somebody else may hold anything by the name of `WHOLE`.
+    """As `settle`, of a folder that is held. That of somebody else may hold anything by the name of
+    `WHOLE`.
 
     So nothing is moved by a link, from elsewhere or to there.
     """
@@ -139,11 +181,17 @@ def _settle(folder: Path) -> bool:
     paths = [path for path in whole.rglob("*") if not path.is_dir() and path.name != GOES]
     for path in sorted(paths, key=lambda path: order.get(path.relative_to(whole).parts[0], -1)):
         target = folder / path.relative_to(whole)
-        if not (files.inside(path, whole) and target.parent.resolve().is_relative_to(folder.resolve())):
+        if not (
+            files.inside(path, whole) and target.parent.resolve().is_relative_to(folder.resolve())
+        ):
             raise UserError(f"{target} would be moved by a link out of {folder}; remove {whole}")
         target.parent.mkdir(parents=True, exist_ok=True)
         files.move(path, target)
-    goes = files.read_text(whole / GOES, files.CONFIGURATION).split("\n") if (whole / GOES).is_file() else []
+    goes = (
+        files.read_text(whole / GOES, files.CONFIGURATION).split("\n")
+        if (whole / GOES).is_file()
+        else []
+    )
     for name in goes:
         if name in RESULTS:
             (folder / name).unlink(missing_ok=True)

@@ -1,4 +1,6 @@
-"""The configuration's schema: what a run is made of beside its plugins, and the values that are refused."""
+"""The configuration's schema: what a run is made of beside its plugins, and the values that are
+refused.
+"""
 
 import dataclasses
 from collections.abc import Mapping
@@ -20,12 +22,17 @@ class ModelConfig:
     bounds: dict[str, list[float]] = field(default_factory=dict)  # {name: [lower, upper]}
     fixed: dict[str, float] = field(default_factory=dict)  # {name: value}
     substeps: int | None = None  # Runge-Kutta steps per sample; null: as many as needed
-    integration: str = "classical"  # or printed: Eq. (4) of the paper as it stands, one step per sample
-    per_event: list[str] = field(default_factory=list)  # parameters with a value of their own in each event
+    # or printed: Eq. (4) of the paper as it stands, one step per sample
+    integration: str = "classical"
+    # parameters with a value of their own in each event
+    per_event: list[str] = field(default_factory=list)
     domain: str = "phasors"  # or waves; chosen by domain=
-    window: Any = None  # over which the recorder averages phasors: seconds, an estimator's name, or recorded
-    priors: bool = False  # hold the motor to what machines usually are, where the records do not tell
-    shown_effects: bool = False  # add the effects that the records show, such as a current of zero sequence
+    # over which the recorder averages phasors: seconds, an estimator's name, or recorded
+    window: Any = None
+    # hold the motor to what machines usually are, where the records do not tell
+    priors: bool = False
+    # add the effects that the records show, such as a current of zero sequence
+    shown_effects: bool = False
 
 
 @dataclass
@@ -62,7 +69,9 @@ class Config:
 
 
 def check(config: Mapping[str, Any]) -> None:
-    """Raise `UserError` for a key nobody reads (as `+sede=3` makes one), one taken out, or a value out of range."""
+    """Raise `UserError` for a key nobody reads (as `+sede=3` makes one), one taken out, or a value
+    out of range.
+    """
     sections = {"model.": ModelConfig, "tracking.": TrackingConfig, "sweep.": SweepConfig}
     for where, kind in {"": Config, **sections}.items():
         part = config.get(where[:-1]) if where else config
@@ -74,6 +83,8 @@ def check(config: Mapping[str, Any]) -> None:
                 raise UserError(f"{where}{key}: there is no such key{among(key, keys, 'Keys')}")
         for key in keys:
             if key not in part:
-                raise UserError(f"{where}{key} is taken out, and every run needs it; leave it as it is")
+                raise UserError(
+                    f"{where}{key} is taken out, and every run needs it; leave it as it is"
+                )
     for key, least in LEAST.items():
         check_range(key, config[key], least)

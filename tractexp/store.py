@@ -1,10 +1,11 @@
 """The store: what was computed is on disk as an entry, read back under its key and never otherwise.
 
-A key is the SHA-256 of all that an entry depends on, so an entry is the right one or is not there; what cannot tell
-all of it has the key "", and nothing is stored. Some entries become code of this process. Two things make that safe.
-Nobody but its user can write to the folder, nor put another in its place. And each file begins with the SHA-256 of its
-own name and content: one that is damaged, cut, exchanged or from another program is none, and is computed again. The
-sums alone would not keep anyone out, who could write them too; that is what the folder is for.
+A key is the SHA-256 of all that an entry depends on, so an entry is the right one or is not there;
+what cannot tell all of it has the key "", and nothing is stored. Some entries become code of this
+process. Two things make that safe. Nobody but its user can write to the folder, nor put another in
+its place. And each file begins with the SHA-256 of its own name and content: one that is damaged,
+cut, exchanged or from another program is none, and is computed again. The sums alone would not keep
+anyone out, who could write them too; that is what the folder is for.
 """
 
 import atexit
@@ -35,16 +36,20 @@ from tractexp.errors import UserError
 CHOICE = "TRACTEXP_CACHE_DIR"
 SUM = hashlib.sha256().digest_size  # bytes a file begins with
 ENDING, EARLIER = ".entry", ".kept"  # of its name, now and in versions before 0.2
-NAME = re.compile(rf"[0-9a-f]+{re.escape(ENDING)}|[a-z]+_[0-9a-f]+{re.escape(EARLIER)}")  # nobody else's
+# nobody else's
+NAME = re.compile(rf"[0-9a-f]+{re.escape(ENDING)}|[a-z]+_[0-9a-f]+{re.escape(EARLIER)}")
 LIBRARIES = ("numpy", "scipy", "llvmlite")  # whose versions may change the last digits
-DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)  # raised where arrays are unpacked
+# raised where arrays are unpacked
+DAMAGED = (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile)
 
 
 class Store:
-    """Entries of one kind, below the cache folder or in a `folder` of their own; beyond `limit` the oldest go.
+    """Entries of one kind, below the cache folder or in a `folder` of their own; beyond `limit` the
+    oldest go.
 
-    A process counts the entries of a large store at the first one it writes and at every 64th part of the limit; where
-    they are too many, an eighth goes at once. To list and sort thousands at each takes far longer than to write it.
+    A process counts the entries of a large store at the first one it writes and at every 64th part
+    of the limit; where they are too many, an eighth goes at once. To list and sort thousands at
+    each takes far longer than to write it.
     """
 
     def __init__(self, kind: str, limit: int | None = None, folder: Path | None = None):
@@ -59,7 +64,9 @@ class Store:
         return _sound(self.path(key)) if key else None
 
     def write(self, key: str, content: bytes) -> None:
-        """Write an entry, whole or not at all; where that is impossible, it is computed again next time."""
+        """Write an entry, whole or not at all; where that is impossible, it is computed again next
+        time.
+        """
         if not key:
             return
         with contextlib.suppress(OSError, UserError):
@@ -77,7 +84,9 @@ class Store:
             self.write(key, content := compute())
         return content
 
-    def arrays(self, key: str, compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
+    def arrays(
+        self, key: str, compute: Callable[[], tuple[np.ndarray, ...]]
+    ) -> tuple[np.ndarray, ...]:
         """The arrays of an entry, computed and written where there is none."""
         if (entry := self.read_arrays(key)) is not None:
             return tuple(entry.values())
@@ -88,7 +97,10 @@ class Store:
     def read_arrays(self, key: str) -> dict[str, np.ndarray] | None:
         """The arrays of an entry by name; None where there are none. Nothing in it is unpickled."""
         content = self.read(key) or b""
-        with contextlib.suppress(*DAMAGED), np.load(io.BytesIO(content), allow_pickle=False) as entry:
+        with (
+            contextlib.suppress(*DAMAGED),
+            np.load(io.BytesIO(content), allow_pickle=False) as entry,
+        ):
             return {name: entry[name] for name in entry.files}
         return None
 
@@ -111,8 +123,10 @@ class Store:
                 path.unlink(missing_ok=True)
 
 
-CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)  # some 10 kB each
-SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)  # draws of 10 MB
+# some 10 kB each
+CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)
+# draws of 10 MB
+SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)
 KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DRAWS))
 MOST_LINKS = 40  # that a path leads through, as the system has it
 
@@ -141,7 +155,9 @@ def _sum(path: Path, content: bytes) -> bytes:
 
 
 def key(*things: Any) -> str:
-    """SHA-256 of numbers, texts, arrays, and of collections and dataclasses of them: equal for what is equal."""
+    """SHA-256 of numbers, texts, arrays, and of collections and dataclasses of them: equal for what
+    is equal.
+    """
     digest = hashlib.sha256()
     for thing in things:
         digest.update(_content(thing))
@@ -152,7 +168,11 @@ def _content(thing: Any) -> bytes:
     if isinstance(thing, np.ndarray):
         return f"{thing.dtype.str} {thing.shape} ".encode() + np.ascontiguousarray(thing).tobytes()
     if dataclasses.is_dataclass(thing):
-        fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing) if field.init}
+        fields = {
+            field.name: getattr(thing, field.name)
+            for field in dataclasses.fields(thing)
+            if field.init
+        }
         return f"{type(thing).__qualname__} ".encode() + _content(fields)
     if isinstance(thing, Mapping):
         return b"{%s}" % key(*(item for pair in thing.items() for item in pair)).encode()
@@ -162,9 +182,13 @@ def _content(thing: Any) -> bytes:
 
 
 def environment() -> str:
-    """What stands behind every number computed here: the code of all plugins, libraries, interpreter, processor."""
+    """What stands behind every number computed here: the code of all plugins, libraries,
+    interpreter, processor.
+    """
     versions = [f"{name} {version(name)}" for name in LIBRARIES]
-    return repr((provenance.code(), versions, sys.version, platform.machine(), platform.processor()))
+    return repr(
+        (provenance.code(), versions, sys.version, platform.machine(), platform.processor())
+    )
 
 
 @functools.cache  # the files of a package are searched for each time
@@ -174,9 +198,13 @@ def version(library: str) -> str:
 
 
 def is_installed(part: Any) -> bool:
-    """Whether a part's code is among that whose digest is taken: a plugin in no installed file may change unseen."""
+    """Whether a part's code is among that whose digest is taken: a plugin in no installed file may
+    change unseen.
+    """
     file = getattr(sys.modules.get(type(part).__module__), "__file__", None)
-    return file is not None and any(Path(file).is_relative_to(folder) for folder in provenance.folders())
+    return file is not None and any(
+        Path(file).is_relative_to(folder) for folder in provenance.folders()
+    )
 
 
 # The folder
@@ -190,7 +218,8 @@ def cache_folder() -> Path:
     if chosen := os.environ.get(CHOICE):
         if reason := _unfit(Path(chosen)):
             raise UserError(
-                f"{CHOICE}={chosen} cannot keep kernels: {reason}; choose a folder of your own, such as a new one"
+                f"{CHOICE}={chosen} cannot keep kernels: {reason}; choose a folder of your own,"
+                " such as a new one"
             )
         return Path(chosen)
     usual = _usual()
@@ -227,7 +256,8 @@ def _unfit(folder: Path, private: bool = False) -> str:
 
 
 def _reachable_by_others(folder: Path) -> str:
-    """Why others could put another folder in this one's place, "" where nobody can: of all that its path leads through.
+    """Why others could put another folder in this one's place, "" where nobody can: of all that its
+    path leads through.
 
     That is every folder in which one of its parts is looked up, before and behind each link.
     """
@@ -274,7 +304,9 @@ def _writable_by_others(folder: Path) -> str:
 
 
 def _others_write(state: os.stat_result) -> bool:
-    """Whether others may write there: all of them, or those of a group that is not the user's alone."""
+    """Whether others may write there: all of them, or those of a group that is not the user's
+    alone.
+    """
     return bool(state.st_mode & stat.S_IWOTH) or (
         bool(state.st_mode & stat.S_IWGRP) and not _is_private_group(state.st_gid)
     )
@@ -282,7 +314,9 @@ def _others_write(state: os.stat_result) -> bool:
 
 @functools.cache
 def _is_private_group(number: int) -> bool:
-    """Whether a group is the one that many systems make for a user, of the same name and with nobody else in it."""
+    """Whether a group is the one that many systems make for a user, of the same name and with
+    nobody else in it.
+    """
     import grp
     import pwd
 
@@ -290,11 +324,17 @@ def _is_private_group(number: int) -> bool:
         group, user = grp.getgrgid(number), pwd.getpwuid(os.geteuid())
     except KeyError:
         return False
-    return group.gr_name == user.pw_name and user.pw_gid == number and set(group.gr_mem) <= {user.pw_name}
+    return (
+        group.gr_name == user.pw_name
+        and user.pw_gid == number
+        and set(group.gr_mem) <= {user.pw_name}
+    )
 
 
 def _create(folder: Path) -> None:
-    """Create a folder where there is none, and those above it, closed to others whatever the umask."""
+    """Create a folder where there is none, and those above it, closed to others
+    whatever the umask.
+    """
     if not folder.parent.is_dir():
         _create(folder.parent)
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -306,13 +346,17 @@ def _temporary(reason: str) -> Path:
         folder = Path(tempfile.mkdtemp(prefix="tractexp-"))
     except OSError as error:
         raise UserError(
-            f"kernels can be kept nowhere ({reason}; {error.strerror}); set {CHOICE} to a folder you can write to"
+            f"kernels can be kept nowhere ({reason}; {error.strerror}); set {CHOICE} to a folder"
+            " you can write to"
         ) from error
     print(
-        f"tractexp: kernels are compiled anew for every command ({reason}); set {CHOICE} to a folder of your own",
+        f"tractexp: kernels are compiled anew for every command ({reason}); set {CHOICE} to a"
+        " folder of your own",
         file=sys.stderr,
     )
     os.environ[CHOICE] = str(folder)
     owner = os.getpid()
-    atexit.register(lambda: shutil.rmtree(folder, ignore_errors=True) if os.getpid() == owner else None)
+    atexit.register(
+        lambda: shutil.rmtree(folder, ignore_errors=True) if os.getpid() == owner else None
+    )
     return folder

@@ -7,7 +7,15 @@ import textwrap
 from collections.abc import Collection, Mapping
 from pathlib import Path
 
-from tractexp.choices import FEWEST_VARIANTS, Option, choices, defaults, find_families, group_variants, sentence
+from tractexp.choices import (
+    FEWEST_VARIANTS,
+    Option,
+    choices,
+    defaults,
+    find_families,
+    group_variants,
+    sentence,
+)
 from tractexp.errors import UserError, among
 
 WIDEST_HELP = 100  # columns
@@ -68,25 +76,45 @@ Values are changed by KEY=VALUE
 
 def usage() -> str:
     options = choices()
-    tasks = {name: re.split("[:;] ", options["task"][name].about)[0] for name in _sort_names("task", options["task"])}
-    groups = {group: _summary(group, options[group]) for group in _order_groups(options) if group not in LATER}
+    tasks = {
+        name: re.split("[:;] ", options["task"][name].about)[0]
+        for name in _sort_names("task", options["task"])
+    }
+    groups = {
+        group: _summary(group, options[group])
+        for group in _order_groups(options)
+        if group not in LATER
+    }
     return TEXT.format(task=defaults()["task"], tasks=_columns(tasks), groups=_columns(groups))
 
 
 def print_choices(arguments: list[str]) -> int:
-    """`tractexp list [GROUP or NAME ...]`: print every name with a sentence on each; returns the exit code.
+    """`tractexp list [GROUP or NAME ...]`: print every name with a sentence on each; returns the
+    exit code.
 
     Of a NAME that has variants these are printed. Raises `UserError` for what is neither.
     """
-    about = "Show what can be chosen: every name of a group with a line on each; without GROUP, of all groups."
+    about = (
+        "Show what can be chosen: every name of a group with a line on each; without GROUP, of all"
+        " groups."
+    )
     parser = argparse.ArgumentParser(prog="tractexp list", description=about)
     parser.add_argument("group", nargs="*", metavar="GROUP")
-    parser.add_argument("-cd", "--config-dir", type=Path, metavar="FOLDER", help="a folder of configurations of yours")
+    parser.add_argument(
+        "-cd",
+        "--config-dir",
+        type=Path,
+        metavar="FOLDER",
+        help="a folder of configurations of yours",
+    )
     given = parser.parse_args(arguments)
     if given.config_dir is not None and not given.config_dir.is_dir():
-        raise UserError(f"tractexp list: there is no folder {given.config_dir}; -cd names one of configurations")
+        raise UserError(
+            f"tractexp list: there is no folder {given.config_dir}; -cd names one of configurations"
+        )
     options = choices([] if given.config_dir is None else [given.config_dir])
-    short = {group.rpartition("/")[2]: group for group in options}  # `static`, as `tractexp new static` has it
+    # `static`, as `tractexp new static` has it
+    short = {group.rpartition("/")[2]: group for group in options}
     names: list[str] = [group.rstrip("/=") for group in given.group]
     chosen = [short.get(name) or name for name in names]
     for name in chosen:
@@ -116,22 +144,33 @@ def _find_group_of_variants(name: str, options: Mapping[str, Mapping[str, Option
 
 
 def _describe_holders(name: str, options: Mapping[str, Mapping[str, Option]]) -> str:
-    """Return the end of a sentence on a name that is no group: the groups that hold it, or all groups."""
-    holders = [f"'tractexp list {group}'" for group in _order_groups(options) if name in options[group]]
+    """Return the end of a sentence on a name that is no group: the groups that hold it, or all
+    groups.
+    """
+    holders = [
+        f"'tractexp list {group}'" for group in _order_groups(options) if name in options[group]
+    ]
     if holders:
         return f", but there is such a name in {' and '.join(holders)}"
     return among(name, options, "Groups")
 
 
-def _import_choices(options: Mapping[str, Mapping[str, Option]]) -> tuple[dict[str, dict[str, Option]], list[str]]:
-    """The choices as they are once every plugin is imported, and why those that fit no group cannot be."""
+def _import_choices(
+    options: Mapping[str, Mapping[str, Option]],
+) -> tuple[dict[str, dict[str, Option]], list[str]]:
+    """The choices as they are once every plugin is imported, and why those that fit no group cannot
+    be.
+    """
     from tractexp.plugin import register_all
 
     classes_of, refused = register_all()
     result = {group: dict(names) for group, names in options.items()}
     for group, classes in classes_of.items():
-        for name, cls in classes.items():  # also those registered by a program, which are in no file
-            result.setdefault(group, {})[name] = Option(name, sentence(cls.__doc__ or ""), cls.__module__)
+        # also those registered by a program, which are in no file
+        for name, cls in classes.items():
+            result.setdefault(group, {})[name] = Option(
+                name, sentence(cls.__doc__ or ""), cls.__module__
+            )
     placed = set()
     for names in result.values():
         for name, choice in names.items():
@@ -164,7 +203,9 @@ def _summary(group: str, names: Mapping[str, Option]) -> str:
     """The names of a group, variants counted beside what they vary; of many, how many."""
     families = find_families({name: names[name] for name in _sort_names(group, names)})
     parts = [
-        f"{base} and {len(members) - 1} variants" if len(members) > FEWEST_VARIANTS else ", ".join(members)
+        f"{base} and {len(members) - 1} variants"
+        if len(members) > FEWEST_VARIANTS
+        else ", ".join(members)
         for base, members in families.items()
     ]
     more = f" and {len(parts) - MOST_HELP_NAMES + 1} others" if len(parts) > MOST_HELP_NAMES else ""
@@ -176,8 +217,13 @@ def _order_groups(options: Mapping[str, object]) -> list[str]:
 
 
 def _sort_names(group: str, names: Collection[str]) -> list[str]:
-    """Names in order, `figure3` before `figure10`, and first of all the one that is chosen by default."""
-    numbered = {name: [(word, int(digits or 0)) for word, digits in re.findall(r"(\D*)(\d*)", name)] for name in names}
+    """Names in order, `figure3` before `figure10`, and first of all the one that is chosen by
+    default.
+    """
+    numbered = {
+        name: [(word, int(digits or 0)) for word, digits in re.findall(r"(\D*)(\d*)", name)]
+        for name in names
+    }
     return sorted(names, key=lambda name: (name != defaults().get(group), numbered[name]))
 
 

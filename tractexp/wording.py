@@ -1,4 +1,6 @@
-"""Numbers as a person reads them: the one format of probabilities and errors on pages and the console."""
+"""Numbers as a person reads them: the one format of probabilities and errors on pages and the
+console.
+"""
 
 import itertools
 import math
@@ -7,16 +9,20 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 
 NEGLIGIBLE = 1e-6  # no model of the noise separates one in ten million from one in a billion
-FEWEST_GROUPED = 3  # alternatives that share a name, or figures: so many are told by what they have in common
+# alternatives that share a name, or figures: so many are told by what they have in common
+FEWEST_GROUPED = 3
 MOST_DIGITS = 7  # after the point: smaller errors are written with powers of ten
 
 
-# what moves a cursor, recolors a terminal or turns the direction of what follows, and halves of characters
+# what moves a cursor, recolors a terminal or turns the direction of what follows, and halves of
+# characters
 UNSEEN = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
 
 
 def escape_text(text: object) -> str:
-    """A text of others, such as a channel's name, for a terminal: its control characters as `\\x1b`, but for lines."""
+    """A text of others, such as a channel's name, for a terminal: its control characters as
+    `\\x1b`, but for lines.
+    """
     return UNSEEN.sub(lambda match: match[0].encode("unicode_escape").decode(), str(text))
 
 
@@ -43,7 +49,9 @@ def with_error(value: float, error: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share of a whole that is itself estimated: what seems more than all of it is all, and less than none, none."""
+    """A share of a whole that is itself estimated: what seems more than all of it is all, and less
+    than none, none.
+    """
     return f"{min(max(share, 0.0), 1.0):.0%}"
 
 
@@ -58,15 +66,18 @@ def join_words(names: Sequence[str], last: str = "and") -> str:
 
 
 def alternatives(sets: Sequence[Sequence[str]]) -> str:
-    """Sets of names as alternatives; many that share a name by that name and what may stand beside it: 'a and b or c',
-    'a beside one more effect (b, c or d)'."""
+    """Sets of names as alternatives; many that share a name by that name and what may stand beside
+    it: 'a and b or c', 'a beside one more effect (b, c or d)'.
+    """
     if not sets:
         return ""
     common = Counter(itertools.chain(*sets)).most_common(1)[0][0]
     sharing = [names for names in sets if common in names and len(names) > 1]
     if len(sharing) < FEWEST_GROUPED:
         return join_words([join_words(names) for names in sets], "or")
-    beside = join_words([join_words([name for name in names if name != common]) for names in sharing], "or")
+    beside = join_words(
+        [join_words([name for name in names if name != common]) for names in sharing], "or"
+    )
     others = [join_words(names) for names in sets if names not in sharing]
     return join_words([f"{common} beside one more effect ({beside})", *others], "or")
 
@@ -79,7 +90,9 @@ def list_figures(values: Sequence[float], shown: Callable[[float], str]) -> str:
 
 
 def as_sentence(text: str) -> str:
-    """A clause as a sentence of its own: with a capital, unless it begins with a parameter's name, and a full stop."""
+    """A clause as a sentence of its own: with a capital, unless it begins with a parameter's name,
+    and a full stop.
+    """
     return f"{text if '_' in text.split(' ')[0] else text[:1].upper() + text[1:]}."
 
 
@@ -115,4 +128,7 @@ def degrees(value: float | None) -> str:
 
 def shown_in_words(shown: Mapping[str, str]) -> str:
     """Which effects are in a model because the records show them, in a sentence."""
-    return f"in the model because the record shows it: {'; '.join(f'{name} ({how})' for name, how in shown.items())}"
+    return (
+        "in the model because the record shows it:"
+        f" {'; '.join(f'{name} ({how})' for name, how in shown.items())}"
+    )

@@ -1,10 +1,11 @@
 """Worker processes for many calls, by `joblib.Parallel` with any of its backends.
 
-Three things joblib cannot do by its public calls. With one worker it runs calls in this process, which a call that
-kills its worker takes along; so one that is to be apart is two, which get one call at a time.
-Where a worker is killed, `Parallel` ends and does not say whose worker it was; so what was in work is called again,
-each in a `Parallel` of its own, and only a call that kills a worker by itself is to blame. A loky worker outlives a
-parent that is killed; so a thread of it watches the parent.
+Three things joblib cannot do by its public calls. With one worker it runs calls in this process,
+which a call that kills its worker takes along; so one that is to be apart is two, which get one
+call at a time. Where a worker is killed, `Parallel` ends and does not say whose worker it was; so
+what was in work is called again, each in a `Parallel` of its own, and only a call that kills a
+worker by itself is to blame. A loky worker outlives a parent that is killed; so a thread of it
+watches the parent.
 """
 
 import contextlib
@@ -29,7 +30,9 @@ Item = TypeVar("Item")
 
 
 def backends() -> list[str]:
-    """The names of joblib's backends, and of those that a package or plugin has registered with it."""
+    """The names of joblib's backends, and of those that a package or plugin has
+    registered with it.
+    """
     from joblib.parallel import BACKENDS
 
     return sorted({*BACKENDS, "dask"})
@@ -37,11 +40,12 @@ def backends() -> list[str]:
 
 @dataclass(frozen=True)
 class Workers:
-    """Workers of a joblib backend: "loky" (processes of this computer), "dask", "threading" or a registered one.
+    """Workers of a joblib backend: "loky" (processes of this computer), "dask", "threading" or a
+    registered one.
 
-    `n_jobs` -1: one for each core this process may use, containers' limits considered, or all of a cluster. `address`
-    is that of a Dask scheduler; without one, "dask" starts a cluster here. One worker is this process, unless it is to
-    be `apart`.
+    `n_jobs` -1: one for each core this process may use, containers' limits considered, or all of a
+    cluster. `address` is that of a Dask scheduler; without one, "dask" starts a cluster here. One
+    worker is this process, unless it is to be `apart`.
     """
 
     n_jobs: int = -1
@@ -54,16 +58,21 @@ class Workers:
     ) -> Iterator[tuple[int, Any]]:
         """(position, result) of the `count` items, as they are done.
 
-        Raises `BrokenExecutor` where a worker is killed; a killed worker of a Dask cluster leaves its item out.
+        Raises `BrokenExecutor` where a worker is killed; a killed worker of a Dask cluster leaves
+        its item out.
         """
         from joblib import Parallel, delayed, effective_n_jobs
 
         with self._chosen(), _quiet():
             n = min(self.n_jobs if self.n_jobs > 0 else effective_n_jobs(self.n_jobs), count)
-            dispatch: Any = {"batch_size": 1, "pre_dispatch": n}  # numbers, other than joblib's annotations say
-            parallel: Any = Parallel(max(n, 1 + self.apart), return_as="generator_unordered", **dispatch)
+            # numbers, other than joblib's annotations say
+            dispatch: Any = {"batch_size": 1, "pre_dispatch": n}
+            parallel: Any = Parallel(
+                max(n, 1 + self.apart), return_as="generator_unordered", **dispatch
+            )
             calls = (delayed(_number_result)(function, k, item) for k, item in enumerate(items))
-            # One at a time where one is at work: joblib drops a result that waits when the next call kills its worker.
+            # One at a time where one is at work: joblib drops a result that waits when the next
+            # call kills its worker.
             for batch in ([call] for call in calls) if n == 1 else [calls]:
                 results = parallel(batch)
                 with contextlib.closing(results):
@@ -76,14 +85,17 @@ class Workers:
         tries: int = 2,
         trace: Callable[[Item], Any] = lambda item: True,
     ) -> Generator[tuple[Item, Any], None, None]:
-        """(item, result) as they are done; None for an item whose worker was killed each of the `tries` times.
+        """(item, result) as they are done; None for an item whose worker was killed each of the
+        `tries` times.
 
-        `trace` tells what an item has left that was in work when a worker was killed: False where it had not begun,
-        True where it had, or its result. Raises `UserError` where workers are killed before they begin.
+        `trace` tells what an item has left that was in work when a worker was killed: False where
+        it had not begun, True where it had, or its result. Raises `UserError` where workers are
+        killed before they begin.
         """
         suspects = yield from self._side_by_side(function, items, trace)
         alone = replace(self, n_jobs=1, apart=True)
-        for item in suspects:  # each alone, since joblib takes items ahead of those that are in work
+        # each alone, since joblib takes items ahead of those that are in work
+        for item in suspects:
             remaining = [item]
             for _ in range(tries - 1):
                 remaining = yield from alone._side_by_side(function, remaining, trace)
@@ -98,7 +110,9 @@ class Workers:
             barren += 1
             keys, working = list(remaining), set[int]()
             with contextlib.suppress(BrokenExecutor):
-                for k, result in self.completed(function, _note_items(remaining, keys, working), len(keys)):
+                for k, result in self.completed(
+                    function, _note_items(remaining, keys, working), len(keys)
+                ):
                     working.discard(k)
                     barren = 0
                     yield remaining.pop(keys[k]), result
@@ -112,7 +126,10 @@ class Workers:
                 else:
                     yield item, state
             if barren == BARREN:
-                raise UserError("worker processes are killed before they begin: is there enough memory for them?")
+                raise UserError(
+                    "worker processes are killed before they begin: is there enough memory for"
+                    " them?"
+                )
         return suspects
 
     @contextlib.contextmanager
@@ -125,7 +142,11 @@ class Workers:
             if self.backend == "dask":
                 from tractexp.compat.joblib_dask import Dask
 
-                chosen = {"backend": Dask(client=stack.enter_context(dask_client(self.n_jobs, self.address)))}
+                chosen = {
+                    "backend": Dask(
+                        client=stack.enter_context(dask_client(self.n_jobs, self.address))
+                    )
+                }
             elif self.backend == "loky":
                 chosen = {"backend": "loky", "inner_max_num_threads": 1, "initializer": _begin}
             else:
@@ -138,7 +159,9 @@ def _number_result(function: Callable[[Any], Any], k: int, item: Any) -> tuple[i
     return k, function(item)
 
 
-def _note_items(remaining: dict[int, Item], keys: Sequence[int], working: set[int]) -> Iterator[Item]:
+def _note_items(
+    remaining: dict[int, Item], keys: Sequence[int], working: set[int]
+) -> Iterator[Item]:
     """The items by their keys; the position of one that is taken is in work from then on."""
     for k, key in enumerate(keys):
         working.add(k)
@@ -149,18 +172,23 @@ def _note_items(remaining: dict[int, Item], keys: Sequence[int], working: set[in
 def _quiet() -> Iterator[None]:
     """Without two warnings of joblib's.
 
-    A worker that has grown by 300 MB ends between two calls, and another takes its place. Joblib warns of it in the
-    thread that minds the workers: where warnings are errors that thread ends, and the calls never do. The other one
-    says that results are not used where this process is ended.
+    A worker that has grown by 300 MB ends between two calls, and another takes its place. Joblib
+    warns of it in the thread that minds the workers: where warnings are errors that thread ends,
+    and the calls never do. The other one says that results are not used where this process is
+    ended.
     """
     with warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "A worker stopped while some jobs were given", UserWarning)
+        warnings.filterwarnings(
+            "ignore", "A worker stopped while some jobs were given", UserWarning
+        )
         warnings.filterwarnings("ignore", ".*tasks (have been|which were still)", UserWarning)
         yield
 
 
 def _begin() -> None:
-    """Leave Ctrl-C, which reaches the whole group, to the parent, and end with it, even where it is killed."""
+    """Leave Ctrl-C, which reaches the whole group, to the parent, and end with it, even where it is
+    killed.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     end_with_parent()
 
@@ -175,7 +203,8 @@ def end_with_parent() -> None:
 def _end_with(parent: Any) -> None:
     if os.name == "nt":
         parent.join()
-    while os.name != "nt" and os.getppid() == parent.pid:  # elsewhere loky hands down nothing to wait for
+    # elsewhere loky hands down nothing to wait for
+    while os.name != "nt" and os.getppid() == parent.pid:
         time.sleep(WATCH)
     os._exit(1)
 
@@ -191,23 +220,31 @@ def dask_client(n_jobs: int, address: str | None) -> Iterator[Any]:
         from distributed import Client, LocalCluster
     except ImportError:
         raise UserError(
-            "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
+            "hydra.launcher.backend=dask needs Dask, which is not installed: pip install"
+            " 'tractexp[dask]'"
         ) from None
     import logging
 
     from joblib import cpu_count
 
-    loud = logging.getLogger("distributed")  # its remarks on every worker that comes or goes would tear the bar
+    # its remarks on every worker that comes or goes would tear the bar
+    loud = logging.getLogger("distributed")
     loud.propagate, loud.handlers = False, [logging.NullHandler()]
     with contextlib.ExitStack() as stack:
-        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))  # we count ourselves
+        # we count ourselves
+        stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
         if address is None:
-            local: Any = LocalCluster  # its annotations know neither a cluster without a dashboard nor its address
+            # its annotations know neither a cluster without a dashboard nor its address
+            local: Any = LocalCluster
             n = n_jobs if n_jobs > 0 else cpu_count()
-            cluster = local(n_workers=n, threads_per_worker=1, dashboard_address=None, silence_logs=50)
+            cluster = local(
+                n_workers=n, threads_per_worker=1, dashboard_address=None, silence_logs=50
+            )
             address = stack.enter_context(cluster).scheduler_address
         try:
             client = stack.enter_context(Client(address, timeout="10s"))
         except (OSError, ValueError) as error:
-            raise UserError(f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})") from error
+            raise UserError(
+                f"hydra.launcher.address={address}: no Dask scheduler answers there ({error})"
+            ) from error
         yield client

@@ -1,4 +1,6 @@
-"""The catalogues: a page for each group of plugins, generated from the plugins that are installed."""
+"""The catalogues: a page for each group of plugins, generated from the plugins that
+are installed.
+"""
 
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -37,7 +39,10 @@ def _page(group: str, folder: Path) -> Path:
     title, how = GROUPS[group]
     classes = [cls for _, cls in sorted(discover()[group].items())]
     chosen = f"`{defaults()[group]}` is chosen by default." if defaults().get(group) else ""
-    items = [f"- [`{cls.name}`](#{_anchor(cls)}): {plain(sentence(cls.__doc__ or ''))}" for cls in classes]
+    items = [
+        f"- [`{cls.name}`](#{_anchor(cls)}): {plain(sentence(cls.__doc__ or ''))}"
+        for cls in classes
+    ]
     head = "\n\n".join([f"# {title}", f"Chosen by `{how}`. {chosen}", "\n".join(items)])
     sections = [_section(cls, folder) for cls in classes]
     path = folder / f"{title.lower().replace(' ', '-')}.md"
@@ -63,12 +68,23 @@ def _picture(cls: type[Part], folder: Path) -> str:
     path.parent.mkdir(parents=True, exist_ok=True)
     caption = pictures.draw(cls, path)
     return (
-        f"```{{figure}} pictures/{path.name}\n:alt: what {cls.name} does in a dip\n\n{caption}\n```" if caption else ""
+        f"```{{figure}} pictures/{path.name}\n:alt: what {cls.name} does in a dip\n\n{caption}\n```"
+        if caption
+        else ""
     )
 
 
 def _facts(cls: type[Part]) -> str:
-    rows = [["domains", "waveforms" if cls.waves_only else "phasors" if cls.phasors_only else "phasors, waveforms"]]
+    rows = [
+        [
+            "domains",
+            "waveforms"
+            if cls.waves_only
+            else "phasors"
+            if cls.phasors_only
+            else "phasors, waveforms",
+        ]
+    ]
     if why := cls.waves_only or cls.phasors_only:
         rows.append(["of no other, for", plain(why)])
     if cls.reads:
@@ -78,7 +94,12 @@ def _facts(cls: type[Part]) -> str:
         alike = [discover()["effect"][name] for name in cls.confused_with]
         rows += [["looks like", _links(alike)]] * bool(alike)
         if cls.family:
-            rows.append(["of the family of", f"{_links([discover()['effect'][cls.family]])}; {plain(cls.differs)}"])
+            rows.append(
+                [
+                    "of the family of",
+                    f"{_links([discover()['effect'][cls.family]])}; {plain(cls.differs)}",
+                ]
+            )
     return table(["", ""], rows)
 
 
@@ -97,7 +118,9 @@ def _parameters(cls: type[Part]) -> str:
     }
     if issubclass(cls, Effect):
         columns["null"] = lambda p: "" if p.null is None else f"{p.null:g}"
-        columns["matters from"] = lambda p: f"{cls.relevant[p.name]:g}" if p.name in cls.relevant else ""
+        columns["matters from"] = lambda p: (
+            f"{cls.relevant[p.name]:g}" if p.name in cls.relevant else ""
+        )
         columns["looked for at"] = lambda p: ", ".join(f"{v:g}" for v in cls.grid.get(p.name, ()))
     if len(sources := {p.source for p in cls.parameters}) > 1:
         columns["source"] = lambda p: plain(p.source)
@@ -111,13 +134,24 @@ def _equations(cls: type[Part]) -> str:
     """The equations of a motor by itself; of any other part those that it changes or brings in."""
     base, of = pictures.pair(cls)
     if issubclass(cls, Motor):
-        edits = [(None, line) for line in motor_alone(cls()).latex()] if not cls.waves_only else list_changed_lines([], of.latex())
+        edits = (
+            [(None, line) for line in motor_alone(cls()).latex()]
+            if not cls.waves_only
+            else list_changed_lines([], of.latex())
+        )
     elif issubclass(cls, Effect):
         edits = list_changed_lines(base.latex(), of.latex())
     else:
-        edits = [(was, line) for was, line in list_changed_lines(motor_alone(of.motor).latex(), of.latex()) if was is None]
+        edits = [
+            (was, line)
+            for was, line in list_changed_lines(motor_alone(of.motor).latex(), of.latex())
+            if was is None
+        ]
     if not edits:
         return ""
-    lines = [line if was is None else rf"{line} \quad \text{{instead of}} \quad {was}" for was, line in edits]
+    lines = [
+        line if was is None else rf"{line} \quad \text{{instead of}} \quad {was}"
+        for was, line in edits
+    ]
     summary = "Equations" if not issubclass(cls, Effect) else "Equations that changed or came in"
     return folded(summary, "\n\n".join(f"$$\n{line}\n$$" for line in lines))

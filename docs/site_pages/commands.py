@@ -1,4 +1,6 @@
-"""The commands that the pages show: those of their blocks of code, one a line, with where they stand."""
+"""The commands that the pages show: those of their blocks of code, one a line, with where they
+stand.
+"""
 
 import re
 import shlex
@@ -29,7 +31,9 @@ class Command:
 
 
 def of(page: Path) -> Iterator[Command]:
-    """The commands of a page: lines of fenced blocks without a language or of a shell, and of indented blocks."""
+    """The commands of a page: lines of fenced blocks without a language or of a shell, and of
+    indented blocks.
+    """
     for heading, line in _lines(page):
         if runs(line):
             yield Command(page, heading, line)
@@ -37,7 +41,9 @@ def of(page: Path) -> Iterator[Command]:
 
 def inline(page: Path) -> Iterator[Command]:
     """The commands within the text of a page."""
-    text = re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(
+        r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE
+    )
     for line in re.findall(r"`([^`]+)`", text):
         if runs(line) and " " in line:
             yield Command(page, "", " ".join(line.split()))

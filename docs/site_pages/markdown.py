@@ -31,7 +31,9 @@ def folded(summary: str, inside: str) -> str:
 
 
 def docstring(what: Any) -> str:
-    """The docstring of a class or a call: paragraphs, indented lines, and `Source:` and `Departures:` marked."""
+    """The docstring of a class or a call: paragraphs, indented lines, and `Source:` and
+    `Departures:` marked.
+    """
     blocks = re.split(r"\n\s*\n", inspect.cleandoc(what.__doc__ or ""))
     return "\n\n".join(filter(None, map(_block, blocks)))
 
@@ -41,7 +43,9 @@ def _block(block: str) -> str:
         return f"```text\n{textwrap.dedent(block).rstrip()}\n```"
     marked = re.split(r"(?m)^(Source|Departures): ", block)
     parts = [plain(marked[0])] if marked[0].strip() else []
-    parts += [f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)]
+    parts += [
+        f"**{word}:** {plain(text)}" for word, text in zip(marked[1::2], marked[2::2], strict=True)
+    ]
     return "\n\n".join(parts)
 
 
@@ -64,7 +68,9 @@ def _default(item: dataclasses.Field) -> str:
 
 
 def _comments(cls: type) -> Iterator[tuple[str, str]]:
-    """(setting, comment): of the arguments of a task's call, then of the class, those of its bases first."""
+    """(setting, comment): of the arguments of a task's call, then of the class, those of its bases
+    first.
+    """
     if call := getattr(cls, "function", None):
         lines, node = _parsed(call)
         for item in (*node.args.args, *node.args.kwonlyargs):

@@ -1,4 +1,6 @@
-"""Equations as MathML, converted when the site is built: browsers set it, offline and without a script."""
+"""Equations as MathML, converted when the site is built: browsers set it, offline and without a
+script.
+"""
 
 import re
 from typing import Any

@@ -33,7 +33,8 @@ def usual() -> Model:
 
 @functools.cache
 def pair(cls: type[Part]) -> tuple[Model, Model]:
-    """The load without a part and with it: the usual model and the part in it, or a load that takes it.
+    """The load without a part and with it: the usual model and the part in it, or a load that takes
+    it.
 
     A motor or a static load takes the place of the usual one.
     """
@@ -53,11 +54,15 @@ def pair(cls: type[Part]) -> tuple[Model, Model]:
 def values(of: Model) -> dict[str, float]:
     """Every parameter at its default, the sizes of an effect clearly beyond what matters."""
     own = {p.name for effect in of.effects for p in effect.parameters}
-    return {p.name: loads.choose_active_size(p) if p.name in own else p.default for p in of.parameters}
+    return {
+        p.name: loads.choose_active_size(p) if p.name in own else p.default for p in of.parameters
+    }
 
 
 def played(of: Model, drive: Drive) -> np.ndarray | None:
-    """P and Q (2, N), or currents (3, N); None where the load has no steady state before the dip."""
+    """P and Q (2, N), or currents (3, N); None where the load has no steady state
+    before the dip.
+    """
     try:
         return loads.play(of, drive, np.array([*values(of).values()]))[:, 0]
     except AssertionError:
@@ -65,7 +70,9 @@ def played(of: Model, drive: Drive) -> np.ndarray | None:
 
 
 def draw(cls: type[Part], path: Path) -> str:
-    """Draw what a part does in a dip and return the caption, in Markdown; "" where nothing can be drawn."""
+    """Draw what a part does in a dip and return the caption, in Markdown; "" where nothing can be
+    drawn.
+    """
     base, of = pair(cls)
     drive = drives.drive(DEPTH, domain=of.domain)
     beside = None if base.title == of.title or base.domain != of.domain else played(base, drive)
@@ -76,12 +83,18 @@ def draw(cls: type[Part], path: Path) -> str:
     return _caption(of, base if beside is not None else None)
 
 
-def _save(drive: Drive, beside: np.ndarray | None, power: np.ndarray, panels: tuple, path: Path) -> None:
+def _save(
+    drive: Drive, beside: np.ndarray | None, power: np.ndarray, panels: tuple, path: Path
+) -> None:
     from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     known = [power] if beside is None else [power, beside]
-    drawn = [k for k, p in enumerate(power) if k < 2 or max(np.abs(each[k]).max() for each in known) > 1e-6]
+    drawn = [
+        k
+        for k, p in enumerate(power)
+        if k < 2 or max(np.abs(each[k]).max() for each in known) > 1e-6
+    ]
     t = drive.inputs[INPUTS.index("t")]
     with rc_context(style.SETTINGS):
         figure = Figure(figsize=(WIDTH, 0.5 + HEIGHT * len(drawn)), layout="constrained")
@@ -96,7 +109,11 @@ def _save(drive: Drive, beside: np.ndarray | None, power: np.ndarray, panels: tu
 
 
 def _caption(of: Model, base: Model | None) -> str:
-    how = "50 ms, unbalanced and with a jump of the angle" if of.domain == WAVES else "0.15 s, while frequency sags"
+    how = (
+        "50 ms, unbalanced and with a jump of the angle"
+        if of.domain == WAVES
+        else "0.15 s, while frequency sags"
+    )
     grey = f"Grey: {_titled(base)}. Color: " if base else ""
     own = {p.name for effect in of.effects for p in effect.parameters if p.null is not None}
     sizes = _joined({name: value for name, value in values(of).items() if name in own})

@@ -18,14 +18,20 @@ SUBCOMMANDS = ("look", "again", "list", "new", "ui", "sync", "doctor")  # which 
 
 def write(folder: Path) -> list[Path]:
     """Write the pages and one that lists them, and return their paths."""
-    shown = [c for page in sorted(DOCS.glob("*.md")) for c in commands.of(page) if c.arguments is not None]
+    shown = [
+        c
+        for page in sorted(DOCS.glob("*.md"))
+        for c in commands.of(page)
+        if c.arguments is not None
+    ]
     tasks = sorted(discover()["task"].items())
     pages = [files.write(folder / f"{name}.md", _page(cls, shown)) for name, cls in tasks]
     rows = [[f"[`{name}`]({name}.md)", plain(sentence(cls.__doc__ or ""))] for name, cls in tasks]
     toctree = "```{toctree}\n:hidden:\n\n" + "\n".join(name for name, _ in tasks) + "\n```\n"
     intro = f"Chosen by `task=NAME`; `{defaults()['task']}` where none is named.\n"
     listed = files.write(
-        folder / "index.md", "\n".join(["# Tasks\n", intro, table(["task", "what it does"], rows), toctree])
+        folder / "index.md",
+        "\n".join(["# Tasks\n", intro, table(["task", "what it does"], rows), toctree]),
     )
     return [listed, *pages]
 
@@ -35,8 +41,12 @@ def _page(cls: type[Task], shown: Iterable[Command]) -> str:
     if rows := markdown.settings(cls):
         rows = [[f"`task.{name[1:]}", *rest] for name, *rest in rows]
         parts += ["## Settings", table(["setting", "default", "meaning"], rows)]
-    if cls.function is not None:  # settings without a comment of their own are arguments of the call
-        parts += [f"## The call `tractexp.{cls.function.__name__}`", markdown.docstring(cls.function)]
+    # settings without a comment of their own are arguments of the call
+    if cls.function is not None:
+        parts += [
+            f"## The call `tractexp.{cls.function.__name__}`",
+            markdown.docstring(cls.function),
+        ]
     used = {(c.page, c.heading): c for c in shown if _task(c) == cls.name}  # the last of a section
     if used:
         parts += ["## Shown in", "\n\n".join(map(_example, [*used.values()][:MOST]))]
@@ -46,14 +56,18 @@ def _page(cls: type[Task], shown: Iterable[Command]) -> str:
 def _task(command: Command) -> str:
     """The task of a command; "" where it is none."""
     arguments = command.arguments or []
-    if arguments[:1] in ([word] for word in SUBCOMMANDS) or not any("=" in word for word in arguments):
+    if arguments[:1] in ([word] for word in SUBCOMMANDS) or not any(
+        "=" in word for word in arguments
+    ):
         return ""
     named = [word.partition("=")[2] for word in arguments if word.startswith("task=")]
     return named[0] if named else defaults()["task"] * ("experiment=" not in " ".join(arguments))
 
 
 def _example(command: Command) -> str:
-    anchor = "-".join("".join(c for c in command.heading.lower() if c.isalnum() or c in " -_").split())
+    anchor = "-".join(
+        "".join(c for c in command.heading.lower() if c.isalnum() or c in " -_").split()
+    )
     title = command.page.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
     label = title if title == command.heading else f"{title}: {command.heading}"
     where = f"[{plain(label)}](../../{command.page.name}#{anchor})"

@@ -1,4 +1,6 @@
-"""Transformers that make two voltages a quarter cycle apart from three phases, and balanced currents of equal arms."""
+"""Transformers that make two voltages a quarter cycle apart from three phases, and balanced
+currents of equal arms.
+"""
 
 from dataclasses import dataclass
 
@@ -12,7 +14,9 @@ from ._phases import PAIRS, PHASES, line
 
 @dataclass(frozen=True, kw_only=True)
 class _Balanced(_Arms):
-    """Arm alpha across a pair of phases, beta on the third phase; equal arms leave no negative sequence."""
+    """Arm alpha across a pair of phases, beta on the third phase; equal arms leave no negative
+    sequence.
+    """
 
     pair: str = "bc"  # of phases, that arm alpha lies across
 

@@ -19,7 +19,9 @@ def line(pair: str) -> np.ndarray:
 
 
 def check_pairs(pairs: Sequence[str], count: int, such: str) -> None:
-    """Raise `UserError` for what are not so many pairs of phases, `such` as these, or two of the same phases."""
+    """Raise `UserError` for what are not so many pairs of phases, `such` as these, or two of the
+    same phases.
+    """
     where = "data.connection.pairs"
     if len(pairs) != count:
         what = {2: "two", 3: "three"}[count]
@@ -27,15 +29,21 @@ def check_pairs(pairs: Sequence[str], count: int, such: str) -> None:
     for pair in pairs:
         check_choice(where, pair, PAIRS)
     if len({frozenset(pair) for pair in pairs}) < len(pairs):
-        raise UserError(f"{where}={[*pairs]} names a pair of phases twice; give different ones, e.g. [ab, bc]")
+        raise UserError(
+            f"{where}={[*pairs]} names a pair of phases twice; give different ones, e.g. [ab, bc]"
+        )
 
 
 def from_lines(pairs: Sequence[str]) -> np.ndarray:
-    """(3, pairs): the phase voltages of no zero sequence that these line voltages are differences of."""
+    """(3, pairs): the phase voltages of no zero sequence that these line voltages are differences
+    of.
+    """
     inverse = np.linalg.pinv(np.array([line(pair) for pair in pairs]))
     return np.where(np.abs(inverse) < 1e-12, 0.0, inverse)
 
 
 def from_two(phases: str) -> np.ndarray:
     """(3, 2): three currents of no zero sequence from those of two phases."""
-    return np.array([[float(p == phase) if phase in phases else -1.0 for p in phases] for phase in PHASES])
+    return np.array(
+        [[float(p == phase) if phase in phases else -1.0 for p in phases] for phase in PHASES]
+    )

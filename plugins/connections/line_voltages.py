@@ -15,8 +15,8 @@ class LineVoltages(Connection):
 
         V_a = (V_ab - V_ca) / 3, and so on round
 
-    Their zero sequence is not recorded and taken as absent; it carries no power into a load without neutral, and the
-    positive and negative sequence do not depend on it.
+    Their zero sequence is not recorded and taken as absent; it carries no power into a load without
+    neutral, and the positive and negative sequence do not depend on it.
 
     Source: IEEE 1459-2010, 3.2.2 (three-wire systems).
     """
@@ -24,7 +24,8 @@ class LineVoltages(Connection):
     lines = True
     usual = {(3, 3, True): {}}
 
-    pairs: list[str] = field(default_factory=lambda: ["ab", "bc", "ca"])  # of phases, in the order of data.voltages
+    # of phases, in the order of data.voltages
+    pairs: list[str] = field(default_factory=lambda: ["ab", "bc", "ca"])
 
     def check(self) -> None:
         check_pairs(self.pairs, 3, "e.g. [ab, bc, ca]")

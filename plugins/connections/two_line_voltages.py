@@ -11,12 +11,14 @@ from ._phases import TWO, check_pairs, from_lines, from_two
 
 @plugin
 class TwoLineVoltages(Connection):
-    """Two line voltages, as two voltage transformers in V (open delta) give them, and the phase currents.
+    """Two line voltages, as two voltage transformers in V (open delta) give them, and the phase
+    currents.
 
         V_a = (2 V_ab + V_bc) / 3, V_b = (V_bc - V_ab) / 3, V_c = -(V_ab + 2 V_bc) / 3
 
-    A zero sequence of voltage is not seen and taken as absent. With `phases` of two letters two currents are taken,
-    and the third is minus their sum: a zero sequence of current is then taken as absent as well.
+    A zero sequence of voltage is not seen and taken as absent. With `phases` of two letters two
+    currents are taken, and the third is minus their sum: a zero sequence of current is then taken
+    as absent as well.
 
     Source: IEEE 1459-2010, 3.2.2 (three-wire systems); Blondel's theorem.
     """
@@ -24,8 +26,10 @@ class TwoLineVoltages(Connection):
     lines = True
     usual = {(2, 3, True): {}, (2, 2, True): {"phases": "ac"}}
 
-    pairs: list[str] = field(default_factory=lambda: ["ab", "bc"])  # of phases, in the order of data.voltages
-    phases: str = "abc"  # in the order of data.currents; two letters, e.g. ac, where there are two current transformers
+    # of phases, in the order of data.voltages
+    pairs: list[str] = field(default_factory=lambda: ["ab", "bc"])
+    # in the order of data.currents; two letters, e.g. ac, where there are two current transformers
+    phases: str = "abc"
 
     def check(self) -> None:
         check_pairs(self.pairs, 2, "e.g. [ab, bc]")

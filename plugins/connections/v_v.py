@@ -17,10 +17,11 @@ class VV(_Arms):
         U_alpha = (V_a - V_b) / ratio, U_beta = (V_b - V_c) / ratio
         I_alpha = ratio I_a, I_beta = -ratio I_c
 
-    `pairs` says which pair feeds which arm, and with which sign. Equal arms leave a negative sequence of half the
-    positive one.
+    `pairs` says which pair feeds which arm, and with which sign. Equal arms leave a negative
+    sequence of half the positive one.
 
-    Source: Chen and Guo 1996, Three phase models of specially connected transformers, IEEE Trans. Power Delivery 11(1).
+    Source: Chen and Guo 1996, Three phase models of specially connected transformers, IEEE Trans.
+    Power Delivery 11(1).
     """
 
     pairs: list[str] = field(default_factory=lambda: ["ab", "bc"])  # that feed alpha and beta

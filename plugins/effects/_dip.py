@@ -4,12 +4,15 @@ from tractexp.extend import sites
 
 from ._operators import gate, ramp
 
-LEVEL, BEGUN = 0.0015, 0.96  # how sharp a level is, and the voltage over U_0 below which a dip has begun
+# how sharp a level is, and the voltage over U_0 below which a dip has begun
+LEVEL, BEGUN = 0.0015, 0.96
 WIDTH = 0.02  # of a change: how rounded its corners are
 
 
 def since(eq, returned, name):
-    """Time [s] since the dip began, or since the voltage had `returned` from its lowest by more than half; 0 before."""
+    """Time [s] since the dip began, or since the voltage had `returned` from its lowest by more
+    than half; 0 before.
+    """
     import sympy
 
     u = eq.U / eq.U0
@@ -22,7 +25,8 @@ def since(eq, returned, name):
 
 
 def changes(eq, returned, name, more_P, more_Q, wait, duration, static):
-    """Let P and Q change by shares of themselves within `duration` [s], `wait` [s] after the time of `since`.
+    """Let P and Q change by shares of themselves within `duration` [s], `wait` [s] after the time
+    of `since`.
 
     Where `static` is 1 all but the motors change.
     """

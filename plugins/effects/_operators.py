@@ -1,4 +1,6 @@
-"""Shapes that several effects share: limits with a rounded corner, so that derivatives exist everywhere."""
+"""Shapes that several effects share: limits with a rounded corner, so that derivatives exist
+everywhere.
+"""
 
 
 def smaller(a, b, width):
@@ -26,12 +28,15 @@ def gate(x, width):
 
 
 def seen_late(eq, u, time):
-    """u as a control sees it through a fast filter: where it was `time` ago, to first order in `time`."""
+    """u as a control sees it through a fast filter: where it was `time` ago, to first order in
+    `time`.
+    """
     return u * (1 - time * eq.U_rate / eq.U)
 
 
 def bent(x, knots, bends, width):
-    """x, but with the slope exp(bend) beyond each knot and rounded there: monotone, and x itself without bends.
+    """x, but with the slope exp(bend) beyond each knot and rounded there: monotone, and x itself
+    without bends.
 
     0 at x = 0. `knots` ascend and are positive.
     """

@@ -1,4 +1,6 @@
-"""What happens in each phase by itself, written with the space vector and the zero sequence of three phases."""
+"""What happens in each phase by itself, written with the space vector and the zero sequence of
+three phases.
+"""
 
 
 def phases_of(eq, vector, zero):
@@ -22,12 +24,15 @@ def beyond(x, knee):
 
 
 def detect_departure(eq, level):
-    """1 in a moment at which the voltage is off by more than `level` of that before the event, else 0."""
+    """1 in a moment at which the voltage is off by more than `level` of that before the event, else
+    0.
+    """
     import sympy
 
     off = eq.recorded_voltage - eq.U0
     square = sum(part**2 for part in eq.parts(off))
-    return sympy.Min(1, sympy.Max(0, 10 * (square / (level * eq.U0) ** 2 - 1)))  # all of it 5 % farther
+    # all of it 5 % farther
+    return sympy.Min(1, sympy.Max(0, 10 * (square / (level * eq.U0) ** 2 - 1)))
 
 
 def _rotate_phase(k):

@@ -1,4 +1,6 @@
-"""What a recorder does to P and Q, compiled: every candidate passes through it, as often as it is simulated."""
+"""What a recorder does to P and Q, compiled: every candidate passes through it, as often as it is
+simulated.
+"""
 
 import numpy as np
 
@@ -10,8 +12,8 @@ STEP = EVENT.index("step")
 def earlier(power, drive, delay):
     """Make of power (C, n, N) what it was `delay` (E, n) [s] earlier.
 
-    Between samples it is the cubic of Catmull and Rom (1974); beyond the ends of an event it goes on by one step of its
-    slope, and stays there.
+    Between samples it is the cubic of Catmull and Rom (1974); beyond the ends of an event it goes
+    on by one step of its slope, and stays there.
     """
     whole, part = _steps(delay / drive.event[:, [STEP]])
     _change(CUBIC, power, drive, {"shift": -whole}, {"r": part})
@@ -26,25 +28,33 @@ def _cubic(y, r):
 def delay_response(power, drive, delay, quiet):
     """Make of power (C, n, N) what the voltage U, `delay` (E, n) [s] earlier, draws.
 
-    Between samples U is the cubic of its slopes, as the equations have it, and the current y/U follows it: by so much
-    as both changed over the interval where that is more than `quiet`, of the voltage before, by a straight line else.
-    What bends besides is a parabola of the weaker of the two bends beside the interval, so that no corner is smoothed.
-    What lies beyond the first and last sample of an event is as there.
+    Between samples U is the cubic of its slopes, as the equations have it, and the current y/U
+    follows it: by so much as both changed over the interval where that is more than `quiet`, of the
+    voltage before, by a straight line else. What bends besides is a parabola of the weaker of the
+    two bends beside the interval, so that no corner is smoothed. What lies beyond the first and
+    last sample of an event is as there.
     """
     whole, part = _steps(delay / drive.event[:, [STEP]])
     of_sample = np.repeat(np.arange(drive.events), np.diff(drive.first))  # its event
     U, step = drive.inputs[INPUTS.index("U")], drive.event[of_sample, STEP]
     rise = np.diff(U, prepend=U[0])
     follow = rise / (rise**2 + (quiet * drive.event[of_sample, EVENT.index("U0")]) ** 2)
-    shared = {"U": U, "each": 1 / U, "slope": drive.inputs[INPUTS.index("U_rate")] * step, "follow": follow}
+    shared = {
+        "U": U,
+        "each": 1 / U,
+        "slope": drive.inputs[INPUTS.index("U_rate")] * step,
+        "follow": follow,
+    }
     shared["place"] = np.arange(len(U), dtype=float)
     _change(CURRENT, power, drive, {"shift": -whole}, {"r": 1 - part}, **shared)
 
 
 def _current(y, U, each, slope, follow, place, r):
-    """Power by the fraction r from the sample before last to the last of three, and one after; U is moved as well.
+    """Power by the fraction r from the sample before last to the last of three, and one after; U is
+    moved as well.
 
-    `follow` is of the interval that ends at a sample. The place of a sample rises by 1 within an event only.
+    `follow` is of the interval that ends at a sample. The place of a sample rises by 1 within an
+    event only.
     """
     from sympy import Abs, Piecewise
 
@@ -60,9 +70,13 @@ def _current(y, U, each, slope, follow, place, r):
 
 
 def add_drift(power, drive, rate):
-    """Make of power (C, n, N) what it is if it changes by `rate` (E, C, n) [1/s] from the first sample of an event."""
+    """Make of power (C, n, N) what it is if it changes by `rate` (E, C, n) [1/s] from the first
+    sample of an event.
+    """
     at_once = np.zeros(rate.shape, dtype=int)
-    _change(GROWN, power, drive, {"shift": at_once}, {"rate": rate}, t=drive.inputs[INPUTS.index("t")])
+    _change(
+        GROWN, power, drive, {"shift": at_once}, {"rate": rate}, t=drive.inputs[INPUTS.index("t")]
+    )
 
 
 def _apply_drift(y, t, rate):
@@ -72,7 +86,8 @@ def _apply_drift(y, t, rate):
 def average_power(power, drive, window):
     """Make of power (2, n, N) its mean over `window` (E, n) [s] around each sample.
 
-    It is linear between samples and keeps its first and last value beyond them. A window of 0 leaves it as it is.
+    It is linear between samples and keeps its first and last value beyond them. A window of 0
+    leaves it as it is.
     """
     length = window / drive.event[:, [STEP]]
     whole, part = _steps(length / 2)
@@ -81,7 +96,9 @@ def average_power(power, drive, window):
 
 
 def _mean(y, total, r, each):
-    """Trapezia between whole samples, of sums up to each, and a part of one more at each end; `each` is 0 for none."""
+    """Trapezia between whole samples, of sums up to each, and a part of one more at each end;
+    `each` is 0 for none.
+    """
     from sympy import Piecewise
 
     ahead, behind = y(0, "ahead"), y(0, "behind")
@@ -92,8 +109,12 @@ def _mean(y, total, r, each):
 
 GROWN = Stencil(_apply_drift, rows=("y",), shared=("t",), numbers=("rate",))
 CUBIC = Stencil(_cubic, rows=("y",), numbers=("r",), onward=True)
-CURRENT = Stencil(_current, rows=("y",), shared=("U", "each", "slope", "follow", "place"), numbers=("r",))
-MEAN = Stencil(_mean, rows=("y",), sums={"total": "y"}, shifts=("ahead", "behind"), numbers=("r", "each"))
+CURRENT = Stencil(
+    _current, rows=("y",), shared=("U", "each", "slope", "follow", "place"), numbers=("r",)
+)
+MEAN = Stencil(
+    _mean, rows=("y",), sums={"total": "y"}, shifts=("ahead", "behind"), numbers=("r", "each")
+)
 
 
 def _steps(lag):
@@ -104,6 +125,9 @@ def _steps(lag):
 
 def _change(stencil, power, drive, shifts, numbers, **shared):
     """Write a stencil in place of power (C, n, N); shifts and numbers are (E, n), or (E, C, n)."""
-    channels = lambda given: {k: each if each.ndim == 3 else each[:, None] for k, each in given.items()}  # noqa: E731
+
+    def channels(given):
+        return {k: each if each.ndim == 3 else each[:, None] for k, each in given.items()}
+
     parts = [drive.part(e) for e in range(drive.events)]
     stencil(power, parts, channels(shifts), y=power, **channels(numbers), **shared)

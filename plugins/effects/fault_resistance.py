@@ -5,14 +5,17 @@ from tractexp.extend import Effect, Parameter, plugin
 from ._phases import detect_departure
 
 SOURCE = "Kundur 1994, section 13.4 (faults by shunts); IEC 60909-0"
-LEVEL, HOLD = 0.1, 0.005  # of the voltage: how far off it is in a fault; s: how long it may be nearer in between
+# of the voltage: how far off it is in a fault; s: how long it may be nearer in between
+LEVEL, HOLD = 0.1, 0.005
 
 
 @plugin
 class FaultResistance(Effect):
-    """While the voltage is off its course, a conductance to earth lies beside the load: the fault is in it.
+    """While the voltage is off its course, a conductance to earth lies beside the load: the fault
+    is in it.
 
-        i -> i + g_f f v,   i_0 -> i_0 + g_f f v_0,   f = 1 while |v - U_0| > 0.1 U_0 within the last 5 ms, else 0
+        i -> i + g_f f v,   i_0 -> i_0 + g_f f v_0,
+        f = 1 while |v - U_0| > 0.1 U_0 within the last 5 ms, else 0
 
     At g_f = 0 the base model.
 

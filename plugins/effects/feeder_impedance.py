@@ -14,41 +14,60 @@ class FeederImpedance(Effect):
 
         V = U - Z_f I,   I = I_d + I_s,   Z_f = R_f + j X_f,   P + j Q -> P + j Q + Z_f |I|^2
 
-    The motor's current is I_d = a + b V, the static load's I_s = conj(P_s + j Q_s)/conj(V) depends on v = |V| by an
-    admittance Y(v) alone, so
+    The motor's current is I_d = a + b V, the static load's I_s = conj(P_s + j Q_s)/conj(V) depends
+    on v = |V| by an admittance Y(v) alone, so
 
         V = B/(1 + Z_f (b + Y(v))),   B = U - Z_f a
 
-    leaves one real equation, v |1 + Z_f (b + Y(v))| = |B|. It is solved for ln v by two steps of Newton's method,
-    from the v that the admittance before the event would give. At R_f = X_f = 0 the base model. Other parts, such as
-    a capacitor, stay at the recorded bus.
+    leaves one real equation, v |1 + Z_f (b + Y(v))| = |B|. It is solved for ln v by two steps of
+    Newton's method, from the v that the admittance before the event would give. At R_f = X_f = 0
+    the base model. Other parts, such as a capacitor, stay at the recorded bus.
 
-    In waveforms all parts lie behind it, a capacitor too, so that its resonance with the reactance is there. Beside the
-    reactance lies a resistance R_p = X_f/(omega_n T_p), T_p = 50 us, by which the voltage v of the bus is no state and
-    the null is the base model:
+    In waveforms all parts lie behind it, a capacitor too, so that its resonance with the reactance
+    is there. Beside the reactance lies a resistance R_p = X_f/(omega_n T_p), T_p = 50 us, by which
+    the voltage v of the bus is no state and the null is the base model:
 
-        v = v_recorded - R_f i - R_p (i - i_L),   di_L/dt = (i - i_L)/T_p - j (omega_n + omega_s) i_L
+        v = v_recorded - R_f i - R_p (i - i_L),
+        di_L/dt = (i - i_L)/T_p - j (omega_n + omega_s) i_L
 
-    The current i is a part linear in v and one of states, so that this is two linear equations; a capacitor sees the
-    slope of v through a lag of T_p. Where all before the event leaves the static load is what its P and Q would be at
-    the recorded voltage.
+    The current i is a part linear in v and one of states, so that this is two linear equations; a
+    capacitor sees the slope of v through a lag of T_p. Where all before the event leaves the static
+    load is what its P and Q would be at the recorded voltage.
 
     Source: WECC composite load model specification 2015 (feeder and transformer).
-    Departures: R_f and X_f are one impedance from bus to load, of waveforms with R_p beside X_f (losses of a winding
-    at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero sequence sees none of it; where a load has
-    no solution (voltage collapse) the last iterate stands.
+    Departures: R_f and X_f are one impedance from bus to load, of waveforms with R_p beside X_f
+    (losses of a winding at high frequencies; it takes 1.6 % of the current at 50 Hz); the zero
+    sequence sees none of it; where a load has no solution (voltage collapse) the last iterate
+    stands.
     """
 
     R_f = Parameter(
-        0.0, (-0.02, 0.1), "pu", "feeder resistance on the record's base", SOURCE, null=0.0, power_exponent=-1
+        0.0,
+        (-0.02, 0.1),
+        "pu",
+        "feeder resistance on the record's base",
+        SOURCE,
+        null=0.0,
+        power_exponent=-1,
     )
     X_f = Parameter(
-        0.0, (-0.05, 0.2), "pu", "feeder reactance on the record's base", SOURCE, null=0.0, power_exponent=-1
+        0.0,
+        (-0.05, 0.2),
+        "pu",
+        "feeder reactance on the record's base",
+        SOURCE,
+        null=0.0,
+        power_exponent=-1,
     )
     places, kind = ("bus",), "law"
     order, iterates = 2, True
     relevant = {"R_f": 0.01, "X_f": 0.02}
-    confused_with = ("stator_resistance", "dc_link_lag", "magnetic_saturation", "speed_dependent_torque")
+    confused_with = (
+        "stator_resistance",
+        "dc_link_lag",
+        "magnetic_saturation",
+        "speed_dependent_torque",
+    )
 
     def refusal(self, eq):
         fits = eq.waves or sites.P_motor not in eq or _affine(eq)
@@ -62,23 +81,37 @@ class FeederImpedance(Effect):
             _before_all(eq, R_f, X_f)
             return
         Z, motor = R_f + I * X_f, sites.P_motor in eq
-        loads = [eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq]
-        at_bus = [eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0)))) for power in (eq.P, eq.Q)]
+        loads = [
+            eq[s] for s in (sites.P_motor, sites.P_static, sites.Q_motor, sites.Q_static) if s in eq
+        ]
+        at_bus = [
+            eq.before(power.xreplace(dict.fromkeys(loads, sympy.Integer(0))))
+            for power in (eq.P, eq.Q)
+        ]
         I_0 = (eq.P0 - at_bus[0] - I * (eq.Q0 - at_bus[1])) / eq.U0
-        a, b = (_compute_complex_step(eq, f"motor_{k}", part, part) for k, part in zip("ab", _motor_current(eq), strict=True))
+        a, b = (
+            _compute_complex_step(eq, f"motor_{k}", part, part)
+            for k, part in zip("ab", _motor_current(eq), strict=True)
+        )
         B = _compute_complex_step(eq, "feeder_source", eq.U - Z * a, eq.U - Z * a)
         x, Y = _solve(eq, Z, b, B, eq.U0 - Z * I_0)
         V = _compute_complex_step(eq, "load_voltage", B / (1 + Z * (b + Y)), eq.U0 - Z * I_0)
 
         name = eq.V if motor else eq.define("load_voltage", V, "V")
         drawn = sum(s * (1 if s.name.startswith("P") else I) for s in loads)
-        current = eq.define("feeder_current", _compute_complex_step(eq, "feeder_current", a + (b + Y) * V, I_0), "I_f")
+        current = eq.define(
+            "feeder_current",
+            _compute_complex_step(eq, "feeder_current", a + (b + Y) * V, I_0),
+            "I_f",
+        )
         eq.shown[current] = conjugate(drawn / name)
         if motor:
             eq.edit(sites.motor_voltage, lambda _: V)
         eq.shown[name] = eq.U - Z * current
         V_0 = sympy.Symbol("V_0")
-        eq.edit(sites.static_voltage, lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(V_0))
+        eq.edit(
+            sites.static_voltage, lambda _: sympy.exp(x), shown=sympy.Abs(name) / sympy.Abs(V_0)
+        )
         square = re(current) ** 2 + im(current) ** 2
         eq.consume(R_f * square, X_f * square)
 
@@ -102,13 +135,19 @@ def _before_all(eq, R_f, X_f):
         eq.moves(inside, (drop - inside) / DAMPED, drop_0)
         eq.edit(sites.bus_voltage_rate, lambda rate: rate - (drop - inside) / DAMPED)
     speed = eq.omega_n + eq.omega_s
-    eq.moves(in_reactance, (eq["feeder_drawn"] - in_reactance) / DAMPED - I * speed * in_reactance, in_reactance_0)
+    eq.moves(
+        in_reactance,
+        (eq["feeder_drawn"] - in_reactance) / DAMPED - I * speed * in_reactance,
+        in_reactance_0,
+    )
     lost = drop_0 * (eq.P0 + I * eq.Q0) / eq.U0
     eq.lose(*eq.parts(lost))
 
 
 def _linear(eq, drop_0):
-    """Of waveforms: the state behind a capacitor's slope or None, and the current as J (x, y) + rest, v = x + j y."""
+    """Of waveforms: the state behind a capacitor's slope or None, and the current as J (x, y) +
+    rest, v = x + j y.
+    """
     import sympy
     from sympy import I
 
@@ -119,7 +158,9 @@ def _linear(eq, drop_0):
         drop = eq.recorded_voltage - values[eq.v]
         values[rate] = eq.expression(sites.bus_voltage_rate) - (drop - inside) / DAMPED
     reads = set(values)  # and what is written in it
-    while more := {s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads}:
+    while more := {
+        s for s, e in eq.definitions.items() if s not in reads and e.free_symbols & reads
+    }:
         reads |= more
     whole = eq.expand(eq.expression(sites.current), lambda s: s in reads and s not in values)
     eq.define("feeder_drawn", eq.expression(sites.current), "i")
@@ -128,8 +169,13 @@ def _linear(eq, drop_0):
     if any(row.has(x, y) for rows in J for row in rows):
         raise Unfit("its current is not linear in the voltage at an instant")
     rest = [part.xreplace({x: sympy.Integer(0), y: sympy.Integer(0)}) for part in parts]
-    J = [[eq.compute(f"feeder_{r}{c}", e, e) if e != 0 else e for c, e in zip("dq", row, strict=True)]
-         for r, row in zip("dq", J, strict=True)]  # fmt: skip
+    J = [
+        [
+            eq.compute(f"feeder_{r}{c}", e, e) if e != 0 else e
+            for c, e in zip("dq", row, strict=True)
+        ]
+        for r, row in zip("dq", J, strict=True)
+    ]
     return inside, J, [eq.compute(f"feeder_{r}", e) for r, e in zip("dq", rest, strict=True)]
 
 
@@ -137,12 +183,16 @@ def _solve_voltage(eq, R, J, rest, source):
     """v of v + R (J v + rest) = source."""
     import sympy
 
-    d, q = (eq.compute(f"feeder_source_{k}", s - R * r) for k, s, r in zip("dq", eq.parts(source), rest, strict=True))
+    d, q = (
+        eq.compute(f"feeder_source_{k}", s - R * r)
+        for k, s, r in zip("dq", eq.parts(source), rest, strict=True)
+    )
     (a, b), (c, e) = ((J[0][0] * R + 1, J[0][1] * R), (J[1][0] * R, J[1][1] * R + 1))
     whole = eq.compute("feeder_whole", a * e - b * c)
     eq.require(
         eq.real(eq.before(a * e - b * c)),
-        "no current settles between an impedance and a load of which one has a negative resistance ({value:.3g}); raise"
+        "no current settles between an impedance and a load of which one has a negative resistance"
+        " ({value:.3g}); raise"
         " X_f, or lower T_m so that the static load draws power",
     )
     return (e * d - b * q) / whole + sympy.I * (a * q - c * d) / whole
@@ -163,7 +213,8 @@ def _solve(eq, Z, b, B, V_0):
         size = eq.compute(f"{x}_size", _square(eq, W))
         excess = eq.compute(f"{x}_excess", v_squared * size / square - 1)
         steepness = 1 + eq.real(re(conjugate(W) * Z * slope)) / size
-        step = excess / (2 + excess) / sympy.Max(STEEPEST, steepness)  # ln(1 + excess) ~ 2 excess/(2 + excess)
+        # ln(1 + excess) ~ 2 excess/(2 + excess)
+        step = excess / (2 + excess) / sympy.Max(STEEPEST, steepness)
         x = eq.compute(f"feeder_x{k + 1}", x - step, 0)
     return x, _static_admittance(eq, x, (v_0 * sympy.exp(x)) ** 2)[0]
 
@@ -178,7 +229,9 @@ def _static_admittance(eq, x, v_squared):
     for site in (sites.P_static, sites.Q_static):
         drawn = eq.expand(eq[site], lambda s: s != u).xreplace({u: sympy.exp(x)})
         Y.append(eq.compute(f"{x}_{site.name}", drawn / v_squared))
-        slope.append(eq.compute(f"{x}_{site.name}_slope", (sympy.diff(drawn, x) - 2 * drawn) / v_squared))
+        slope.append(
+            eq.compute(f"{x}_{site.name}_slope", (sympy.diff(drawn, x) - 2 * drawn) / v_squared)
+        )
     return Y[0] - I * Y[1], slope[0] - I * slope[1]
 
 
@@ -200,13 +253,18 @@ def _motor_current_at(eq, V):
 
 
 def _affine(eq):
-    """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at some number."""
+    """Whether the motor's current really is a + b V: tried at V = 2j with every other symbol at
+    some number.
+    """
     from sympy import Float, I
 
     a, b = _motor_current(eq)
     off = _motor_current_at(eq, 2 * I) - a - 2 * I * b
     numbers = {s: Float(0.3 + 0.01 * k) for k, s in enumerate(sorted(off.free_symbols, key=str))}
-    return abs(complex(off.xreplace({s: n if s.is_real else n * (1 + I) for s, n in numbers.items()}))) < 1e-9
+    return (
+        abs(complex(off.xreplace({s: n if s.is_real else n * (1 + I) for s, n in numbers.items()})))
+        < 1e-9
+    )
 
 
 def _compute_complex_step(eq, name, value, before):

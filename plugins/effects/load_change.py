@@ -9,19 +9,24 @@ SOURCE = "ordinary change of load; rates of feeders and trains stay below some p
 
 @plugin
 class LoadChange(Measurement):
-    """The load changes by itself while the event is recorded, for trains accelerate and others come and go.
+    """The load changes by itself while the event is recorded, for trains accelerate and others come
+    and go.
 
         P -> P (1 + d_P t),   Q -> Q (1 + d_Q t),   t since the first sample of the event
 
-    In waveforms the currents change so, their parts in phase with the voltage before the event by d_P, those across it
-    by d_Q, and the zero sequence not at all. At d_P = d_Q = 0 the base model.
+    In waveforms the currents change so, their parts in phase with the voltage before the event by
+    d_P, those across it by d_Q, and the zero sequence not at all. At d_P = d_Q = 0 the base model.
 
     Source: a straight line is the first term of any slow change.
     Departures: none.
     """
 
-    drift_P = Parameter(0.0, (-0.05, 0.05), "1/s", "relative change of P per second", SOURCE, "d_P", null=0.0)
-    drift_Q = Parameter(0.0, (-0.05, 0.05), "1/s", "relative change of Q per second", SOURCE, "d_Q", null=0.0)
+    drift_P = Parameter(
+        0.0, (-0.05, 0.05), "1/s", "relative change of P per second", SOURCE, "d_P", null=0.0
+    )
+    drift_Q = Parameter(
+        0.0, (-0.05, 0.05), "1/s", "relative change of Q per second", SOURCE, "d_Q", null=0.0
+    )
 
     places, kind = ("bus",), "drift"
     relevant = {"drift_P": 0.003, "drift_Q": 0.003}

@@ -9,29 +9,41 @@ SOURCE = "ordinary change of load; customers and trains that react to a dip"
 
 @plugin
 class LoadChangeAfterDip(Effect):
-    """The load changes by itself once the voltage has returned: at once, in a ramp, or steadily to its end.
+    """The load changes by itself once the voltage has returned: at once, in a ramp, or steadily to
+    its end.
 
-        P -> P + a_P r (P - w P_d),   Q -> Q + a_Q r (Q - w Q_d),   r = min(1, max(0, (t_d - T_w)/T_c))
+        P -> P + a_P r (P - w P_d),   Q -> Q + a_Q r (Q - w Q_d),
+        r = min(1, max(0, (t_d - T_w)/T_c))
 
-    t_d is the time since the voltage was more than half the way back from its lowest. With T_c beyond the
-    record it is a drift. At w = 0 all parts change, at w = 1
-    all but the motors, whose power is P_d. At a_P = a_Q = 0 the base model.
+    t_d is the time since the voltage was more than half the way back from its lowest. With T_c
+    beyond the record it is a drift. At w = 0 all parts change, at w = 1 all but the motors, whose
+    power is P_d. At a_P = a_Q = 0 the base model.
 
     Source: a straight line is the first term of any slow change, a step of any sudden one.
     Departures: in waveforms all the current changes as P does; corners are rounded
     over 2 % of the change so that derivatives exist.
     """
 
-    after_change_P = Parameter(0.0, (-0.5, 0.5), "1", "relative change of P", SOURCE, "a_P", null=0.0)
-    after_change_Q = Parameter(0.0, (-0.5, 0.5), "1", "relative change of Q", SOURCE, "a_Q", null=0.0)
+    after_change_P = Parameter(
+        0.0, (-0.5, 0.5), "1", "relative change of P", SOURCE, "a_P", null=0.0
+    )
+    after_change_Q = Parameter(
+        0.0, (-0.5, 0.5), "1", "relative change of Q", SOURCE, "a_Q", null=0.0
+    )
     after_change_wait = Parameter(0.0, (0.0, 2.0), "s", "time before it begins", SOURCE, "T_w")
     after_change_time = Parameter(5.0, (0.002, 5.0), "s", "time that it takes", SOURCE, "T_c")
-    after_change_static = Parameter(0.0, (0.0, 1.0), "1", "1 where only the static load changes", SOURCE, "w")
+    after_change_static = Parameter(
+        0.0, (0.0, 1.0), "1", "1 where only the static load changes", SOURCE, "w"
+    )
 
     order = 3
     places, kind = ("bus",), "drift"
     family, differs = "load_change", "after the dip"
-    grid = {"after_change_wait": (0.0, 0.2, 0.4), "after_change_time": (0.1, 5.0), "after_change_static": (0.0, 1.0)}
+    grid = {
+        "after_change_wait": (0.0, 0.2, 0.4),
+        "after_change_time": (0.1, 5.0),
+        "after_change_static": (0.0, 1.0),
+    }
     relevant = {"after_change_P": 0.02, "after_change_Q": 0.02}
     confused_with = ("load_change", "exponential_recovery", "undervoltage_trip")
 

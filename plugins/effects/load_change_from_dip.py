@@ -11,7 +11,8 @@ SOURCE = "ordinary change of load; customers and trains that react to a dip"
 class LoadChangeFromDip(Effect):
     """The load changes by itself once the dip begins: at once, in a ramp, or steadily to its end.
 
-        P -> P + a_P r (P - w P_d),   Q -> Q + a_Q r (Q - w Q_d),   r = min(1, max(0, (t_d - T_w)/T_c))
+        P -> P + a_P r (P - w P_d),   Q -> Q + a_Q r (Q - w Q_d),
+        r = min(1, max(0, (t_d - T_w)/T_c))
 
     t_d is the time since a voltage below 0.96 of that before. With T_c beyond the record it is a
     drift. At w = 0 all parts change, at w = 1
@@ -26,12 +27,18 @@ class LoadChangeFromDip(Effect):
     dip_change_Q = Parameter(0.0, (-0.5, 0.5), "1", "relative change of Q", SOURCE, "a_Q", null=0.0)
     dip_change_wait = Parameter(0.0, (0.0, 2.0), "s", "time before it begins", SOURCE, "T_w")
     dip_change_time = Parameter(5.0, (0.002, 5.0), "s", "time that it takes", SOURCE, "T_c")
-    dip_change_static = Parameter(0.0, (0.0, 1.0), "1", "1 where only the static load changes", SOURCE, "w")
+    dip_change_static = Parameter(
+        0.0, (0.0, 1.0), "1", "1 where only the static load changes", SOURCE, "w"
+    )
 
     order = 3
     places, kind = ("bus",), "drift"
     family, differs = "load_change", "from the dip on"
-    grid = {"dip_change_wait": (0.0, 0.4), "dip_change_time": (0.1, 5.0), "dip_change_static": (0.0, 1.0)}
+    grid = {
+        "dip_change_wait": (0.0, 0.4),
+        "dip_change_time": (0.1, 5.0),
+        "dip_change_static": (0.0, 1.0),
+    }
     relevant = {"dip_change_P": 0.02, "dip_change_Q": 0.02}
     confused_with = ("load_change", "exponential_recovery", "undervoltage_trip")
 

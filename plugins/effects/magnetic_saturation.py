@@ -11,18 +11,21 @@ class MagneticSaturation(Effect):
 
         X - X' -> (X - X')/sigma,   T0' -> T0'/sigma,   sigma = 1 + k_s (|E|^2 - |E_0|^2)
 
-    In waveforms E + j X'/2 I, the voltage of the air gap with equal leakages, stands for E: in a dip's first cycles
-    stator and rotor flux are apart, and the main flux is between them.
+    In waveforms E + j X'/2 I, the voltage of the air gap with equal leakages, stands for E: in a
+    dip's first cycles stator and rotor flux are apart, and the main flux is between them.
 
-    In the parameters of the model, C = (X - X')/X and T' = X'/X T0', both are divided by n = 1 + (1 - C)(sigma - 1).
-    At k_s = 0 the base model.
+    In the parameters of the model, C = (X - X')/X and T' = X'/X T0', both are divided by n = 1 + (1
+    - C)(sigma - 1). At k_s = 0 the base model.
 
-    Source: saturation as a factor on the magnetizing reactance, Milano 2010, ch. 15; CIM5 load model.
-    Departures: quadratic in the internal voltage, and counted from its value before the event, so that C and T' are
-    the machine's at that point.
+    Source: saturation as a factor on the magnetizing reactance, Milano 2010, ch. 15; CIM5 load
+    model.
+    Departures: quadratic in the internal voltage, and counted from its value before the event, so
+    that C and T' are the machine's at that point.
     """
 
-    saturation = Parameter(0.0, (0.0, 3.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0)
+    saturation = Parameter(
+        0.0, (0.0, 3.0), "1/pu²", "growth of sigma with flux squared", SOURCE, "k_s", null=0.0
+    )
 
     places, kind = ("coupling", "flux decay"), "law"
     relevant = {"saturation": 0.2}

@@ -11,7 +11,8 @@ class MotorTrip(_Trip):
 
         P_d -> (1 - F_m g) P_d,   Q_d -> (1 - F_m g) Q_d
 
-    The static load stays. In waveforms the motors' current falls by F_m g. At F_m = 0 the base model.
+    The static load stays. In waveforms the motors' current falls by F_m g. At F_m = 0 the base
+    model.
 
     Source: NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model.
     Departures: those of `undervoltage_trip`.

@@ -2,29 +2,40 @@
 
 from tractexp.extend import Effect, Parameter, plugin, sites
 
-SOURCE = "Kundur 1994, section 7.2; Boldea, Nasar 2010, The Induction Machine Handbook (unbalanced supply)"
+SOURCE = (
+    "Kundur 1994, section 7.2; Boldea, Nasar 2010, The Induction Machine Handbook (unbalanced"
+    " supply)"
+)
 
 
 @plugin
 class NegativeSequenceBraking(Effect):
-    """Negative-sequence voltage drives a current whose field turns backwards: a torque against, and power drawn.
+    """Negative-sequence voltage drives a current whose field turns backwards: a torque against, and
+    power drawn.
 
-    The rotor slips by nearly 2 against it, so Z_2 = Z' + R_2/2, with R_2 = c X'/(omega_n tau') the rotor resistance
-    behind the transient reactance:
+    The rotor slips by nearly 2 against it, so Z_2 = Z' + R_2/2, with R_2 = c X'/(omega_n tau') the
+    rotor resistance behind the transient reactance:
 
-        T_e -> T_e - k_2 dU2^2 R_2/2/|Z_2|^2,   P + j Q -> P + j Q + k_2 dU2^2 Z_2/|Z_2|^2,   dU2^2 = U2^2 - U20^2
+        T_e -> T_e - k_2 dU2^2 R_2/2/|Z_2|^2,   P + j Q -> P + j Q + k_2 dU2^2 Z_2/|Z_2|^2,
+        dU2^2 = U2^2 - U20^2
 
     At k_2 = 0 the base model; k_2 = 1 is the theory.
 
-    Source: Kundur 1994, section 7.2 (equivalent circuit at slip 2 - s); Boldea, Nasar 2010 (unbalanced supply).
-    Departures: the unbalance before the event belongs to the steady state, so only its change counts.
+    Source: Kundur 1994, section 7.2 (equivalent circuit at slip 2 - s); Boldea, Nasar 2010
+    (unbalanced supply).
+    Departures: the unbalance before the event belongs to the steady state, so only its change
+    counts.
     """
 
-    negative_sequence = Parameter(0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0)
+    negative_sequence = Parameter(
+        0.0, (0.0, 10.0), "1", "size relative to the theory", SOURCE, "k_2", null=0.0
+    )
 
     places, kind = ("load torque", "bus"), "law"
     reads = ("U2",)
-    phasors_only = "in waveforms the motor's equations carry negative sequence and its torque themselves"
+    phasors_only = (
+        "in waveforms the motor's equations carry negative sequence and its torque themselves"
+    )
     relevant = {"negative_sequence": 0.5}
     confused_with = ("second_motor_group", "shunt_capacitor")
 

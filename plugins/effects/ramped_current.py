@@ -10,7 +10,8 @@ WIDTH = 0.02  # of the current: how rounded the corners are
 
 @plugin
 class RampedCurrent(Effect):
-    """A share of the static active power is drawn by converters whose current may fall quickly and returns slowly.
+    """A share of the static active power is drawn by converters whose current may fall quickly and
+    returns slowly.
 
         P_s -> (1 - s) P_s + s P_s0 u i,   di/dt = min((m(u)/m(1) - i)/T_f, r),   u = U/U_0
         m(u) = min(1, max(0, (u - u_none)/(u_all - u_none)))
@@ -18,19 +19,29 @@ class RampedCurrent(Effect):
     Power factor one: Q is untouched. At s = 0 the base model, whatever the rest.
 
     Source: WECC 2014, REGC_A, where the current is a generator's; here the same limits of a load.
-    Departures: one lag stands for the current's control and the measurement of the voltage; corners are rounded over
-    2 % of the current; levels count from the voltage before the event.
+    Departures: one lag stands for the current's control and the measurement of the voltage; corners
+    are rounded over 2 % of the current; levels count from the voltage before the event.
     """
 
-    ramped_share = Parameter(0.0, (0.0, 1.0), "1", "share in the static active power", SOURCE, "s_r", null=0.0)
+    ramped_share = Parameter(
+        0.0, (0.0, 1.0), "1", "share in the static active power", SOURCE, "s_r", null=0.0
+    )
     ramp_rate = Parameter(5.0, (0.3, 100.0), "1/s", "how fast the current comes back", SOURCE, "r")
-    ramp_full = Parameter(0.9, (0.75, 1.0), "1", "voltage of full current, over U_0", SOURCE, "u_{all}")
-    ramp_none = Parameter(0.5, (0.0, 0.74), "1", "voltage of no current, over U_0", SOURCE, "u_{none}")
+    ramp_full = Parameter(
+        0.9, (0.75, 1.0), "1", "voltage of full current, over U_0", SOURCE, "u_{all}"
+    )
+    ramp_none = Parameter(
+        0.5, (0.0, 0.74), "1", "voltage of no current, over U_0", SOURCE, "u_{none}"
+    )
     ramp_fall = Parameter(0.01, (0.004, 0.1), "s", "time in which the current falls", SOURCE, "T_f")
 
     places, kind = ("converter share",), "lag"
     family, differs = "dc_link_lag", "whose current returns along a ramp"
-    grid = {"ramp_rate": (1.5, 5.0, 15.0), "ramp_full": (0.8, 0.9, 0.97), "ramp_none": (0.2, 0.5, 0.7)}
+    grid = {
+        "ramp_rate": (1.5, 5.0, 15.0),
+        "ramp_full": (0.8, 0.9, 0.97),
+        "ramp_none": (0.2, 0.5, 0.7),
+    }
     relevant = {"ramped_share": 0.1}
     confused_with = ("exponential_recovery", "undervoltage_trip", "voltage_dependent_power_limit")
 

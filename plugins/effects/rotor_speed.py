@@ -9,12 +9,14 @@ SOURCE = "Wu, Fan, Zou 2022, Energies 15(14) 5034, Table 1 and Eq. (1)"
 
 @plugin
 class RotorSpeed(Effect):
-    r"""The rotor slows down in the dip and comes back, where the base model keeps the speed it had before the event.
+    r"""The rotor slows down in the dip and comes back, where the base model keeps the speed it had
+    before the event.
 
         domega/dt = w (T_e - T_L),     w = 1/M
 
-    At w = 0, infinite inertia, the base model, `voltage`; at w = 1/M the third-order motor `electromechanical` of that
-    M, to rounding: the two are nested as they stand. The steady state is the same for every w.
+    At w = 0, infinite inertia, the base model, `voltage`; at w = 1/M the third-order motor
+    `electromechanical` of that M, to rounding: the two are nested as they stand. The steady state
+    is the same for every w.
 
     Not to be confused with `speed_dependent_torque`, which needs a speed that moves.
 
@@ -23,7 +25,14 @@ class RotorSpeed(Effect):
     """
 
     swing = Parameter(
-        0.0, (0.0, 2000.0), "rad/(s² pu)", "inverse of the inertia M", SOURCE, "w", null=0.0, power_exponent=-1
+        0.0,
+        (0.0, 2000.0),
+        "rad/(s² pu)",
+        "inverse of the inertia M",
+        SOURCE,
+        "w",
+        null=0.0,
+        power_exponent=-1,
     )
     places, kind = ("speed",), "lag"
     order = -1

@@ -9,19 +9,24 @@ SOURCE = "WECC composite load model: motors A, B, C side by side"
 class SecondMotorGroup(Effect):
     """Part of the motors has another inertia, so that it slows down and recovers at another pace.
 
-    A share g of the motor load is a second machine with the same electrical parameters and load per unit, and
-    inertia r M; every quantity that moves with a motor has a twin marked 2:
+    A share g of the motor load is a second machine with the same electrical parameters and load per
+    unit, and inertia r M; every quantity that moves with a motor has a twin marked 2:
 
         P_d = (1 - g) P_d1 + g P_d2,        r M domega_2/dt = T_e2 - T_L2
 
     At g = 0 the base model, whatever r.
 
-    Source: WECC composite load model specification (motor groups); Milano 2010, ch. 15 for each machine.
+    Source: WECC composite load model specification (motor groups); Milano 2010, ch. 15 for each
+    machine.
     Departures: both groups share the electrical parameters.
     """
 
-    group_share = Parameter(0.0, (0.0, 0.6), "1", "share of the second group in the motor load", SOURCE, "g", null=0.0)
-    inertia_ratio = Parameter(4.0, (0.1, 12.0), "1", "inertia of the second group over the first's", SOURCE, "r")
+    group_share = Parameter(
+        0.0, (0.0, 0.6), "1", "share of the second group in the motor load", SOURCE, "g", null=0.0
+    )
+    inertia_ratio = Parameter(
+        4.0, (0.1, 12.0), "1", "inertia of the second group over the first's", SOURCE, "r"
+    )
 
     places, kind = ("motor",), "lag"
     order = 1

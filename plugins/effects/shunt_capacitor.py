@@ -15,16 +15,23 @@ class ShuntCapacitor(Effect):
         Q -> Q - b U^2 (omega_s + omega_n)/omega_n
         i -> i + b (dv/dt/omega_n + j (omega_s + omega_n)/omega_n v)      in waveforms
 
-    Q_0 includes the bank, so the static load has b U_0^2 more. At b = 0 the base model. An exponent q_v near 2
-    hides it in phasors: without a switching of the bank or a change of frequency it is hardly seen. In waveforms every
-    edge and every harmonic of the voltage shows it.
+    Q_0 includes the bank, so the static load has b U_0^2 more. At b = 0 the base model. An exponent
+    q_v near 2 hides it in phasors: without a switching of the bank or a change of frequency it is
+    hardly seen. In waveforms every edge and every harmonic of the voltage shows it.
 
     Source: WECC composite load model specification (Bss, Bfdr).
     Departures: none.
     """
 
     capacitor = Parameter(
-        0.0, (0.0, 1.0), "pu", "susceptance on the record's base", SOURCE, "b", null=0.0, power_exponent=1
+        0.0,
+        (0.0, 1.0),
+        "pu",
+        "susceptance on the record's base",
+        SOURCE,
+        "b",
+        null=0.0,
+        power_exponent=1,
     )
     places, kind = ("bus",), "law"
     relevant = {"capacitor": 0.05}
@@ -32,7 +39,11 @@ class ShuntCapacitor(Effect):
 
     def shown(self, event):
         supplied = -event.Q0 / np.hypot(event.P0, event.Q0)
-        return f"the load supplies Q, {supplied:.0%} of S, before the dip" if supplied > SUPPLIED else ""
+        return (
+            f"the load supplies Q, {supplied:.0%} of S, before the dip"
+            if supplied > SUPPLIED
+            else ""
+        )
 
     def edit(self, eq, capacitor):
         eq.draw(eq.capacitor(capacitor))

@@ -14,10 +14,13 @@ class SpeedDependentTorque(Effect):
     omega_0 is the speed before the event, so that T_m keeps its meaning. At k = 0 the base model.
 
     Source: WECC composite load model specification (Etrq); Milano 2010, ch. 15.
-    Departures: the exponent is 2 and the share is free, where WECC's share is 1 and the exponent free.
+    Departures: the exponent is 2 and the share is free, where WECC's share is 1 and the exponent
+    free.
     """
 
-    quadratic_share = Parameter(0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0)
+    quadratic_share = Parameter(
+        0.0, (0.0, 1.0), "1", "share of the torque that is quadratic", SOURCE, "k", null=0.0
+    )
 
     places, kind = ("load torque",), "law"
     relevant = {"quadratic_share": 0.25}

@@ -7,11 +7,13 @@ from ._trip import _Trip, relay
 
 @plugin
 class StaticTrip(_Trip):
-    """A share F_s of the static load drops out and returns, as `undervoltage_trip` lets the whole load.
+    """A share F_s of the static load drops out and returns, as `undervoltage_trip` lets the whole
+    load.
 
         P_s -> (1 - F_s g) P_s,   Q_s -> (1 - F_s g) Q_s
 
-    The motors stay and do not notice: contactors of lighting and electronics, not of drives. At F_s = 0 the base model.
+    The motors stay and do not notice: contactors of lighting and electronics, not of drives. At F_s
+    = 0 the base model.
 
     Source: NERC 2016, Dynamic Load Modeling, app. A; WECC composite load model.
     Departures: those of `undervoltage_trip`.

@@ -7,25 +7,38 @@ SOURCE = "Kundur 1994, section 11.2; Milano 2010, ch. 19 (SVC and STATCOM)"
 
 @plugin
 class StaticVarCompensator(Effect):
-    """A compensator that feeds reactive current into the bus when the voltage is low, up to its rating.
+    """A compensator that feeds reactive current into the bus when the voltage is low, up to its
+    rating.
 
-        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x u^n,   u = U/U_0,   sat(z) = max(-1, min(1, z))
+        T_c dx/dt = sat(K (U_0 - U)) - x,   Q -> Q - q_c x u^n,   u = U/U_0,
+        sat(z) = max(-1, min(1, z))
 
-    A small drop dU brings K q_c dU, a deep one the rating q_c: of current where n = 1 (STATCOM), of susceptance where
-    n = 2 (thyristor-controlled). The set point is the voltage before the event. At q_c = 0 the base model, whatever
-    the rest.
+    A small drop dU brings K q_c dU, a deep one the rating q_c: of current where n = 1 (STATCOM), of
+    susceptance where n = 2 (thyristor-controlled). The set point is the voltage before the event.
+    At q_c = 0 the base model, whatever the rest.
 
     Source: Kundur 1994, section 11.2; Milano 2010, ch. 19: proportional regulator, one lag, limits.
     Departures: the limit is symmetric.
     """
 
     compensator = Parameter(
-        0.0, (0.0, 1.0), "pu", "rating on the record's base", SOURCE, "q_c", null=0.0, power_exponent=1
+        0.0,
+        (0.0, 1.0),
+        "pu",
+        "rating on the record's base",
+        SOURCE,
+        "q_c",
+        null=0.0,
+        power_exponent=1,
     )
-    compensator_gain = Parameter(10.0, (1.0, 100.0), "1/pu", "gain per rating, 1/droop", SOURCE, "K")
+    compensator_gain = Parameter(
+        10.0, (1.0, 100.0), "1/pu", "gain per rating, 1/droop", SOURCE, "K"
+    )
     compensator_time = Parameter(0.03, (0.005, 0.3), "s", "time constant", SOURCE, "T_c")
 
-    compensator_exponent = Parameter(1.0, (1.0, 2.0), "1", "of voltage: 1 current, 2 susceptance", SOURCE, "n")
+    compensator_exponent = Parameter(
+        1.0, (1.0, 2.0), "1", "of voltage: 1 current, 2 susceptance", SOURCE, "n"
+    )
 
     places, kind = ("bus",), "limit"
     grid = {"compensator_gain": (2.0, 10.0, 50.0), "compensator_time": (0.01, 0.03, 0.1)}

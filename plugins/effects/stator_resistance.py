@@ -11,14 +11,21 @@ class StatorResistance(Effect):
 
         I = (U - E)/(R_s + j X')
 
-    At R_s = 0 the base model. The air-gap torque Re(E I*) is then less than the motor's power by R_s |I|^2.
+    At R_s = 0 the base model. The air-gap torque Re(E I*) is then less than the motor's power by
+    R_s |I|^2.
 
     Source: Milano 2010, ch. 15 (third-order motor with r_S).
     Departures: none.
     """
 
     R_s = Parameter(
-        0.0, (-0.02, 0.2), "pu", "stator resistance on the record's base", SOURCE, null=0.0, power_exponent=-1
+        0.0,
+        (-0.02, 0.2),
+        "pu",
+        "stator resistance on the record's base",
+        SOURCE,
+        null=0.0,
+        power_exponent=-1,
     )
     places, kind = ("stator impedance",), "law"
     rival = True

@@ -5,7 +5,10 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from ._operators import gate
 from ._phases import detect_departure, phases_of, vector_of
 
-SOURCE = "IEEE C37.04, pole discrepancy; Blackburn, Domin 2014, Protective Relaying, section 4.9 (open phases)"
+SOURCE = (
+    "IEEE C37.04, pole discrepancy; Blackburn, Domin 2014, Protective Relaying, section 4.9 (open"
+    " phases)"
+)
 LEVEL = 0.1  # of the voltage: how far off it is when the event begins
 
 
@@ -13,18 +16,24 @@ LEVEL = 0.1  # of the voltage: how far off it is when the event begins
 class StuckPole(Effect):
     """From a time after the event's beginning, one phase of the load carries no current, or less.
 
-        i_k -> (1 - s w_k g) i_k,   g = 1 from T_p after the voltage first left its course by 0.1 U_0
+        i_k -> (1 - s w_k g) i_k,
+        g = 1 from T_p after the voltage first left its course by 0.1 U_0
 
-    with w_k = 1 for the phase that is meant and 0 for the others. At s = 0 the base model, whatever phase and time.
+    with w_k = 1 for the phase that is meant and 0 for the others. At s = 0 the base model, whatever
+    phase and time.
 
     Source: IEEE C37.04 (pole discrepancy); Blackburn, Domin 2014, section 4.9.
-    Departures: the other phases carry on as if that one did; a pole that opens does so at once, not at a zero of its
-    current.
+    Departures: the other phases carry on as if that one did; a pole that opens does so at once, not
+    at a zero of its current.
     """
 
-    opened_share = Parameter(0.0, (0.0, 1.0), "1", "share of the phase's current that is gone", SOURCE, "s_p", null=0.0)
+    opened_share = Parameter(
+        0.0, (0.0, 1.0), "1", "share of the phase's current that is gone", SOURCE, "s_p", null=0.0
+    )
     opened_phase = Parameter(0.0, (0.0, 2.0), "1", "0, 1 or 2: phase a, b or c", SOURCE, "k_p")
-    opened_after = Parameter(0.06, (0.0, 0.5), "s", "time after the voltage left its course", SOURCE, "T_p")
+    opened_after = Parameter(
+        0.06, (0.0, 0.5), "s", "time after the voltage left its course", SOURCE, "T_p"
+    )
 
     places, kind = ("bus",), "trip"
     order = 3

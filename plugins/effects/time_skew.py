@@ -2,7 +2,8 @@
 
 from tractexp.extend import Measurement, Parameter, plugin
 
-QUIET = 0.005  # of the voltage before: a change between samples that tells how the current follows it
+# of the voltage before: a change between samples that tells how the current follows it
+QUIET = 0.005
 
 
 @plugin
@@ -11,16 +12,25 @@ class TimeSkew(Measurement):
 
         P_recorded(t) = P(t - tau)
 
-    At tau = 0 the base model. It is the voltage that is moved: the current of the samples on either side follows it
-    there, so that an edge of the voltage within the interval is one of the power, not a curve that overshoots. In
-    waveforms the currents are cubics through their samples. Before the first sample and after the last all is as there.
+    At tau = 0 the base model. It is the voltage that is moved: the current of the samples on either
+    side follows it there, so that an edge of the voltage within the interval is one of the power,
+    not a curve that overshoots. In waveforms the currents are cubics through their samples. Before
+    the first sample and after the last all is as there.
 
-    Source: instrument transformers and filters of unequal delay, IEC/IEEE 60255-118-1; the cubic is Catmull and
-    Rom's 1974.
+    Source: instrument transformers and filters of unequal delay, IEC/IEEE 60255-118-1; the cubic is
+    Catmull and Rom's 1974.
     Departures: none.
     """
 
-    skew = Parameter(0.0, (-0.02, 0.02), "s", "delay of power behind voltage", "IEC/IEEE 60255-118-1", r"\tau", 0.0)
+    skew = Parameter(
+        0.0,
+        (-0.02, 0.02),
+        "s",
+        "delay of power behind voltage",
+        "IEC/IEEE 60255-118-1",
+        r"\tau",
+        0.0,
+    )
 
     places, kind = ("measurement",), "delay"
     relevant = {"skew": 0.001}

@@ -4,24 +4,37 @@ import numpy as np
 
 from tractexp.extend import Effect, Parameter, plugin
 
-SOURCE = "Kundur 1994, section 3.4 (sequence networks of transformers); IEC 60909-0, zero-sequence impedances"
+SOURCE = (
+    "Kundur 1994, section 3.4 (sequence networks of transformers); IEC 60909-0, zero-sequence"
+    " impedances"
+)
 
 
 @plugin
 class ZeroSequencePath(Effect):
-    """The zero sequence of the voltage drives a current through an earthed neutral: R_0 + j X_0 to earth.
+    """The zero sequence of the voltage drives a current through an earthed neutral: R_0 + j X_0 to
+    earth.
 
-        dpsi_0/dt = omega_n (v_0 - r_0 psi_0),   i_0 -> i_0 + b_0 psi_0,   b_0 = 1/X_0,   r_0 = R_0/X_0
+        dpsi_0/dt = omega_n (v_0 - r_0 psi_0),   i_0 -> i_0 + b_0 psi_0,   b_0 = 1/X_0,
+        r_0 = R_0/X_0
 
-    The flux linkage psi_0 is a state: an offset that a fault leaves in it decays with 1/(omega_n r_0). A transformer
-    that is earthed on this side with a delta winding has X_0 near its leakage. At b_0 = 0 the base model, whatever r_0.
+    The flux linkage psi_0 is a state: an offset that a fault leaves in it decays with 1/(omega_n
+    r_0). A transformer that is earthed on this side with a delta winding has X_0 near its leakage.
+    At b_0 = 0 the base model, whatever r_0.
 
     Source: Kundur 1994, section 3.4; IEC 60909-0.
     Departures: none.
     """
 
     zero_susceptance = Parameter(
-        0.0, (0.0, 100.0), "pu", "1/X_0 on the record's base", SOURCE, "b_0", null=0.0, power_exponent=1
+        0.0,
+        (0.0, 100.0),
+        "pu",
+        "1/X_0 on the record's base",
+        SOURCE,
+        "b_0",
+        null=0.0,
+        power_exponent=1,
     )
     zero_resistance = Parameter(0.05, (0.003, 3.0), "1", "R_0/X_0", SOURCE, "r_0")
 
@@ -35,9 +48,15 @@ class ZeroSequencePath(Effect):
         if not event.compared[2]:
             return ""
         dip = slice(event.start, event.end)
-        drawn, before = np.sqrt(2 * np.mean(event.currents[2, dip] ** 2)), np.hypot(event.P0, event.Q0) / event.U0
+        drawn, before = (
+            np.sqrt(2 * np.mean(event.currents[2, dip] ** 2)),
+            np.hypot(event.P0, event.Q0) / event.U0,
+        )
         driven = np.abs(event.v_zero[dip]).max() / event.U0
-        return f"zero sequence, {driven:.0%} of the voltage in the dip, drives {drawn / before:.2g} times the current"
+        return (
+            f"zero sequence, {driven:.0%} of the voltage in the dip, drives {drawn / before:.2g}"
+            " times the current"
+        )
 
     def edit(self, eq, zero_susceptance, zero_resistance):
         psi = eq.lag("zero_flux", r"\psi_0")

@@ -4,14 +4,20 @@ import numpy as np
 
 from tractexp.extend import DATA, Estimator, UserError, plugin
 
-# {nominal frequency [Hz]: {reporting rate [1/s]: (reference frequency F_fr [Hz], order N at 16 samples a cycle)}}
+# {nominal frequency [Hz]: {reporting rate [1/s]: (reference frequency F_fr [Hz], order N at 16
+# samples a cycle)}}
 FILTERS = {
     50: {10: (1.779, 806), 25: (4.355, 338), 50: (7.75, 142), 100: (14.1, 66)},
     60: {
-        10: (1.78, 968), 12: (2.125, 816), 15: (2.64, 662), 20: (3.5, 502), 30: (5.02, 306), 60: (8.19, 164),
+        10: (1.78, 968),
+        12: (2.125, 816),
+        15: (2.64, 662),
+        20: (3.5, 502),
+        30: (5.02, 306),
+        60: (8.19, 164),
         120: (16.25, 70),
     },
-}  # fmt: skip
+}
 
 
 @plugin
@@ -20,11 +26,12 @@ class MClass(Estimator):
 
         w(t) = sinc(4 F_fr t) (0.54 + 0.46 cos(2 pi t / T)),  |t| <= T/2,  T = N / (16 f_0)
 
-    F_fr and N follow from the rate at which the unit reports, so that nothing above half of it gets through.
+    F_fr and N follow from the rate at which the unit reports, so that nothing above half of it gets
+    through.
 
     Source: IEC/IEEE 60255-118-1:2018, annex D.7, eq. (D.7) and table D.1.
-    Departures: the sinusoid is taken at the tracked frequency by least squares, where the reference turns at the
-    nominal one; phasors are given as often as for the other estimators.
+    Departures: the sinusoid is taken at the tracked frequency by least squares, where the reference
+    turns at the nominal one; phasors are given as often as for the other estimators.
     """
 
     reporting: int | None = None  # phasors a second of the unit; null: the nominal frequency
@@ -33,7 +40,10 @@ class MClass(Estimator):
         supported = sorted({rate for table in FILTERS.values() for rate in table})
         if self.reporting is not None and self.reporting not in supported:
             rates = ", ".join(map(str, supported))
-            raise UserError(f"{DATA.estimator}.reporting={self.reporting} is none of the standard's rates: {rates}")
+            raise UserError(
+                f"{DATA.estimator}.reporting={self.reporting} is none of the standard's rates:"
+                f" {rates}"
+            )
 
     def filter(self, nominal: float) -> tuple[float, float]:
         """F_fr [Hz] and the window's length [s]; raises `UserError` where the standard has none."""
@@ -42,7 +52,8 @@ class MClass(Estimator):
         if rate not in table:
             rates = f": {', '.join(map(str, table))}" if table else ""
             raise UserError(
-                f"{DATA.estimator}=m_class: the standard has no M-class filter for {rate} phasors a second at "
+                f"{DATA.estimator}=m_class: the standard has no M-class filter for {rate} phasors a"
+                " second at "
                 f"{nominal:g} Hz{rates}; choose another estimator, e.g. one_cycle"
             )
         reference, order = table[rate]

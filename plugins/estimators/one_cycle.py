@@ -11,10 +11,11 @@ class OneCycle(Estimator):
 
         min over X of the sum over the window of (x - sqrt(2) Re(X e^{j phi}))^2
 
-    Its two end samples are weighted by what is left over of the cycle, so that the window is one cycle long to a
-    fraction of a sample, and harmonics vanish at any frequency.
+    Its two end samples are weighted by what is left over of the cycle, so that the window is one
+    cycle long to a fraction of a sample, and harmonics vanish at any frequency.
 
-    Source: Phadke and Thorp 2008, Synchronized Phasor Measurements, section 2.4 (weighted least squares).
+    Source: Phadke and Thorp 2008, Synchronized Phasor Measurements, section 2.4 (weighted least
+    squares).
     """
 
     usual = True

@@ -1,10 +1,12 @@
-"""Play a dip through a load in ANDES: run by a Python that has it, in a process of its own (ANDES is GPL-3).
+"""Play a dip through a load in ANDES: run by a Python that has it, in a process of its own (ANDES
+is GPL-3).
 
     python _andes_run.py load.json dip.json response.npz
 
-`load.json` holds the load's tables on one bus, as `task=export task.format=andes` writes them; `dip.json` the source's
-voltage at each step. Written: t, and at the load's bus U, angle, P and Q of each device, 100 MVA base; the seconds
-that the time domain simulation took, and the version of ANDES. The line is as long for each load, in per unit of it.
+`load.json` holds the load's tables on one bus, as `task=export task.format=andes` writes them;
+`dip.json` the source's voltage at each step. Written: t, and at the load's bus U, angle, P and Q of
+each device, 100 MVA base; the seconds that the time domain simulation took, and the version of
+ANDES. The line is as long for each load, in per unit of it.
 """
 
 import importlib
@@ -23,9 +25,30 @@ SYSTEM = 100.0  # MVA
 SOURCE_BUS = -1  # a number that no load's bus has
 SOURCE = {
     "Bus": [{"idx": SOURCE_BUS, "name": "source", "Vn": 110.0}],
-    "Line": [{"idx": "line", "bus1": SOURCE_BUS, "bus2": 1, "Vn1": 110.0, "Vn2": 110.0, "r": 0.002, "x": 0.02}],
+    "Line": [
+        {
+            "idx": "line",
+            "bus1": SOURCE_BUS,
+            "bus2": 1,
+            "Vn1": 110.0,
+            "Vn2": 110.0,
+            "r": 0.002,
+            "x": 0.02,
+        }
+    ],
     "Slack": [{"idx": "G", "bus": SOURCE_BUS, "Sn": 100.0, "Vn": 110.0, "p0": 1.0, "q0": 0.5}],
-    "GENCLS": [{"idx": "M", "bus": SOURCE_BUS, "gen": "G", "Sn": 100.0, "Vn": 110.0, "M": 1e6, "D": 0.0, "xd1": 0.01}],
+    "GENCLS": [
+        {
+            "idx": "M",
+            "bus": SOURCE_BUS,
+            "gen": "G",
+            "Sn": 100.0,
+            "Vn": 110.0,
+            "M": 1e6,
+            "D": 0.0,
+            "xd1": 0.01,
+        }
+    ],
 }
 
 
@@ -50,7 +73,9 @@ def load_case(tables, frequency):
 
 
 def start_running(system, motor):
-    """Make the power flow start at a running motor: from standstill, ANDES's own guess, a loaded one diverges."""
+    """Make the power flow start at a running motor: from standstill, ANDES's own guess, a loaded
+    one diverges.
+    """
     initialize = system.PFlow.init
     guesses = {"slip": 0.02, "e1d": 0.2, "e1q": 0.85, "e2d": 0.2, "e2q": 0.85}
     size = motor.Sn.v / system.config.mva  # currents are per unit of the system
@@ -73,7 +98,9 @@ def start_running(system, motor):
 def play(tables, dip):
     """Time series of the load at a step of `dip['step']` s."""
     system = load_case(tables, dip["frequency"])
-    motor = next((getattr(system, name) for name in ("Motor3", "Motor5") if getattr(system, name).n), None)
+    motor = next(
+        (getattr(system, name) for name in ("Motor3", "Motor5") if getattr(system, name).n), None
+    )
     if motor is not None:
         start_running(system, motor)
     if not system.PFlow.run():
@@ -87,12 +114,19 @@ def play(tables, dip):
 
     system.TDS.callpert = follow
     config = system.TDS.config
-    config.tf, config.tstep, config.fixt, config.shrinkt = dip["step"] * (len(voltage) - 1), dip["step"], 1, 0
+    config.tf, config.tstep, config.fixt, config.shrinkt = (
+        dip["step"] * (len(voltage) - 1),
+        dip["step"],
+        1,
+        0,
+    )
     config.no_tqdm, config.tol, config.honest, config.max_iter = 1, 1e-7, 1, 30
     started = time.perf_counter()
     if not system.TDS.run():
         raise SystemExit("the time domain simulation of ANDES did not converge")
-    return {"seconds": time.perf_counter() - started} | response(system, motor, tables["Bus"][0]["idx"])
+    return {"seconds": time.perf_counter() - started} | response(
+        system, motor, tables["Bus"][0]["idx"]
+    )
 
 
 def response(system, motor, bus):
@@ -110,7 +144,14 @@ def response(system, motor, bus):
         law = system.ZIP
         P += law.pp0.v[0] + law.pi0.v[0] * U + law.pz0.v[0] * U**2
         Q += law.qp0.v[0] + law.qi0.v[0] * U + law.qz0.v[0] * U**2
-    return {"version": andes.__version__, "t": np.array(series.t), "U": U, "angle": angle, "P": P, "Q": Q}
+    return {
+        "version": andes.__version__,
+        "t": np.array(series.t),
+        "U": U,
+        "angle": angle,
+        "P": P,
+        "Q": Q,
+    }
 
 
 if __name__ == "__main__":

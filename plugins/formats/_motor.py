@@ -9,8 +9,8 @@ SAME = {"branch": "constant_impedance"}  # what phasors see of a static load
 def restore_load(load, motor, law, static):
     """The load that a file's numbers give.
 
-    `motor` is None, or its circuit (a `TCircuit`), inertia H [s] and load torque [pu]; `law` are the static load's
-    parameters by name, `static` its P and Q before the event [pu].
+    `motor` is None, or its circuit (a `TCircuit`), inertia H [s] and load torque [pu]; `law` are
+    the static load's parameters by name, `static` its P and Q before the event [pu].
     """
     parts = {"motor": {"name": "none"}, "static": {"name": "none"}, "effects": []}
     values = dict(law)
@@ -27,13 +27,22 @@ def restore_load(load, motor, law, static):
 
 
 def terms(load):
-    """The static load as a polynomial: three (coefficient, exponent) of U/U_0 for P, and three for Q."""
+    """The static load as a polynomial: three (coefficient, exponent) of U/U_0 for P, and three for
+    Q.
+    """
     value, static = load.values.get, load.result.model["static"]["name"]
     if static == "zip":
         shares = [(value(f"{x}_Z"), value(f"{x}_I")) for x in "ab"]
         return [((Z, 2.0), (current, 1.0), (1 - Z - current, 0.0)) for Z, current in shares]
-    fixed = {"constant_impedance": (2.0, 2.0), "branch": (2.0, 2.0), "constant_power": (0.0, 0.0)}.get(static)
-    return [((1.0, n), (0.0, 0.0), (0.0, 0.0)) for n in fixed or (load.values["p_v"], load.values["q_v"])]
+    fixed = {
+        "constant_impedance": (2.0, 2.0),
+        "branch": (2.0, 2.0),
+        "constant_power": (0.0, 0.0),
+    }.get(static)
+    return [
+        ((1.0, n), (0.0, 0.0), (0.0, 0.0))
+        for n in fixed or (load.values["p_v"], load.values["q_v"])
+    ]
 
 
 def law(load, sides):

@@ -8,15 +8,18 @@ from tractexp.extend.formats import Format, Restored, quoting
 
 @plugin
 class Modelica(Format):
-    """A Modelica model with inputs U [pu] and omega_s [rad/s] and outputs P, Q [pu], written from the equations.
+    """A Modelica model with inputs U [pu] and omega_s [rad/s] and outputs P, Q [pu], written from
+    the equations.
 
-    Every continuous state, parameter and equation of the identified model, effects included, appears under its own
-    name; a phasor as its real and imaginary part. States start at the steady state before the event and the model needs
-    no library. Connect the inputs to the magnitude and speed of a terminal's voltage phasor.
+    Every continuous state, parameter and equation of the identified model, effects included,
+    appears under its own name; a phasor as its real and imaginary part. States start at the steady
+    state before the event and the model needs no library. Connect the inputs to the magnitude and
+    speed of a terminal's voltage phasor.
 
     Not to be confused with a component of a power system library: it has no electrical connector.
 
-    Source: Modelica Language Specification 3.6, chapters 4 (models), 8 (equations) and 3 (operators).
+    Source: Modelica Language Specification 3.6, chapters 4 (models), 8 (equations) and 3
+    (operators).
     Departures: none. Models with discrete memories, and effects of the measurement, are refused.
     """
 
@@ -35,13 +38,18 @@ class Modelica(Format):
         lines = [f"model TractionLoad {quoting.modelica(f'{load.model.title}, {base}')}"]
         for p in load.model.parameters:
             about = f"{p.about.replace(RECORD, 'this base')} [{p.unit}]"
-            lines.append(f"  parameter Real {p.name} = {load.values[p.name]!r} {quoting.modelica(about)};")
+            lines.append(
+                f"  parameter Real {p.name} = {load.values[p.name]!r} {quoting.modelica(about)};"
+            )
         for name, about in BEFORE.items():
             if any(_reads(right, name) for _, right in rows) or name in ("U0", "omega_s0"):
-                lines.append(f"  parameter Real {name} = {before[name]!r} {quoting.modelica(about)};")
+                lines.append(
+                    f"  parameter Real {name} = {before[name]!r} {quoting.modelica(about)};"
+                )
         lines += [f"  input Real U(start = U0) {quoting.modelica('voltage [pu]')};"]
         lines += [
-            f"  input Real omega_s(start = omega_s0) {quoting.modelica('synchronous speed less nominal [rad/s]')};"
+            "  input Real omega_s(start = omega_s0)"
+            f" {quoting.modelica('synchronous speed less nominal [rad/s]')};"
         ]
         if any(_reads(right, "U2") for _, right in rows):
             lines.append(f"  input Real U2 {quoting.modelica('negative-sequence voltage [pu]')};")
@@ -49,13 +57,23 @@ class Modelica(Format):
         for (symbol, *_), start in zip(eq.real_states(), eq.real_starts(), strict=True):
             lines.append(f"  Real {symbol}(start = {before[start.name]!r}, fixed = true);")
         lines += [f"  Real {symbol};" for symbol in eq.steps]
-        lines += ["equation", *(f"  {left} = {right};" for left, right in rows), "end TractionLoad;"]
+        lines += [
+            "equation",
+            *(f"  {left} = {right};" for left, right in rows),
+            "end TractionLoad;",
+        ]
         return "\n".join(lines) + "\n"
 
     def read_back(self, text, load):
-        numbers = {name: float(value) for name, value in re.findall(r"parameter Real (\w+) = ([-+.\de]+) ", text)}
-        model = {key: load.result.model[key] for key in ("motor", "static", "effects", "integration")
-                 if key in load.result.model}  # fmt: skip
+        numbers = {
+            name: float(value)
+            for name, value in re.findall(r"parameter Real (\w+) = ([-+.\de]+) ", text)
+        }
+        model = {
+            key: load.result.model[key]
+            for key in ("motor", "static", "effects", "integration")
+            if key in load.result.model
+        }
         parameters = {p.name: numbers[p.name] for p in load.model.parameters}
         static = load.before.get("P_static", 0.0), load.before.get("Q_static", 0.0)
         return Restored(model, parameters, static)
@@ -76,13 +94,22 @@ BEFORE = {
 
 
 def _equations(eq):
-    """(left, right) of each equation, as Modelica text; what the static load draws before the event is one name."""
+    """(left, right) of each equation, as Modelica text; what the static load draws before the event
+    is one name.
+    """
     from tractexp.extend.symbols import Symbol
 
     static = {eq.P_s0: Symbol("P_left", real=True), eq.Q_s0: Symbol("Q_left", real=True)}
-    named = {symbol: Symbol(name, real=True) for symbol, name in zip(static.values(), ("P_s0", "Q_s0"), strict=True)}
+    named = {
+        symbol: Symbol(name, real=True)
+        for symbol, name in zip(static.values(), ("P_s0", "Q_s0"), strict=True)
+    }
     at = {eq.U_rate: Symbol("der(U)", real=True), eq.t: Symbol("time", real=True)}
-    show = lambda e: _modelica(eq.real(eq.expand(e, lambda s: s not in static).xreplace(static)).xreplace(named | at))  # noqa: E731
+
+    def show(e):
+        kept = eq.real(eq.expand(e, lambda s: s not in static).xreplace(static))
+        return _modelica(kept.xreplace(named | at))
+
     rows = [(f"der({symbol})", _modelica(d.xreplace(at))) for symbol, d, _ in eq.real_states()]
     rows += [(symbol.name, show(e)) for symbol, e in eq.steps.items()]
     return [*rows, ("P", show(eq.P)), ("Q", show(eq.Q))]
@@ -98,13 +125,19 @@ def _modelica(expression):
             if expr.exp == Rational(1, 2):
                 return f"sqrt({self._print(expr.base)})"
             base, power = (self.parenthesize(x, 80) for x in (expr.base, expr.exp))
-            return f"{base}^{power}" if not expr.exp.is_negative else f"{base}^({self._print(expr.exp)})"
+            return (
+                f"{base}^{power}"
+                if not expr.exp.is_negative
+                else f"{base}^({self._print(expr.exp)})"
+            )
 
         def _print_Float(self, expr):
             return repr(float(expr))
 
     names = {"Max(": "max(", "Min(": "min(", "Abs(": "abs("}
-    text = Printer({"full_prec": False}).doprint(expression.evalf() if isinstance(expression, Float) else expression)
+    text = Printer({"full_prec": False}).doprint(
+        expression.evalf() if isinstance(expression, Float) else expression
+    )
     for python, modelica in names.items():
         text = text.replace(python, modelica)
     return text

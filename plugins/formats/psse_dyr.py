@@ -8,18 +8,21 @@ from ._motor import law, restore_load, terms
 
 @plugin
 class PsseDyr(Format):
-    """Records of a PSS/E .dyr file: the motor as CIM5BL on load 'M' of the bus, the static load as IEELBL on load 'S'.
+    """Records of a PSS/E .dyr file: the motor as CIM5BL on load 'M' of the bus, the static load as
+    IEELBL on load 'S'.
 
-    CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H, VI, TI, TB, D,
-    TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI = 0); MBASE is the export's base.
-    R2 = X2 = 0 is a single cage; of `stator_flux` the stator's transients are left out. IEELBL: three terms a V^n
-    each for P and for Q, then the frequency coefficients, then the exponents, n1..n6; coefficients are divided by
-    U_0^n, because V is the bus voltage and not U/U_0.
+    CIM5BL: bus, model, load, IT, RA, XA, XM, R1, X1, R2, X2, E1, S(E1), E2, S(E2), MBASE, PMULT, H,
+    VI, TI, TB, D, TNOM. Type 1, no saturation, constant torque (D = 0), no undervoltage trip (VI =
+    0); MBASE is the export's base. R2 = X2 = 0 is a single cage; of `stator_flux` the stator's
+    transients are left out. IEELBL: three terms a V^n each for P and for Q, then the frequency
+    coefficients, then the exponents, n1..n6; coefficients are divided by U_0^n, because V is the
+    bus voltage and not U/U_0.
 
-    Not to be confused with the power flow data: the two loads and their MW and Mvar must be in the .raw file.
+    Not to be confused with the power flow data: the two loads and their MW and Mvar must be in the
+    .raw file.
 
-    Source: PowerWorld Simulator help, CIM5 (parameters, MBASE, types); STEPS and uqgrid, which read .dyr files, for the
-    order of CIM5BL's and IEELBL's constants and for T0' and X' from them.
+    Source: PowerWorld Simulator help, CIM5 (parameters, MBASE, types); STEPS and uqgrid, which read
+    .dyr files, for the order of CIM5BL's and IEELBL's constants and for T0' and X' from them.
     Departures: none.
     """
 
@@ -36,11 +39,28 @@ class PsseDyr(Format):
             saturation, trip = (0.0, 0.0, 0.0, 0.0), (0.0, 9999.0, 0.0)
             rating = (load.power, 1.0, load.inertia)
             records.append(
-                _record(load.bus, "CIM5BL", "M", 1, c.R_s, c.X_s, c.X_m, *cages, *saturation, *rating, *trip, 0.0, 0.0)
+                _record(
+                    load.bus,
+                    "CIM5BL",
+                    "M",
+                    1,
+                    c.R_s,
+                    c.X_s,
+                    c.X_m,
+                    *cages,
+                    *saturation,
+                    *rating,
+                    *trip,
+                    0.0,
+                    0.0,
+                )
             )
         if "P_static" in load.before:
             pairs = [pair for side in terms(load) for pair in side]
-            coefficients, exponents = [a / load.before["U0"] ** n for a, n in pairs], [n for _, n in pairs]
+            coefficients, exponents = (
+                [a / load.before["U0"] ** n for a, n in pairs],
+                [n for _, n in pairs],
+            )
             records.append(_record(load.bus, "IEELBL", "S", *coefficients, 0.0, 0.0, *exponents))
         return "".join(records)
 
@@ -49,7 +69,10 @@ class PsseDyr(Format):
         for identifier, part in (("M", "motor"), ("S", "static")):
             if f"P_{part}" in load.before:
                 P, Q = (load.power * load.before[f"{power}_{part}"] for power in "PQ")
-                lines.append(f"load '{identifier}' of bus {load.bus} in the power flow: {P:.6g} MW, {Q:.6g} Mvar")
+                lines.append(
+                    f"load '{identifier}' of bus {load.bus} in the power flow: {P:.6g} MW, {Q:.6g}"
+                    " Mvar"
+                )
         return lines
 
     def read_back(self, text, load):
@@ -61,7 +84,8 @@ class PsseDyr(Format):
                 cages = c[4:6] + (c[6:8] if c[7] else [None, None])
                 motor = TCircuit(load.omega_n, *c[1:4], *cages), c[14], load.values["T_m"]
             else:
-                static = load.before["P_static"], load.before["Q_static"]  # in the power flow: see the notes
+                # in the power flow: see the notes
+                static = load.before["P_static"], load.before["Q_static"]
                 pairs = [(c[k] * load.before["U0"] ** c[8 + k], c[8 + k]) for k in range(6)]
                 own = law(load, (pairs[:3], pairs[3:]))
         return restore_load(load, motor, own, static)

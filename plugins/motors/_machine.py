@@ -1,29 +1,53 @@
-"""What the motors share: parameters by one name and meaning, and the steady state of a single cage, Eq. (3)."""
+"""What the motors share: parameters by one name and meaning, and the steady state of a single cage,
+Eq. (3).
+"""
 
 from tractexp.extend import Parameter, sites
 
 PAPER = "Wu, Fan, Zou 2022, Energies 15(14) 5034"
 
-T_PRIME = Parameter(0.1, (0.005, 0.5), "s", "transient time constant X'/X T0'", f"{PAPER}, Eq. (1)", "T'")
+T_PRIME = Parameter(
+    0.1, (0.005, 0.5), "s", "transient time constant X'/X T0'", f"{PAPER}, Eq. (1)", "T'"
+)
 X_PRIME = Parameter(
-    0.3, (0.05, 1.5), "pu", "transient reactance on the record's base", f"{PAPER}, Eq. (2)", "X'", power_exponent=-1
+    0.3,
+    (0.05, 1.5),
+    "pu",
+    "transient reactance on the record's base",
+    f"{PAPER}, Eq. (2)",
+    "X'",
+    power_exponent=-1,
 )
 C = Parameter(0.9, (0.3, 0.99), "1", "(X - X')/X", f"{PAPER}, Eq. (1)")
-M = Parameter(0.005, (0.0005, 0.03), "pu s²/rad", "inertia, H = M omega_s/2", f"{PAPER}, Eq. (1)", power_exponent=1)
+M = Parameter(
+    0.005,
+    (0.0005, 0.03),
+    "pu s²/rad",
+    "inertia, H = M omega_s/2",
+    f"{PAPER}, Eq. (1)",
+    power_exponent=1,
+)
 T_M = Parameter(
-    0.5, (0.05, 1.0), "pu", "load torque, the motor's power before the event", f"{PAPER}, Eq. (1)", power_exponent=1
+    0.5,
+    (0.05, 1.0),
+    "pu",
+    "load torque, the motor's power before the event",
+    f"{PAPER}, Eq. (1)",
+    power_exponent=1,
 )
 
 
 def usual(T_prime, X_prime, C, M, T_m):
-    """What one cage usually is: medians of seven types of motor, and one and a half times the logarithms' scatter.
+    """What one cage usually is: medians of seven types of motor, and one and a half times the
+    logarithms' scatter.
 
-    An aggregate of unknown machines may lie farther off than the types do, hence the half more. X'/X and R_s/X' are the
-    machine's; X' T_m and M/T_m are its transient reactance and 2 H/omega_n times and over its load factor, whatever the
-    base.
+    An aggregate of unknown machines may lie farther off than the types do, hence the half more.
+    X'/X and R_s/X' are the machine's; X' T_m and M/T_m are its transient reactance and 2 H/omega_n
+    times and over its load factor, whatever the base.
 
-    Source: IEEE Task Force on Load Representation 1995, typical data of seven types of induction motor (small and large
-    industrial, pumps, power plant auxiliaries, residential, mixed, air conditioners), at 60 Hz.
+    Source: IEEE Task Force on Load Representation 1995, typical data of seven types of induction
+    motor (small and large industrial, pumps, power plant auxiliaries, residential, mixed, air
+    conditioners), at 60 Hz.
     """
     return [
         (1 - C, 0.082, 1.33),
@@ -34,10 +58,11 @@ def usual(T_prime, X_prime, C, M, T_m):
 
 
 def single_cage(eq, T_prime, X_prime, C, T_m):
-    """Declare what the motors with rotor flux and without stator transients share, Eqs. (1)-(2) but for the speed.
+    """Declare what the motors with rotor flux and without stator transients share, Eqs. (1)-(2) but
+    for the speed.
 
-    Returns the stator current, the speed's symbol, its value relative to synchronous before the event, and the
-    excess of the electrical over the load torque.
+    Returns the stator current, the speed's symbol, its value relative to synchronous before the
+    event, and the excess of the electrical over the load torque.
     """
     from sympy import I
 
@@ -67,19 +92,25 @@ def rotor(eq, E, inner, omega, current, T_prime, X_prime, C, T_m):
 
 
 def at_rest(eq, T_prime, X_prime, C, T_m):
-    """Internal voltage and speed relative to synchronous before the event, Eq. (3): the stable of two solutions."""
+    """Internal voltage and speed relative to synchronous before the event, Eq. (3): the stable of
+    two solutions.
+    """
     from sympy import I
 
     sine, cosine = _angle(eq, X_prime, C, T_m)
-    return C * eq.U0 / 2 * (1 + cosine - I * sine), -sine / (1 + cosine) / T_prime  # C U0 cos(delta_0) exp(j delta_0)
+    # C U0 cos(delta_0) exp(j delta_0)
+    return C * eq.U0 / 2 * (1 + cosine - I * sine), -sine / (1 + cosine) / T_prime
 
 
 def require(eq, positive, X_prime, C, T_m):
-    """State what the steady state of Eq. (3) needs: a real angle, a C between 0 and 1, the others positive."""
+    """State what the steady state of Eq. (3) needs: a real angle, a C between 0 and 1, the others
+    positive.
+    """
     sine, _ = _angle(eq, X_prime, C, T_m)
     eq.require(
         1 - abs(sine),
-        "no steady state exists before the event: Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it is {value:.3g};"
+        "no steady state exists before the event: Eq. (3) needs |2 T_m X'/(C U0²)| at most 1 and it"
+        " is {value:.3g};"
         " lower T_m or X', or raise C",
         abs(sine),
     )

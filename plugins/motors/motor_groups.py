@@ -12,15 +12,17 @@ class MotorGroups(Motor):
 
         I = I_1 + I_2 + ...,        P_d + j Q_d = V I*
 
-    `of` names the motors, each a name or a mapping of name and settings; `model/motor=[a,b]` on the command line says
-    the same. What the first declares keeps its names, what the k-th declares ends in `_k`: `T_m_2`, `E_2`. The default
-    of `T_m` is shared between them and that of `M` doubles from one to the next.
+    `of` names the motors, each a name or a mapping of name and settings; `model/motor=[a,b]` on the
+    command line says the same. What the first declares keeps its names, what the k-th declares ends
+    in `_k`: `T_m_2`, `E_2`. The default of `T_m` is shared between them and that of `M` doubles
+    from one to the next.
 
-    Groups of the same kind could change places without changing the power: of each kind they stand in order of
-    inertia, M <= M_2, which is a requirement of the model. Effects act on the first group, and their null is the same.
+    Groups of the same kind could change places without changing the power: of each kind they stand
+    in order of inertia, M <= M_2, which is a requirement of the model. Effects act on the first
+    group, and their null is the same.
 
-    Not to be confused with the effect `second_motor_group`, which has one parameter set and two inertias: of that the
-    null is one group, so that a record can be asked whether there are two.
+    Not to be confused with the effect `second_motor_group`, which has one parameter set and two
+    inertias: of that the null is one group, so that a record can be asked whether there are two.
 
     Source: WECC composite load model specification (motors A, B, C side by side); each motor's own.
     Departures: none.
@@ -32,16 +34,23 @@ class MotorGroups(Motor):
 
     def __post_init__(self):
         if len(self.of) < 2:
-            raise UserError(f"several motor groups are two or more, and model/motor={self.of} names {len(self.of)}")
+            raise UserError(
+                f"several motor groups are two or more, and model/motor={self.of} names"
+                f" {len(self.of)}"
+            )
         for member in map(_name, self.of):
             if member in ("none", self.name):
-                raise UserError(f"model/motor={self.of} has '{member}' in it, which is no motor by itself")
+                raise UserError(
+                    f"model/motor={self.of} has '{member}' in it, which is no motor by itself"
+                )
         members: tuple[Motor, ...] = tuple(
             build("model/motor", m if isinstance(m, Mapping) else {"name": m}) for m in self.of
         )
         fields = {
             "members": members,
-            "parameters": tuple(p for k, one in enumerate(members, 1) for p in _own(one, k, len(members))),
+            "parameters": tuple(
+                p for k, one in enumerate(members, 1) for p in _own(one, k, len(members))
+            ),
             "reads": tuple(dict.fromkeys(channel for one in members for channel in one.reads)),
             "within_a_cycle": any(one.within_a_cycle for one in members),
             "phasors_only": next((one.phasors_only for one in members if one.phasors_only), ""),
@@ -81,16 +90,28 @@ class MotorGroups(Motor):
         for k, member in enumerate(self.of, 1):
             M = parameters.get("M" + _suffix(k))
             if M is not None and (before := last.get(str(member))) is not None:
-                sentence = f"groups of the same motor stand in order of inertia: {before} may not exceed {M}, and it is"
-                eq.require(M - before, sentence + " larger by {value:.3g}; let them change places", before - M)
+                sentence = (
+                    f"groups of the same motor stand in order of inertia: {before} may not exceed"
+                    f" {M}, and it is"
+                )
+                eq.require(
+                    M - before,
+                    sentence + " larger by {value:.3g}; let them change places",
+                    before - M,
+                )
             last[str(member)] = M
 
 
 def _name(member):
-    """What a member is called. Raises `UserError` for what is neither a name, nor a mapping that has one."""
+    """What a member is called. Raises `UserError` for what is neither a name, nor a mapping that
+    has one.
+    """
     name = member.get("name") if isinstance(member, Mapping) else member
     if not isinstance(name, str):
-        raise UserError(f"model/motor has {member!r} in its list; give a name, or a mapping of 'name' and settings")
+        raise UserError(
+            f"model/motor has {member!r} in its list; give a name, or a mapping of 'name' and"
+            " settings"
+        )
     return name
 
 
@@ -107,4 +128,10 @@ def _own(motor, k, groups):
             yield replace(p, default=default)
         else:
             symbol = rf"{{{p.symbol}}}_{k}"
-            yield replace(p, default=default, name=p.name + _suffix(k), symbol=symbol, about=f"{p.about}, of group {k}")
+            yield replace(
+                p,
+                default=default,
+                name=p.name + _suffix(k),
+                symbol=symbol,
+                about=f"{p.about}, of group {k}",
+            )

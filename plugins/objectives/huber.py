@@ -9,13 +9,16 @@ from tractexp.extend import Loss, check_range, plugin
 class Huber(Loss):
     """Residuals beyond `tuning` usual ones count by their size, not by their square.
 
-    Source: Huber 1964, with his tuning of 1.345: 95 % of the efficiency of least squares under normal noise.
-    Departures: the scale is not estimated along with the fit but taken from the noise before the dip.
+    Source: Huber 1964, with his tuning of 1.345: 95 % of the efficiency of least squares under
+    normal noise.
+    Departures: the scale is not estimated along with the fit but taken from the noise before the
+    dip.
     """
 
     quadratic = False
     tuning: float = 1.345  # usual residuals
-    scale: float | None = None  # the usual residual [pu]; null: the standard deviation before each dip
+    # the usual residual [pu]; null: the standard deviation before each dip
+    scale: float | None = None
 
     def check(self) -> None:
         super().check()

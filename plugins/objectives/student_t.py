@@ -15,7 +15,8 @@ class StudentT(Loss):
 
     quadratic = False
     freedom: float = 4.0  # degrees of freedom
-    scale: float | None = None  # the usual residual [pu]; null: the standard deviation before each dip
+    # the usual residual [pu]; null: the standard deviation before each dip
+    scale: float | None = None
 
     def check(self) -> None:
         super().check()

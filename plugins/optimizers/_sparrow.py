@@ -1,7 +1,9 @@
-"""The sparrow search shared by `ssa` and `issa`: one operator per equation, and the loop that applies them.
+"""The sparrow search shared by `ssa` and `issa`: one operator per equation, and the loop that
+applies them.
 
-Equation numbers are those of the traction load paper, section 3; ranks i count from 1, best first. An operator takes
-positions (k, d), draws from the generator it is given, and returns new positions (k, d), not yet clipped.
+Equation numbers are those of the traction load paper, section 3; ranks i count from 1, best first.
+An operator takes positions (k, d), draws from the generator it is given, and returns new positions
+(k, d), not yet clipped.
 """
 
 from collections.abc import Callable, Iterator
@@ -16,7 +18,9 @@ EXP_MAX = 700.0  # exp overflows beyond it; any box ends long before
 
 
 def produce(x: np.ndarray, alarmed: bool, iterations: int, rng: np.random.Generator) -> np.ndarray:
-    """Producers, Eq. (11), ranks 1 to k: x exp(-i / (alpha iter_max)), or x + Q L once R2 >= ST (`alarmed`)."""
+    """Producers, Eq. (11), ranks 1 to k: x exp(-i / (alpha iter_max)), or x + Q L once R2 >= ST
+    (`alarmed`).
+    """
     if alarmed:
         return x + rng.standard_normal((len(x), 1))
     rank = np.arange(1, len(x) + 1)[:, None]
@@ -25,28 +29,41 @@ def produce(x: np.ndarray, alarmed: bool, iterations: int, rng: np.random.Genera
 
 
 def follow(
-    x: np.ndarray, leader: np.ndarray, flight: np.ndarray | float, scalar: bool, rng: np.random.Generator
+    x: np.ndarray,
+    leader: np.ndarray,
+    flight: np.ndarray | float,
+    scalar: bool,
+    rng: np.random.Generator,
 ) -> np.ndarray:
-    """Scroungers up to rank n/2, Eqs. (12) and (16): X_P + s |x - X_P| A+ L, where A is +-1 and A+ = A^T (A A^T)^-1.
+    """Scroungers up to rank n/2, Eqs. (12) and (16): X_P + s |x - X_P| A+ L, where A is +-1 and A+
+    = A^T (A A^T)^-1.
 
-    As printed, shapes (1, d), (d, 1) and (1, d) make one number for all coordinates, with A+ = A^T / d: `scalar`.
-    Element-wise, the equation holds for each coordinate by itself, d = 1, where A+ = A.
+    As printed, shapes (1, d), (d, 1) and (1, d) make one number for all coordinates, with A+ = A^T
+    / d: `scalar`. Element-wise, the equation holds for each coordinate by itself, d = 1, where A+ =
+    A.
     """
     signed = flight * np.abs(x - leader) * (2.0 * rng.integers(0, 2, x.shape) - 1.0)
     return leader + (signed.mean(axis=1, keepdims=True) if scalar else signed)
 
 
-def starve(x: np.ndarray, worst: np.ndarray, rank: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+def starve(
+    x: np.ndarray, worst: np.ndarray, rank: np.ndarray, rng: np.random.Generator
+) -> np.ndarray:
     """Scroungers of rank (k,) beyond n/2, Eq. (12): Q exp((X_worst - x) / i^2)."""
     grown = np.exp(np.minimum((worst - x) / rank[:, None] ** 2, EXP_MAX))
     return rng.standard_normal((len(x), 1)) * grown
 
 
 def perceive(
-    x: np.ndarray, f: np.ndarray, best: tuple[np.ndarray, float], worst: tuple[np.ndarray, float],
+    x: np.ndarray,
+    f: np.ndarray,
+    best: tuple[np.ndarray, float],
+    worst: tuple[np.ndarray, float],
     rng: np.random.Generator,
-) -> np.ndarray:  # fmt: skip
-    """Perceivers with objectives f (k,), Eq. (13): about the best, or, for the best itself, away from the worst."""
+) -> np.ndarray:
+    """Perceivers with objectives f (k,), Eq. (13): about the best, or, for the best itself, away
+    from the worst.
+    """
     beta = rng.standard_normal(x.shape)
     k = rng.uniform(-1.0, 1.0, (len(x), 1))
     away = x + k * np.abs(x - worst[0]) / (f - worst[1] + TINY)[:, None]
@@ -73,7 +90,9 @@ class Flock:
         self.x, self.f = self.x[order], self.f[order]
 
     def move(self, rows: np.ndarray, x: np.ndarray) -> None:
-        """Propose positions x (k, d) to the sparrows `rows` (k,), which take them always, or only where better."""
+        """Propose positions x (k, d) to the sparrows `rows` (k,), which take them always, or only
+        where better.
+        """
         x, f = self.evaluate(x)
         if self.better_only:
             better = f < self.f[rows]
@@ -84,14 +103,18 @@ class Flock:
 
 @dataclass(frozen=True, kw_only=True)
 class Sparrow(Iterative):
-    """The loop: rank, producers, scroungers and perceivers, and what a subclass adds at three places."""
+    """The loop: rank, producers, scroungers and perceivers, and what a subclass adds at three
+    places.
+    """
 
     population: int = 50
     producers: float = 0.2  # share of the population, the best
-    perceivers: float = 0.4  # share of the population, drawn anew in each iteration: SD of section 4.3
+    # share of the population, drawn anew in each iteration: SD of section 4.3
+    perceivers: float = 0.4
     safety_threshold: float = 0.8  # ST of Eq. (11)
     acceptance: str = "better"  # "better": a sparrow moves only to improve; "all": always
-    step: str = "elementwise"  # A+ L of Eq. (12): "elementwise" or, as printed, one "scalar" for all coordinates
+    # A+ L of Eq. (12): "elementwise" or, as printed, one "scalar" for all coordinates
+    step: str = "elementwise"
 
     def check(self) -> None:
         super().check()
@@ -110,8 +133,12 @@ class Sparrow(Iterative):
         """The step s of Eq. (16) for each coordinate; Eq. (12) has none."""
         return 1.0
 
-    def perturbation(self, box: Box, iterations: int, rng: np.random.Generator) -> Callable[[int, Flock], None]:
-        """What is done to the flock at the end of iteration t = 1, 2, ... of so many; traditionally nothing."""
+    def perturbation(
+        self, box: Box, iterations: int, rng: np.random.Generator
+    ) -> Callable[[int, Flock], None]:
+        """What is done to the flock at the end of iteration t = 1, 2, ... of so many; traditionally
+        nothing.
+        """
         return lambda t, flock: None
 
     @property
@@ -121,7 +148,9 @@ class Sparrow(Iterative):
 
     @property
     def _foraging(self) -> float:
-        """The simulations of Eqs. (11)-(13) in an iteration, on average: producers who perceive move twice."""
+        """The simulations of Eqs. (11)-(13) in an iteration, on average: producers who perceive
+        move twice.
+        """
         return self.population * (1.0 + self.perceivers * self.producers)
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
@@ -136,10 +165,11 @@ class Sparrow(Iterative):
             yield
 
     def _forage(self, flock: Flock, iterations: int, rng: np.random.Generator) -> None:
-        """Eqs. (11)-(13). X_P is the best producer after its move; a perceiver makes that move instead of its own.
+        """Eqs. (11)-(13). X_P is the best producer after its move; a perceiver makes that move
+        instead of its own.
 
-        The authors' code simulates a scrounger's move even where the perceiver's then replaces it; here it is not,
-        which changes no position.
+        The authors' code simulates a scrounger's move even where the perceiver's then replaces it;
+        here it is not, which changes no position.
         """
         n = self.population
         p = max(1, round(self.producers * n))

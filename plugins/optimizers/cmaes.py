@@ -13,17 +13,21 @@ def _pycma() -> Any:
         import cma
     except ImportError as error:
         raise UserError(
-            "optimizer=cmaes needs the package 'cma', which is not installed: pip install 'tractexp[cmaes]'"
+            "optimizer=cmaes needs the package 'cma', which is not installed: pip install"
+            " 'tractexp[cmaes]'"
         ) from error
     return cma
 
 
 @plugin
 class CMAES(Iterative):
-    """Covariance matrix adaptation, restarted with a doubled population from a new random point when it stalls.
+    """Covariance matrix adaptation, restarted with a doubled population from a new random point
+    when it stalls.
 
-    Source: Hansen and Ostermeier 2001; restarts (IPOP) by Auger and Hansen 2005; the implementation is pycma.
-    Departures: none; pycma draws from the search's own generator and leaves NumPy's global state alone.
+    Source: Hansen and Ostermeier 2001; restarts (IPOP) by Auger and Hansen 2005; the implementation
+    is pycma.
+    Departures: none; pycma draws from the search's own generator and leaves NumPy's global state
+    alone.
     """
 
     population: int = 0  # 0: pycma's 4 + 3 ln d

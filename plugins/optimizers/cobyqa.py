@@ -13,17 +13,20 @@ APART = 0.3  # of the box, in the coordinate in which two starts differ most
 
 @plugin
 class COBYQA(Iterative):
-    """Quadratic models of the objective, in a trust region within the bounds, from the best points of a scatter.
+    """Quadratic models of the objective, in a trust region within the bounds, from the best points
+    of a scatter.
 
-    A model m(x) = c + g'x + x'Hx/2 passes through 2 d + 1 points, with the least change of H since the last one; a step
-    goes to its minimum in |x - x_best| <= Delta within the bounds, one simulation; Delta grows where the model was
-    right and shrinks where not, and a descent ends once it is below `precision`. An iteration is one descent. When the
-    starts of a scatter are used up, another is drawn.
+    A model m(x) = c + g'x + x'Hx/2 passes through 2 d + 1 points, with the least change of H since
+    the last one; a step goes to its minimum in |x - x_best| <= Delta within the bounds, one
+    simulation; Delta grows where the model was right and shrinks where not, and a descent ends once
+    it is below `precision`. An iteration is one descent. When the starts of a scatter are used up,
+    another is drawn.
 
     Source: Ragonneau 2022, "Model-based derivative-free optimization methods and software", as
     scipy.optimize.minimize(method="COBYQA"); uniform scatter and starts are our own.
-    Departures: objectives of refused candidates are lowered to the worst of the scatter, as a parabola through 1e12
-    is no model of its neighborhood. It evaluates one point at a time and itself takes about a millisecond for each.
+    Departures: objectives of refused candidates are lowered to the worst of the scatter, as a
+    parabola through 1e12 is no model of its neighborhood. It evaluates one point at a time and
+    itself takes about a millisecond for each.
     """
 
     usual: ClassVar[int] = 10  # descents
@@ -56,8 +59,14 @@ class COBYQA(Iterative):
         from scipy.optimize import minimize
 
         minimize(
-            lambda unit: min(float(evaluate(box.from_unit(unit[None]))[1][0]), ceiling), start, method="COBYQA",
+            lambda unit: min(float(evaluate(box.from_unit(unit[None]))[1][0]), ceiling),
+            start,
+            method="COBYQA",
             bounds=[(0.0, 1.0)] * box.dimension,
-            options={"initial_tr_radius": self.radius, "final_tr_radius": self.precision, "maxfev": 10**9,
-                     "maxiter": 10**9},
-        )  # fmt: skip
+            options={
+                "initial_tr_radius": self.radius,
+                "final_tr_radius": self.precision,
+                "maxfev": 10**9,
+                "maxiter": 10**9,
+            },
+        )

@@ -16,13 +16,16 @@ STRATEGIES = tuple(
 
 @plugin
 class DifferentialEvolution(Iterative):
-    """SciPy's differential evolution, a generation as one batch, its factor F drawn anew for each (dither).
+    """SciPy's differential evolution, a generation as one batch, its factor F drawn anew for each
+    (dither).
 
-    Ends after `iterations`, or once the spread of the population's objectives is `tolerance` of their mean.
+    Ends after `iterations`, or once the spread of the population's objectives is `tolerance` of
+    their mean.
 
     Source: Storn and Price 1997, as scipy.optimize.differential_evolution.
-    Departures: a trial competes at the end of its generation (SciPy's updating='deferred'). SciPy evaluates the
-    initial population and the first generation in one step, so iteration 0 spends both.
+    Departures: a trial competes at the end of its generation (SciPy's updating='deferred'). SciPy
+    evaluates the initial population and the first generation in one step, so iteration 0 spends
+    both.
     """
 
     population: int = 50

@@ -20,7 +20,9 @@ def tent(z: np.ndarray, alpha: float) -> np.ndarray:
 
 
 def tent_orbit(z: np.ndarray, alpha: float, rng: np.random.Generator) -> np.ndarray:
-    """`tent`, with an orbit that has reached its dead point 0 started anew (alpha = 0.5 does so in 53 steps)."""
+    """`tent`, with an orbit that has reached its dead point 0 started anew (alpha = 0.5 does so in
+    53 steps).
+    """
     z = tent(z, alpha)
     dead = (z <= 0.0) | (z >= 1.0)
     return np.where(dead, rng.random(z.shape), z) if dead.any() else z
@@ -51,15 +53,18 @@ def disturb(x: np.ndarray, z: np.ndarray, box: Box) -> np.ndarray:
 
 @plugin
 class ISSA(Sparrow):
-    """Sparrow search with tent initialization, Levy flight, Gaussian variation and tent perturbation.
+    """Sparrow search with tent initialization, Levy flight, Gaussian variation and tent
+    perturbation.
 
-    With all four off it is `ssa`, bit for bit. By "fitness" (step 5), sparrows better than the mean vary and the
-    others are disturbed, which simulates the population a second time. By "stage" (section 3.2.3), all are
-    disturbed in the first half of the iterations; in the second half the best alone varies, as Eq. (17) prints.
+    With all four off it is `ssa`, bit for bit. By "fitness" (step 5), sparrows better than the mean
+    vary and the others are disturbed, which simulates the population a second time. By "stage"
+    (section 3.2.3), all are disturbed in the first half of the iterations; in the second half the
+    best alone varies, as Eq. (17) prints.
 
-    Source: traction load paper, Eqs. (14)-(19), steps 1-7 and settings of section 4.2; Mantegna 1994.
-    Departures: as `ssa`. Levy's step is Mantegna's unless levy_formula=printed. The paper does not say how
-    step 5 divides the flock: the mean fitness does. Each sparrow has its own chaotic orbit.
+    Source: traction load paper, Eqs. (14)-(19), steps 1-7 and settings of section 4.2; Mantegna
+    1994.
+    Departures: as `ssa`. Levy's step is Mantegna's unless levy_formula=printed. The paper does not
+    say how step 5 divides the flock: the mean fitness does. Each sparrow has its own chaotic orbit.
     """
 
     plain: ClassVar[str] = "ssa"
@@ -86,9 +91,13 @@ class ISSA(Sparrow):
         return box.from_unit(np.array(orbit))
 
     def flight(self, shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray | float:
-        return levy_flight(shape, self.levy_formula, rng) if self.levy else super().flight(shape, rng)
+        return (
+            levy_flight(shape, self.levy_formula, rng) if self.levy else super().flight(shape, rng)
+        )
 
-    def perturbation(self, box: Box, iterations: int, rng: np.random.Generator) -> Callable[[int, Flock], None]:
+    def perturbation(
+        self, box: Box, iterations: int, rng: np.random.Generator
+    ) -> Callable[[int, Flock], None]:
         if not (self.gaussian or self.tent_perturbation):
             return super().perturbation(box, iterations, rng)
         orbit = rng.random((self.population, box.dimension))
@@ -97,7 +106,9 @@ class ISSA(Sparrow):
             nonlocal orbit
             orbit = tent_orbit(orbit, self.tent_alpha, rng)
             varied, disturbed = self._divide(t, iterations, flock.f)
-            x = np.concatenate((vary(flock.x[varied], rng), disturb(flock.x[disturbed], orbit[disturbed], box)))
+            x = np.concatenate(
+                (vary(flock.x[varied], rng), disturb(flock.x[disturbed], orbit[disturbed], box))
+            )
             if len(x):
                 flock.move(np.concatenate((varied, disturbed)), x)
 
@@ -106,12 +117,15 @@ class ISSA(Sparrow):
     @property
     def perturbed(self) -> float:
         shares = self.gaussian * BETTER, self.tent_perturbation * (1.0 - BETTER)
-        if self.schedule == "stage":  # all in one half of the iterations, the best alone in the other
+        # all in one half of the iterations, the best alone in the other
+        if self.schedule == "stage":
             shares = self.gaussian * 0.5 / self.population, self.tent_perturbation * 0.5
         return self.population * sum(shares)
 
     def _divide(self, t: int, iterations: int, f: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Rows to vary and rows to disturb in iteration t; a switch that is off leaves its rows alone."""
+        """Rows to vary and rows to disturb in iteration t; a switch that is off leaves its rows
+        alone.
+        """
         if self.schedule == "fitness":
             better = f < f.mean()
             varied, disturbed = better.nonzero()[0], (~better).nonzero()[0]
@@ -119,4 +133,6 @@ class ISSA(Sparrow):
             varied, disturbed = np.arange(0), np.arange(len(f))
         else:
             varied, disturbed = np.array([f.argmin()]), np.arange(0)
-        return varied[: None if self.gaussian else 0], disturbed[: None if self.tent_perturbation else 0]
+        return varied[: None if self.gaussian else 0], disturbed[
+            : None if self.tent_perturbation else 0
+        ]

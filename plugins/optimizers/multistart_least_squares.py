@@ -11,7 +11,9 @@ CLOSER = 10  # scatters drawn ever closer about the least refused point before a
 
 
 def latin_hypercube(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
-    """(n, d) points of the unit cube, each coordinate with one point in every n-th (McKay et al. 1979)."""
+    """(n, d) points of the unit cube, each coordinate with one point in every n-th (McKay et al.
+    1979).
+    """
     cells = rng.permuted(np.tile(np.arange(n), (d, 1)), axis=1).T
     return (cells + rng.random((n, d))) / n
 
@@ -19,22 +21,26 @@ def latin_hypercube(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
 def toward_walls(unit: np.ndarray) -> np.ndarray:
     """Uniform coordinates made dense near the walls of the unit cube (arcsine distribution).
 
-    Bounds of times and inertias span decades, and on a linear scale most of what they allow lies near the lower one.
+    Bounds of times and inertias span decades, and on a linear scale most of what they allow lies
+    near the lower one.
     """
     return np.sin(np.pi * unit / 2) ** 2
 
 
 @plugin
 class MultistartLeastSquares(Optimizer):
-    """A Latin hypercube, denser near the walls, then bounded least squares from its best points that lie apart.
+    """A Latin hypercube, denser near the walls, then bounded least squares from its best points
+    that lie apart.
 
-    Descents are brief, best start first; the lowest so far goes on to the end, the others only after all have begun.
-    Candidates without a steady state are never started from. Where the whole scatter is refused, it is drawn
-    again about its least refused point, half as wide. One iteration is the scatter or one descent.
+    Descents are brief, best start first; the lowest so far goes on to the end, the others only
+    after all have begun. Candidates without a steady state are never started from. Where the whole
+    scatter is refused, it is drawn again about its least refused point, half as wide. One iteration
+    is the scatter or one descent.
 
-    Source: Branch, Coleman and Li 1999 (SciPy's trust region reflective); McKay, Beckman and Conover 1979.
-    Departures: each coordinate has the arcsine distribution, and descents race; the hypercube is our own, as
-    importing scipy.stats for it takes longer than the search.
+    Source: Branch, Coleman and Li 1999 (SciPy's trust region reflective); McKay, Beckman and
+    Conover 1979.
+    Departures: each coordinate has the arcsine distribution, and descents race; the hypercube is
+    our own, as importing scipy.stats for it takes longer than the search.
     """
 
     scatter: int = 100
@@ -62,4 +68,6 @@ class MultistartLeastSquares(Optimizer):
         feasible = f < REFUSED
         x, f = x[feasible], f[feasible]
         chosen = best_distinct(box.to_unit(x), f, LEAST_START_DISTANCE, self.starts)
-        yield from race(evaluate, box, zip(x[chosen], f[chosen], strict=True), self.tolerance, self.trials)
+        yield from race(
+            evaluate, box, zip(x[chosen], f[chosen], strict=True), self.tolerance, self.trials
+        )

@@ -13,12 +13,14 @@ class PSO(Iterative):
 
         v <- omega v + c1 r1 (p - x) + c2 r2 (g - x),    x <- x + v
 
-    p is a particle's own best, g the swarm's; r1, r2 are uniform in [0, 1) for each particle and coordinate.
+    p is a particle's own best, g the swarm's; r1, r2 are uniform in [0, 1) for each particle and
+    coordinate.
 
-    Source: Shi and Eberhart 1998, Eqs. (3)-(4); omega, c1, c2, population and iterations from section 4.3 of the
-    traction load paper.
-    Departures: the paper is silent on the rest. Velocities start at zero; a particle stopped by a wall loses the
-    velocity that carried it there. The paper prints no limit of the velocity: none is felt below 1, the box's width.
+    Source: Shi and Eberhart 1998, Eqs. (3)-(4); omega, c1, c2, population and iterations from
+    section 4.3 of the traction load paper.
+    Departures: the paper is silent on the rest. Velocities start at zero; a particle stopped by a
+    wall loses the velocity that carried it there. The paper prints no limit of the velocity: none
+    is felt below 1, the box's width.
     """
 
     population: int = 50

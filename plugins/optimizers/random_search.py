@@ -10,7 +10,8 @@ from tractexp.extend import Box, Evaluate, Iterative, check_range, plugin
 
 @plugin
 class RandomSearch(Iterative):
-    """Points drawn uniformly, none better informed than the last: what any other optimizer must beat.
+    """Points drawn uniformly, none better informed than the last: what any other optimizer must
+    beat.
 
     Source: Anderson 1953, "Recent advances in finding best operating conditions".
     Departures: none; the points come in batches of `population`.

@@ -11,9 +11,10 @@ from tractexp.extend.files import records, survey_of
 class Archive(Reader):
     """Events of many files in a folder, whatever their formats, channels as they are proposed.
 
-    An event is named FILE#LOAD.DIP: the file within the folder, the load and the dip as `tractexp look` numbers them,
-    counted from 1. FILE#LOAD is the first event of a load that is worth fitting, FILE that of the first load. Each
-    record has the base of its own file: voltage and apparent power before its first dip.
+    An event is named FILE#LOAD.DIP: the file within the folder, the load and the dip as `tractexp
+    look` numbers them, counted from 1. FILE#LOAD is the first event of a load that is worth
+    fitting, FILE that of the first load. Each record has the base of its own file: voltage and
+    apparent power before its first dip.
 
     Source: tractexp's own; the formats are those of the readers of the files.
     Departures: none.
@@ -27,12 +28,16 @@ class Archive(Reader):
 
     def check(self) -> None:
         if not self.path:
-            raise UserError(f"{DATA.path} is missing: give the folder of the recordings, e.g. {DATA.path}=recordings")
+            raise UserError(
+                f"{DATA.path} is missing: give the folder of the recordings, e.g."
+                f" {DATA.path}=recordings"
+            )
 
     def read(self) -> Events:
         if not self.train:
             raise UserError(
-                f"{DATA.train} is empty: name events of {self.path} as FILE#LOAD.DIP; a survey lists them:"
+                f"{DATA.train} is empty: name events of {self.path} as FILE#LOAD.DIP; a survey"
+                " lists them:"
                 f" {survey_of(self.path)}"
             )
         check_distinct(f"{DATA.train} and {DATA.validate}", [*self.train, *self.validate])

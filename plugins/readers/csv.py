@@ -33,18 +33,22 @@ PRE, POST = 1.0, 10.0  # s kept of a table that holds several dips
 
 @plugin
 class CSV(Tabular, Reader):
-    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel, logs of instruments.
+    """Tables of t, U, P, Q and, where recorded, f and U2: CSV and other text, Parquet, Excel, logs
+    of instruments.
 
-    A file named in `train` or `validate` is one record. With `path` the dips of one long table are numbered from 1 in
-    order of time, and `train` and `validate` are numbers: the first is fitted and the others validate unless said
-    otherwise. Names, units, delimiter, decimal mark and encoding are found and said in a note, or given (`columns`,
-    `units`, ...); phasors (magnitudes and angles) become U, P, Q, f, U2. Without units U, P, Q, U2 are per unit, or in
-    kV (line to line), MW and Mvar where `base_voltage` [kV] and `base_power` [MVA] say what one per unit is; with units
-    and no base, the base is the steady state before the first dip. A path `pkg://package/file.csv` reads a file inside
-    an installed package. A file of the same name ending in .json beside the table may give its "name", a "note" on
-    where it comes from, "base", "columns" and "units".
+    A file named in `train` or `validate` is one record. With `path` the dips of one long table are
+    numbered from 1 in order of time, and `train` and `validate` are numbers: the first is fitted
+    and the others validate unless said otherwise. Names, units, delimiter, decimal mark and
+    encoding are found and said in a note, or given (`columns`, `units`, ...); phasors (magnitudes
+    and angles) become U, P, Q, f, U2. Without units U, P, Q, U2 are per unit, or in kV (line to
+    line), MW and Mvar where `base_voltage` [kV] and `base_power` [MVA] say what one per unit is;
+    with units and no base, the base is the steady state before the first dip. A path
+    `pkg://package/file.csv` reads a file inside an installed package. A file of the same name
+    ending in .json beside the table may give its "name", a "note" on where it comes from, "base",
+    "columns" and "units".
 
-    Source: RFC 4180, with comment lines; the names t, U, P, Q, f, U2 are tractexp's own. Phasors: Fortescue 1918.
+    Source: RFC 4180, with comment lines; the names t, U, P, Q, f, U2 are tractexp's own. Phasors:
+    Fortescue 1918.
     Departures: any delimiter, title lines, unit rows.
     """
 
@@ -52,14 +56,18 @@ class CSV(Tabular, Reader):
 
     path: str = ""  # one table with several dips
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number
-    validate: list[Any] | None = None  # files held out; with path, dips by number, null: every other one
-    pre: float | None = None  # s kept before a dip starts, at most; null: 1 where there are several dips, else all
-    post: float | None = None  # s kept after a dip starts, at most; null: 10 where there are several dips, else all
+    # files held out; with path, dips by number, null: every other one
+    validate: list[Any] | None = None
+    # s kept before a dip starts, at most; null: 1 where there are several dips, else all
+    pre: float | None = None
+    # s kept after a dip starts, at most; null: 10 where there are several dips, else all
+    post: float | None = None
     base_voltage: float | None = None  # kV, line to line
     base_power: float | None = None  # MVA, three-phase
     frequency: float = 50.0  # Hz, nominal
     reverse_current: bool = False  # true where P and Q are counted positive out of the load
-    estimator: Any = None  # phasor estimator of the recorder: one_cycle, p_class, m_class; null: not known
+    # phasor estimator of the recorder: one_cycle, p_class, m_class; null: not known
+    estimator: Any = None
 
     @classmethod
     def takes(cls, path: str) -> bool:
@@ -69,13 +77,23 @@ class CSV(Tabular, Reader):
         if self.path:
             self._check_numbers()
         elif not self.train:
-            raise UserError(f"{DATA.train} is empty: name at least one CSV file to fit, e.g. {DATA.train}=[dip.csv]")
+            raise UserError(
+                f"{DATA.train} is empty: name at least one CSV file to fit, e.g."
+                f" {DATA.train}=[dip.csv]"
+            )
         files: set[str] = set()
         for path in [] if self.path else map(str, (*self.train, *(self.validate or []))):
             if path in files:
-                raise UserError(f"{DATA.train} and {DATA.validate} name '{path}' twice; a record may serve only once")
+                raise UserError(
+                    f"{DATA.train} and {DATA.validate} name '{path}' twice; a record may serve only"
+                    " once"
+                )
             files.add(path)
-        limits = {"base_voltage": SIZES["voltage"], "base_power": SIZES["power"], "frequency": SIZES["frequency"]}
+        limits = {
+            "base_voltage": SIZES["voltage"],
+            "base_power": SIZES["power"],
+            "frequency": SIZES["frequency"],
+        }
         for key, allowed in (limits | {"pre": (0.05,), "post": (0.1,)}).items():
             value = getattr(self, key)
             if value is not None:
@@ -86,7 +104,8 @@ class CSV(Tabular, Reader):
         for each in (*self.train, *(self.validate or [])):
             if not isinstance(each, int) or isinstance(each, bool):
                 raise UserError(
-                    f"{DATA.path}={self.path} is given, so {DATA.train} and {DATA.validate} are numbers of its dips, "
+                    f"{DATA.path}={self.path} is given, so {DATA.train} and {DATA.validate} are"
+                    " numbers of its dips, "
                     f"and '{each}' is none; leave {DATA.path} out to read whole files"
                 )
         check_numbers(self.train or None, self.validate)
@@ -94,10 +113,17 @@ class CSV(Tabular, Reader):
     def read(self) -> Events:
         if self.path:  # the dips of one table: the whole of it where there is one
             whole, dips = self._dips()
-            notes = () if dips and dips[0].result is whole else (*whole.notes, count_noun(len(dips), "dip"))
+            notes = (
+                ()
+                if dips and dips[0].result is whole
+                else (*whole.notes, count_noun(len(dips), "dip"))
+            )
             return chosen(self.path, dips, self.train or None, self.validate, notes)
         first = self._record(str(self.train[0]))
-        rest = [self._record(str(path), first.base) for path in (*self.train[1:], *(self.validate or []))]
+        rest = [
+            self._record(str(path), first.base)
+            for path in (*self.train[1:], *(self.validate or []))
+        ]
         return Events([first, *rest[: len(self.train) - 1]], rest[len(self.train) - 1 :])
 
     def table(self) -> tuple[Record, list[FileDip]] | None:
@@ -105,10 +131,15 @@ class CSV(Tabular, Reader):
 
     def _dips(self) -> tuple[Record, list[FileDip]]:
         whole = self._record(self.path)
-        pre, post = (usual if given is None else given for given, usual in ((self.pre, PRE), (self.post, POST)))
+        pre, post = (
+            usual if given is None else given
+            for given, usual in ((self.pre, PRE), (self.post, POST))
+        )
         dips = cut_dips([replace(whole, notes=())], self.path, pre, post)
         if len(dips) < 2 and self.pre is None and self.post is None:
-            spans = [(dip.start, dip.end) for dip in dips] or [(float(whole.t[0]), float(whole.t[-1]))]
+            spans = [(dip.start, dip.end) for dip in dips] or [
+                (float(whole.t[0]), float(whole.t[-1]))
+            ]
             return whole, [FileDip(1, *spans[0], whole)]
         return whole, dips
 
@@ -118,10 +149,18 @@ class CSV(Tabular, Reader):
         table, mapping = self.table_of(path, sidecar)
         given = self.base_voltage or (sidecar.base and sidecar.base.voltage)
         declared = sidecar.base.frequency if sidecar.base else table.frequency or self.frequency
-        quantities = powers(table, mapping, declared, self.reverse_current, kilovolts=given is not None)
-        window = sidecar.window or (self.estimator and estimator_of(self.estimator).window(quantities.frequency))
+        quantities = powers(
+            table, mapping, declared, self.reverse_current, kilovolts=given is not None
+        )
+        window = sidecar.window or (
+            self.estimator and estimator_of(self.estimator).window(quantities.frequency)
+        )
         begun = {"time": quantities.start.isoformat()} if quantities.start else {}
-        arrays: Any = {**quantities.columns, "more": table.numbers(sidecar.more), "window": window or None}
+        arrays: Any = {
+            **quantities.columns,
+            "more": table.numbers(sidecar.more),
+            "window": window or None,
+        }
         raw = Record(
             name=self._name(path, sidecar),
             source=path,
@@ -132,7 +171,9 @@ class CSV(Tabular, Reader):
         even = raw if sidecar.uniform else raw.uniform(table.place)
         base, note = self._base(even, quantities, sidecar, base)
         voltage, power = (
-            size if quantities.absolute[key] or (quantities.absolute[key] is None and size_given) else 1.0
+            size
+            if quantities.absolute[key] or (quantities.absolute[key] is None and size_given)
+            else 1.0
             for key, size, size_given in (
                 ("U", base.voltage, given),
                 ("P", base.power, self.base_power or sidecar.base),
@@ -146,26 +187,44 @@ class CSV(Tabular, Reader):
 
     def _name(self, path: str, sidecar: Sidecar) -> str:
         stem = Path(path.removeprefix(PACKAGE)).stem
-        stems = [Path(str(p).removeprefix(PACKAGE)).stem for p in (*self.train, *(self.validate or []))]
+        stems = [
+            Path(str(p).removeprefix(PACKAGE)).stem for p in (*self.train, *(self.validate or []))
+        ]
         return sidecar.name or stem if self.path or stems.count(stem) == 1 else path
 
-    def _base(self, record: Record, quantities: Powers, sidecar: Sidecar, same: Base | None) -> tuple[Base, list[str]]:
-        """What one per unit is: given, that of the record before, or the steady state of values in kV and MW."""
-        voltage = self.base_voltage or (sidecar.base and sidecar.base.voltage) or (same and same.voltage)
+    def _base(
+        self, record: Record, quantities: Powers, sidecar: Sidecar, same: Base | None
+    ) -> tuple[Base, list[str]]:
+        """What one per unit is: given, that of the record before, or the steady state of values in
+        kV and MW.
+        """
+        voltage = (
+            self.base_voltage or (sidecar.base and sidecar.base.voltage) or (same and same.voltage)
+        )
         power = self.base_power or (sidecar.base and sidecar.base.power) or (same and same.power)
-        if voltage is None and power is None and quantities.absolute["U"] and quantities.absolute["P"] is None:
+        if (
+            voltage is None
+            and power is None
+            and quantities.absolute["U"]
+            and quantities.absolute["P"] is None
+        ):
             raise UserError(
-                f"{record.where}: U is in kV, and the unit of P and Q is not told; say {DATA.units}={{P: MW, Q: Mvar}} "
-                f"or {DATA.units}={{P: pu, Q: pu}}, or the base, {DATA.base_voltage} and {DATA.base_power}"
+                f"{record.where}: U is in kV, and the unit of P and Q is not told; say"
+                f" {DATA.units}={{P: MW, Q: Mvar}} "
+                f"or {DATA.units}={{P: pu, Q: pu}}, or the base, {DATA.base_voltage} and"
+                f" {DATA.base_power}"
             )
         chosen_by = None if self.base_power else sidecar.base or same
         origin = chosen_by.origin if chosen_by else DECLARATION
         sources = []
-        if (voltage is None and quantities.absolute["U"]) or (power is None and quantities.absolute["P"]):
+        if (voltage is None and quantities.absolute["U"]) or (
+            power is None and quantities.absolute["P"]
+        ):
             U, S = level(record)
             if S < 1e-9:
                 raise UserError(
-                    f"{record.where}: P and Q are zero or missing before the first dip, so they give no base; say it: "
+                    f"{record.where}: P and Q are zero or missing before the first dip, so they"
+                    " give no base; say it: "
                     f"{DATA.base_power} (MVA)"
                 )
             if quantities.absolute["U"]:
@@ -176,5 +235,9 @@ class CSV(Tabular, Reader):
             if power is None and quantities.absolute["P"]:
                 power, origin = S, LOAD
                 sources.append(f"{S:.4g} MVA")
-        note = [f"base: {' and '.join(sources)}, the steady state before the first dip"] if sources else []
+        note = (
+            [f"base: {' and '.join(sources)}, the steady state before the first dip"]
+            if sources
+            else []
+        )
         return Base(voltage or 1.0, power or 1.0, quantities.frequency, origin), note

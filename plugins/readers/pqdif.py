@@ -10,12 +10,13 @@ from tractexp.extend.files import kind_of, pqdif
 class PQDIF(WaveformReader):
     """Dips from the waveforms of a PQDIF file (.pqd), as power quality analyzers write it.
 
-    Values are in V and A of the primary side, where the monitor's settings say that its transformer ratios are to be
-    applied, after them. Each observation of the channels that most observations have is a stretch of its own. Logs of
-    RMS values, P and Q are a table, `data=csv`.
+    Values are in V and A of the primary side, where the monitor's settings say that its transformer
+    ratios are to be applied, after them. Each observation of the channels that most observations
+    have is a stretch of its own. Logs of RMS values, P and Q are a table, `data=csv`.
 
     Source: IEEE Std 1159.3-2003 and -2019.
-    Departures: histograms, spectra and flicker are not read, nor PKZIP and the compression of the whole file.
+    Departures: histograms, spectra and flicker are not read, nor PKZIP and the compression of the
+    whole file.
     """
 
     endings = parts = (".pqd", ".pqdif")

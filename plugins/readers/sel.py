@@ -10,13 +10,13 @@ from tractexp.extend.files import cev, kind_of
 class SEL(WaveformReader):
     """Dips from an SEL relay's compressed event report (.cev, command CEV R).
 
-    The report's columns, instantaneous primary values over the root of two, are taken back to instantaneous ones; they
-    are sampled by the frequency in its column FREQ. A filtered report (4 or 8 samples per cycle) holds phasors, which
-    are a table, `data=csv`.
+    The report's columns, instantaneous primary values over the root of two, are taken back to
+    instantaneous ones; they are sampled by the frequency in its column FREQ. A filtered report (4
+    or 8 samples per cycle) holds phasors, which are a table, `data=csv`.
 
     Source: SEL instruction manuals, appendix Compressed ASCII and section event reports.
-    Departures: the scale is checked against the currents of the report's summary; reports as text for people (.eve)
-    are not read.
+    Departures: the scale is checked against the currents of the report's summary; reports as text
+    for people (.eve) are not read.
     """
 
     endings = parts = (".cev",)

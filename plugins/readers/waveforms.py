@@ -17,10 +17,11 @@ from tractexp.extend.files import (
 class Waveforms(Tabular, WaveformReader):
     """Dips from a table of sampled voltages and currents: CSV and other text, Parquet, Excel.
 
-    Columns such as t, ua, ub, uc, ia, ib, ic, or t, u, i of a single-phase feeder; every further column of numbers is
-    a channel too. Names, units, delimiter, decimal mark and encoding are found and said in a note, or given (`columns`,
-    `units`, ...). A gap in time parts the file: no window reaches across it. A table that `task=convert` wrote of a
-    recording is that recording again, ratios and all.
+    Columns such as t, ua, ub, uc, ia, ib, ic, or t, u, i of a single-phase feeder; every further
+    column of numbers is a channel too. Names, units, delimiter, decimal mark and encoding are found
+    and said in a note, or given (`columns`, `units`, ...). A gap in time parts the file: no window
+    reaches across it. A table that `task=convert` wrote of a recording is that recording again,
+    ratios and all.
 
     Source: RFC 4180; the names ua, ub, uc, ia, ib, ic are those of IEC 61869 in small letters.
     Departures: any delimiter, title lines, unit rows.

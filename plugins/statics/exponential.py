@@ -13,9 +13,9 @@ class Exponential(Static):
 
     P_s0 and Q_s0 are not identified: they are what the motor leaves of the power before the event.
 
-    Of waveforms it is an admittance that follows the size of the voltage over the past half cycle: the power is the
-    law's once half a cycle has passed since the voltage changed, and negative sequence and harmonics see the
-    admittance of the fundamental.
+    Of waveforms it is an admittance that follows the size of the voltage over the past half cycle:
+    the power is the law's once half a cycle has passed since the voltage changed, and negative
+    sequence and harmonics see the admittance of the fundamental.
 
     Source: Wu, Fan, Zou 2022, Eq. (6).
     Departures: none.

@@ -11,11 +11,13 @@ class ExponentialFrequency(Static):
 
         P_s = P_s0 (U/U_0)^p_v (f/f_0)^p_f        Q_s = Q_s0 (U/U_0)^q_v (f/f_0)^q_f
 
-    with f/f_0 = (omega_n + omega_s)/(omega_n + omega_s0), the recorded frequency over that before the event. Where
-    no frequency is given the ratio is 1: p_f and q_f then have no effect, and an identification is refused.
+    with f/f_0 = (omega_n + omega_s)/(omega_n + omega_s0), the recorded frequency over that before
+    the event. Where no frequency is given the ratio is 1: p_f and q_f then have no effect, and an
+    identification is refused.
 
-    Not to be confused with the effect `frequency_dependence`, which adds a term linear in frequency to whatever
-    static load there is; the two agree to first order, and together would count the same thing twice.
+    Not to be confused with the effect `frequency_dependence`, which adds a term linear in frequency
+    to whatever static load there is; the two agree to first order, and together would count the
+    same thing twice.
 
     Source: Milano 2010, ch. 14 (frequency-dependent load); ANDES FLoad.
     Departures: the frequency is the recorded one, without the measurement filter of FLoad.
@@ -28,7 +30,8 @@ class ExponentialFrequency(Static):
 
     reads = ("f",)
     phasors_only = (
-        "its frequency is a recorded channel, and a waveform has none; take model/static=branch, whose reactance"
+        "its frequency is a recorded channel, and a waveform has none; take model/static=branch,"
+        " whose reactance"
         " follows the frequency by itself"
     )
 

@@ -7,7 +7,9 @@ from tractexp.extend.files import tidy
 
 
 class _Table(Writer):
-    """A column for each quantity, a row for each sample; the sidecar in JSON says everything else."""
+    """A column for each quantity, a row for each sample; the sidecar in JSON says
+    everything else.
+    """
 
     def record(self, record: Record, path: Path) -> list[Path]:
         return tidy.write_record(record, path)

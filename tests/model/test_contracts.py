@@ -1,4 +1,6 @@
-"""Every built-in plugin against the contracts that a third party's plugins are held to, and that these can fail."""
+"""Every built-in plugin against the contracts that a third party's plugins are held to, and that
+these can fail.
+"""
 
 import numpy as np
 import pytest
@@ -34,8 +36,16 @@ def stranger():
     """Registers a class with these methods as the plugin `stranger`, until the test ends."""
 
     def register(base, **attributes):
-        size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)} if issubclass(base, Effect) else {}
-        body = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
+        size = (
+            {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
+            if issubclass(base, Effect)
+            else {}
+        )
+        body = {
+            "__doc__": "a = b. Source: here.",
+            "__module__": "elsewhere.stranger",
+            "__annotations__": {},
+        }
         return plugin(type("Stranger", (base,), body | size | attributes))
 
     yield register
@@ -97,21 +107,44 @@ def missing(self):
 @pytest.mark.parametrize(
     ("base", "attributes", "check", "sentence"),
     [
-        (Measurement, {"observe": halved}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
+        (
+            Measurement,
+            {"observe": halved},
+            loads.is_the_base_model_at_its_null,
+            "pu away from the base model",
+        ),
         (Measurement, {"observe": mixed}, loads.sees_each_event_by_itself, "mixes events"),
-        (Effect, {"edit": doubled}, loads.is_the_base_model_at_its_null, "pu away from the base model"),
+        (
+            Effect,
+            {"edit": doubled},
+            loads.is_the_base_model_at_its_null,
+            "pu away from the base model",
+        ),
         (Effect, {"edit": doubled}, loads.has_sizes_that_matter, "does not say in 'relevant'"),
-        (Effect, {"edit": unmoved, "relevant": {"a": 1}, "confused_with": ("load_chang",)}, loads.has_sizes_that_matter,
-         "confused with 'load_chang', no other effect; did you mean 'load_change'"),
-        (Static, {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."}, loads.says_what_it_is,
-         "has no equation: no line with '=' or '->'"),
+        (
+            Effect,
+            {"edit": unmoved, "relevant": {"a": 1}, "confused_with": ("load_chang",)},
+            loads.has_sizes_that_matter,
+            "confused with 'load_chang', no other effect; did you mean 'load_change'",
+        ),
+        (
+            Static,
+            {"law": lambda self, u: (u, u), "__doc__": "A load. Source: here."},
+            loads.says_what_it_is,
+            "has no equation: no line with '=' or '->'",
+        ),
         (Effect, {"edit": unmoved}, loads.shows_in_a_dip, "shows nothing"),
         (Effect, {"edit": growing}, loads.rests, "under a steady voltage"),
         (Effect, {"edit": growing}, loads.says_what_it_is, "has no line 'Departures:'"),
-        (Optimizer, {"search": proposed}, searches.gives_the_same_bits_for_the_same_seed, "another history"),
+        (
+            Optimizer,
+            {"search": proposed},
+            searches.gives_the_same_bits_for_the_same_seed,
+            "another history",
+        ),
         (Optimizer, {"search": stuck}, searches.finds_the_bottom_of_a_bowl, "after a start of"),
     ],
-)  # fmt: skip
+)
 def test_a_contract_that_is_broken_says_how(stranger, base, attributes, check, sentence):
     with pytest.raises(AssertionError, match=sentence):
         check(stranger(base, **attributes))
@@ -146,7 +179,9 @@ def test_an_estimator_that_is_off_fails_its_contract(stranger):
     def averager(self, rate, nominal):
         return Averager(60, lambda y, rate, f, at: 0.9 * y[..., at])
 
-    made = stranger(Estimator, half=half_a_cycle, weight=lambda self, at, nominal: 1 + 0 * at, averager=averager)
+    made = stranger(
+        Estimator, half=half_a_cycle, weight=lambda self, at, nominal: 1 + 0 * at, averager=averager
+    )
     with pytest.raises(AssertionError, match=r"off a sinusoid of 48\.7 Hz"):
         channels.is_exact_in_steady_state(made)
 
@@ -155,7 +190,9 @@ def test_an_effect_that_nothing_takes_fails_with_the_reason(stranger):
     def edit(self, eq, a):
         eq["no_such_quantity"]
 
-    with pytest.raises(AssertionError, match="no registered motor and static load take the effect 'stranger'"):
+    with pytest.raises(
+        AssertionError, match="no registered motor and static load take the effect 'stranger'"
+    ):
         loads.rests(stranger(Effect, edit=edit))
 
 
@@ -174,23 +211,47 @@ def test_a_law_that_is_none_is_refused_when_the_model_is_composed(stranger, law,
 @pytest.mark.parametrize(
     ("edit", "sentence"),
     [
-        (lambda self, eq, a: eq.edit(sites.load_torque, lambda T: T + a * eq["E"]), "load_torque is real, and what"),
-        (lambda self, eq, a: eq.edit("load_torqe", lambda T: T), "no site 'load_torqe'; did you mean 'load_torque'"),
+        (
+            lambda self, eq, a: eq.edit(sites.load_torque, lambda T: T + a * eq["E"]),
+            "load_torque is real, and what",
+        ),
+        (
+            lambda self, eq, a: eq.edit("load_torqe", lambda T: T),
+            "no site 'load_torqe'; did you mean 'load_torque'",
+        ),
         (lambda self, eq, a: eq.omgea, r"offer no 'eq\.omgea'; did you mean 'omega'"),
         (lambda self, eq, a: setattr(eq, "P", 0), r"eq\.P cannot be assigned; eq\.edit"),
-        (lambda self, eq, a: eq.place(sites.coupling, a), "coupling is taken already|belongs to the motor"),
+        (
+            lambda self, eq, a: eq.place(sites.coupling, a),
+            "coupling is taken already|belongs to the motor",
+        ),
         (lambda self, eq, a: eq.moves(eq.U, a, 0), "given 'U', which is no state"),
         (lambda self, eq, a: eq.lag("idle", "x"), "nothing says how the state 'idle' moves"),
         (lambda self, eq, a: eq.lag("_x1", "x"), "called '_x1': that is no name of Python's"),
-        (lambda self, eq, a: eq.lag("omega", "x"), "quantity 'omega' already, declared by the motor; prefix the names"),
+        (
+            lambda self, eq, a: eq.lag("omega", "x"),
+            "quantity 'omega' already, declared by the motor; prefix the names",
+        ),
         (
             lambda self, eq, a: eq.edit(sites.load_torqe, lambda T: T),
             r"no 'sites\.load_torqe'; did you mean 'load_torque'",
         ),
-        (late("lag", lambda eq: eq.U), r"before the event of 'late' contains U, which moves; use eq\.U0 or eq\.before"),
-        (late("memory", lambda eq: eq[sites.static_voltage]), "before the event of 'late' contains U, which moves"),
-        (late("lag", lambda eq: eq.omega), r"of 'late' contains omega, which moves; use eq\.before"),
-        (lambda self, eq, a: eq.require(eq.U2 - a, "too low"), r"\('too low'\) contains U2, which moves; use eq\.U20"),
+        (
+            late("lag", lambda eq: eq.U),
+            r"before the event of 'late' contains U, which moves; use eq\.U0 or eq\.before",
+        ),
+        (
+            late("memory", lambda eq: eq[sites.static_voltage]),
+            "before the event of 'late' contains U, which moves",
+        ),
+        (
+            late("lag", lambda eq: eq.omega),
+            r"of 'late' contains omega, which moves; use eq\.before",
+        ),
+        (
+            lambda self, eq, a: eq.require(eq.U2 - a, "too low"),
+            r"\('too low'\) contains U2, which moves; use eq\.U20",
+        ),
     ],
 )
 def test_what_an_edit_does_wrong_is_a_sentence(stranger, edit, sentence):
@@ -206,7 +267,10 @@ def test_a_law_is_evaluated_at_a_state_by_substitution(stranger):
         eq.edit(sites.Q_static, lambda Q: (1 - a) * Q + a * Q.subs(eq[sites.static_voltage], late))
 
     motor, static = loads.partners()
-    bare, eq = loads.model(motor, static).equations, loads.model(motor, static, stranger(Effect, edit=edit)).equations
+    bare, eq = (
+        loads.model(motor, static).equations,
+        loads.model(motor, static, stranger(Effect, edit=edit)).equations,
+    )
     law, edited = bare.expression(sites.Q_static), eq.expression(sites.Q_static)
     u, late, a = bare[sites.static_voltage], eq["late_voltage"], eq["a"]
     assert edited.subs(a, 1) == law.subs(u, late) != law
@@ -226,7 +290,8 @@ def test_a_static_load_with_a_parameter_of_the_motor_is_refused(stranger):
     law = eval(f"lambda self, u, {taken.name}: (1, 1)")
     static = stranger(Static, law=law, **{taken.name: taken})
     with pytest.raises(
-        UserError, match=f"static load 'stranger' do not compose: .* a parameter '{taken.name}' already"
+        UserError,
+        match=f"static load 'stranger' do not compose: .* a parameter '{taken.name}' already",
     ):
         _ = loads.model(motor, static).equations
 

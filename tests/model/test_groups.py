@@ -15,11 +15,25 @@ from tractexp.overrides import overrides
 from tractexp.plugin import build, get
 
 ONE = {
-    "T_prime": 0.12, "X_prime": 0.4, "C": 0.9, "M": 0.004, "T_m": 0.4, "R_s": 0.03, "T_second": 0.01, "X_second": 0.3,
-}  # fmt: skip
+    "T_prime": 0.12,
+    "X_prime": 0.4,
+    "C": 0.9,
+    "M": 0.004,
+    "T_m": 0.4,
+    "R_s": 0.03,
+    "T_second": 0.01,
+    "X_second": 0.3,
+}
 TWO = {
-    "T_prime": 0.06, "X_prime": 0.5, "C": 0.85, "M": 0.009, "T_m": 0.25, "R_s": 0.05, "T_second": 0.02, "X_second": 0.4,
-}  # fmt: skip
+    "T_prime": 0.06,
+    "X_prime": 0.5,
+    "C": 0.85,
+    "M": 0.009,
+    "T_m": 0.25,
+    "R_s": 0.05,
+    "T_second": 0.02,
+    "X_second": 0.4,
+}
 BOTH = ONE | {f"{name}_2": value for name, value in TWO.items()}
 DOMAINS = ("phasors", "waves")
 
@@ -49,7 +63,9 @@ def drawn(motors, domain, known, *effects):
 def test_two_groups_draw_what_both_motors_draw(domain):
     pair = ("stator_flux", "double_cage")
     both = drawn(pair, domain, BOTH)
-    assert both == pytest.approx(drawn(pair[:1], domain, ONE) + drawn(pair[1:], domain, TWO), abs=1e-9)
+    assert both == pytest.approx(
+        drawn(pair[:1], domain, ONE) + drawn(pair[1:], domain, TWO), abs=1e-9
+    )
 
 
 @pytest.mark.parametrize("domain", DOMAINS)
@@ -78,7 +94,11 @@ def test_each_group_has_its_parameters():
     assert by_name["M_3"].default == pytest.approx(4 * by_name["M"].default)
     assert by_name["X_prime_2"].about == by_name["X_prime"].about + ", of group 2"
     assert of.motor.within_a_cycle
-    assert of.title == "stator_flux + electromechanical + electromechanical motor and branch static load, on waveforms"
+    assert (
+        of.title
+        == "stator_flux + electromechanical + electromechanical motor and branch static load, on"
+        " waveforms"
+    )
     assert not build("model/motor", {"name": "motor_groups"}).within_a_cycle
 
 
@@ -87,7 +107,8 @@ def test_groups_of_the_same_motor_stand_in_order_of_inertia():
     drive = Drive.of([Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)])
     swapped = np.array([(TWO | {f"{n}_2": v for n, v in ONE.items()})[name] for name in of.names])
     assert of.refusal(swapped, drive) == (
-        "groups of the same motor stand in order of inertia: M may not exceed M_2, and it is larger by 0.005; let them"
+        "groups of the same motor stand in order of inertia: M may not exceed M_2, and it is larger"
+        " by 0.005; let them"
         " change places"
     )
     different = model(("stator_flux", "double_cage"), "phasors")
@@ -104,18 +125,27 @@ def test_a_steady_state_that_a_group_lacks_names_the_group():
 
 def test_the_command_line_takes_a_list():
     assert overrides(["model/motor=[stator_flux, double_cage]", "seed=3"]) == [
-        "model/motor=motor_groups", "model.motor.of=[stator_flux,double_cage]", "seed=3",
-    ]  # fmt: skip
+        "model/motor=motor_groups",
+        "model.motor.of=[stator_flux,double_cage]",
+        "seed=3",
+    ]
     assert overrides(["model/motor=stator_flux"]) == ["model/motor=stator_flux"]
     for several in ("model/motor=[a,b],c", "model/motor=[a,b],[c,d]"):
-        with pytest.raises(UserError, match="a sweep over lists is written model/motor=motor_groups") as told:
+        with pytest.raises(
+            UserError, match="a sweep over lists is written model/motor=motor_groups"
+        ) as told:
             overrides([several])
         assert several in str(told.value)
 
 
 def test_a_list_of_motors_is_a_model_that_is_kept():
-    made = tractexp.compose(motor=["stator_flux", {"name": "double_cage"}], static="branch", domain="waves")
-    assert made.node["motor"] == {"name": "motor_groups", "of": ["stator_flux", {"name": "double_cage"}]}
+    made = tractexp.compose(
+        motor=["stator_flux", {"name": "double_cage"}], static="branch", domain="waves"
+    )
+    assert made.node["motor"] == {
+        "name": "motor_groups",
+        "of": ["stator_flux", {"name": "double_cage"}],
+    }
     assert compose(*parts(made.node)).names == made.model.names
     assert {"X_prime", "X_prime_2", "X_second_2"} <= set(made.parameters)
 
@@ -123,10 +153,16 @@ def test_a_list_of_motors_is_a_model_that_is_kept():
 @pytest.mark.parametrize(
     ("motors", "sentence"),
     [
-        (["stator_flux"], "several motor groups are two or more, and model/motor=['stator_flux'] names 1"),
+        (
+            ["stator_flux"],
+            "several motor groups are two or more, and model/motor=['stator_flux'] names 1",
+        ),
         (["stator_flux", "none"], "has 'none' in it, which is no motor by itself"),
         (["motor_groups", "stator_flux"], "has 'motor_groups' in it, which is no motor by itself"),
-        (["stator_flux", "stator_flx"], "there is no model/motor 'stator_flx'; did you mean 'stator_flux'?"),
+        (
+            ["stator_flux", "stator_flx"],
+            "there is no model/motor 'stator_flx'; did you mean 'stator_flux'?",
+        ),
         (["stator_flux", 3], "has 3 in its list; give a name, or a mapping of 'name' and settings"),
         (["stator_flux", {"nam": "x"}], "has {'nam': 'x'} in its list"),
     ],
@@ -139,6 +175,7 @@ def test_a_list_that_makes_no_sense_gets_a_sentence(motors, sentence):
 
 def test_a_group_that_makes_no_sense_of_waveforms_is_refused():
     with pytest.raises(
-        UserError, match="the motor 'stator_flux \\+ mechanical' does not go with domain=waves: its flux"
+        UserError,
+        match="the motor 'stator_flux \\+ mechanical' does not go with domain=waves: its flux",
     ):
         _ = model(("stator_flux", "mechanical"), "waves").equations

@@ -1,4 +1,6 @@
-"""What a recorder's filter makes of a jump lies within what is left open there; nothing is where nothing jumps."""
+"""What a recorder's filter makes of a jump lies within what is left open there; nothing is where
+nothing jumps.
+"""
 
 import numpy as np
 import pytest
@@ -10,13 +12,16 @@ RATE, FINER = 3200.0, 12
 
 
 def jumping(at: float, size: float, cutoff: float) -> tuple[np.ndarray, np.ndarray]:
-    """A sine that falls by `size` of itself `at` [s]: as sampled at once, and behind an anti-alias filter, (N,)."""
+    """A sine that falls by `size` of itself `at` [s]: as sampled at once, and behind an anti-alias
+    filter, (N,).
+    """
     t = np.arange(400 * FINER) / (RATE * FINER)
     wave = np.cos(2 * np.pi * 50 * t)
     fallen = np.where(t >= at, wave * size, 0.0)
     seen = sosfilt(butter(2, 2 * cutoff / FINER, output="sos"), fallen)
     still = sosfilt(butter(2, 2 * cutoff / FINER, output="sos"), wave * size)
-    steady = np.where(t >= at, still, 0.0)  # what the filter's lag does to a sine is in the voltage as well
+    # what the filter's lag does to a sine is in the voltage as well
+    steady = np.where(t >= at, still, 0.0)
     return steady[::FINER], seen[::FINER]
 
 

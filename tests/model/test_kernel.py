@@ -37,7 +37,9 @@ def computed(expression, x, y=None, width=None):
         left = f.integer("sub", "%n", i)
         known = {X: n.part(f.at("%x", i), left), Y: n.part(f.at("%y", i), left)}
         n.store_part(Expressions(n, known)(expression), f.at("%out", i), left)
-    text = "\n".join([*f.intrinsics.values(), f.text("define void @run(ptr %x, ptr %y, ptr %out, i64 %n)")])
+    text = "\n".join(
+        [*f.intrinsics.values(), f.text("define void @run(ptr %x, ptr %y, ptr %out, i64 %n)")]
+    )
     loaded, out = objects.load(text), np.full(len(x), 77.0)
     y = np.zeros(len(x)) if y is None else y
     run = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3, ctypes.c_int64)(loaded.address)
@@ -47,9 +49,12 @@ def computed(expression, x, y=None, width=None):
 
 # Mathematics
 
-WIDE = np.concatenate([np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264])  # half powers of 2
+# half powers of 2
+WIDE = np.concatenate([np.linspace(-699, 699, 20001), np.arange(-1000, 1000) * 0.34657359027997264])
 SMALL = np.concatenate([np.linspace(-1, 1, 4001), 10.0 ** np.arange(-300, 0)])
-ANGLES = np.concatenate([np.linspace(-20, 20, 4001), np.random.default_rng(0).uniform(-1e6, 1e6, 4000)])
+ANGLES = np.concatenate(
+    [np.linspace(-20, 20, 4001), np.random.default_rng(0).uniform(-1e6, 1e6, 4000)]
+)
 POSITIVE = np.concatenate([10.0 ** np.linspace(-300, 300, 4001), np.linspace(0.5, 2, 4001)])
 
 
@@ -97,7 +102,9 @@ def test_waves(name):
     ],
 )
 def test_further_functions(name, x, most):
-    theirs = {"atan": np.arctan, "asin": np.arcsin, "acos": np.arccos}.get(name) or getattr(np, name)
+    theirs = {"atan": np.arctan, "asin": np.arcsin, "acos": np.arccos}.get(name) or getattr(
+        np, name
+    )
     assert np.abs(computed(getattr(sympy, name)(X), x) - theirs(x)).max() < most
 
 
@@ -105,7 +112,9 @@ def test_further_functions(name, x, most):
 def test_hyperbolic_functions(name):
     x = WIDE[abs(WIDE) < 600]
     theirs = getattr(np, name)(x)
-    assert (np.abs(computed(getattr(sympy, name)(X), x) - theirs) / np.maximum(1, np.abs(theirs))).max() < 2e-13
+    assert (
+        np.abs(computed(getattr(sympy, name)(X), x) - theirs) / np.maximum(1, np.abs(theirs))
+    ).max() < 2e-13
 
 
 def test_the_angle_of_a_point():
@@ -115,11 +124,24 @@ def test_the_angle_of_a_point():
 
 
 EVERY = [
-    X**3 - 2 * X * Y + 1 / (Y**2 + 1), X**-2, sympy.sqrt(X**2 + 1) ** 3, sympy.Max(X, Y, 0.5) - sympy.Min(X, Y, 0),
-    sympy.Abs(X - Y), sympy.sign(X), sympy.Heaviside(X, 0.5), sympy.floor(3 * X) + sympy.ceiling(Y), -X, X - X * Y / 3,
-    sympy.Piecewise((X, sympy.And(X > 0, Y > 0)), (Y, sympy.Or(X < -1, sympy.Not(Y <= 1))), (2, True)),
-    sympy.Piecewise((X, X >= Y), (Y, True)), sympy.pi * X - sympy.Rational(2, 7), (X + Y) ** 5, sympy.exp(X * Y) / 3,
-]  # fmt: skip
+    X**3 - 2 * X * Y + 1 / (Y**2 + 1),
+    X**-2,
+    sympy.sqrt(X**2 + 1) ** 3,
+    sympy.Max(X, Y, 0.5) - sympy.Min(X, Y, 0),
+    sympy.Abs(X - Y),
+    sympy.sign(X),
+    sympy.Heaviside(X, 0.5),
+    sympy.floor(3 * X) + sympy.ceiling(Y),
+    -X,
+    X - X * Y / 3,
+    sympy.Piecewise(
+        (X, sympy.And(X > 0, Y > 0)), (Y, sympy.Or(X < -1, sympy.Not(Y <= 1))), (2, True)
+    ),
+    sympy.Piecewise((X, X >= Y), (Y, True)),
+    sympy.pi * X - sympy.Rational(2, 7),
+    (X + Y) ** 5,
+    sympy.exp(X * Y) / 3,
+]
 
 
 @pytest.mark.parametrize("expression", EVERY, ids=str)
@@ -146,7 +168,10 @@ def test_every_width_of_vectors_gives_the_same_bits(expression):
 
 
 def test_what_a_kernel_cannot_compute_is_said():
-    with pytest.raises(UserError, match="the equations contain gamma, in gamma\\(x\\), which kernels cannot compute"):
+    with pytest.raises(
+        UserError,
+        match="the equations contain gamma, in gamma\\(x\\), which kernels cannot compute",
+    ):
         computed(sympy.gamma(X), np.ones(1))
 
 
@@ -177,18 +202,27 @@ def model():
 @pytest.fixture(scope="module")
 def drive():
     t = np.arange(30) * 1e-2
-    one = Excitation(1e-2, 1 - 0.3 * (abs(t - 0.1) < 0.05), np.ones(30), np.full(30, 0.6), 1.0, 1.0, 0.6)
+    one = Excitation(
+        1e-2, 1 - 0.3 * (abs(t - 0.1) < 0.05), np.ones(30), np.full(30, 0.6), 1.0, 1.0, 0.6
+    )
     return Drive.of([one, one])
 
 
 def arguments(model, drive, n=9):
     candidates = model._candidates(drive, np.tile([p.default for p in model.parameters], (n, 1)))
     return {
-        "candidates": candidates, "event": drive.event, "first": drive.first, "inputs": drive.inputs,
-        "measured": drive.measured, "weights": drive.weights, "substeps": np.ones(2, dtype=np.int64),
-        "sums": np.empty((2, 2, n)), "miss": np.empty((2, n)), "outputs": np.empty((2, n, 60)),
+        "candidates": candidates,
+        "event": drive.event,
+        "first": drive.first,
+        "inputs": drive.inputs,
+        "measured": drive.measured,
+        "weights": drive.weights,
+        "substeps": np.ones(2, dtype=np.int64),
+        "sums": np.empty((2, 2, n)),
+        "miss": np.empty((2, n)),
+        "outputs": np.empty((2, n, 60)),
         "starts": np.empty((2, 3, n)),
-    }  # fmt: skip
+    }
 
 
 def test_what_fits_is_taken(model, drive):
@@ -202,8 +236,9 @@ def test_what_fits_is_taken(model, drive):
     model.kernel.run(**empty)
 
 
-@pytest.mark.parametrize("name", ["candidates", "event", "measured", "weights", "sums",
-                                  "miss", "outputs", "starts"])  # fmt: skip
+@pytest.mark.parametrize(
+    "name", ["candidates", "event", "measured", "weights", "sums", "miss", "outputs", "starts"]
+)
 @pytest.mark.parametrize(
     "wrong",
     [
@@ -279,11 +314,15 @@ def test_a_kernel_is_compiled_for_other_processors(model, triple):
 def test_a_kernel_of_any_width_gives_the_same_response(drive, motor):
     model = compose(get("model/motor", motor)(), get("model/static", "exponential")())
     rng = np.random.default_rng(1)
-    values = np.array([p.default for p in model.parameters]) * rng.uniform(0.9, 1.1, (70, len(model.names)))
+    values = np.array([p.default for p in model.parameters]) * rng.uniform(
+        0.9, 1.1, (70, len(model.names))
+    )
     responses = []
     for width in (2, 4, 8):
         other = copy.copy(model)
-        other.__dict__["kernel"] = Kernel(emit.text(lower(model.equations), model.title, "classical", width))
+        other.__dict__["kernel"] = Kernel(
+            emit.text(lower(model.equations), model.title, "classical", width)
+        )
         responses.append(other.simulate(drive, values, [1, 3]).outputs)
     assert np.isfinite(responses[0]).any()
     assert all(np.array_equal(responses[0], one, equal_nan=True) for one in responses[1:])
@@ -294,11 +333,23 @@ def test_an_expression_is_printed_whole_up_to_so_many_nodes(more):
     terms = sympy.symbols(f"x:{listing.MOST_PRINTED_NODES - 1 + more}")
     none, start = Phase((), (), ()), Phase((), (), (sympy.Add(*terms),))
     lowered = SimpleNamespace(
-        start=start, rest=None, constant=none, derivative=none, renewal=none, output=none, starts=["s"], constants=[],
-        states=[], memories=[], outputs=[],
-    )  # fmt: skip
+        start=start,
+        rest=None,
+        constant=none,
+        derivative=none,
+        renewal=none,
+        output=none,
+        starts=["s"],
+        constants=[],
+        states=[],
+        memories=[],
+        outputs=[],
+    )
     _, line = listing.equations(cast(Any, lowered))
-    assert (f"x{listing.MOST_PRINTED_NODES - 2}" in line, "terms and more" in line) == (not more, bool(more))
+    assert (f"x{listing.MOST_PRINTED_NODES - 2}" in line, "terms and more" in line) == (
+        not more,
+        bool(more),
+    )
 
 
 def test_a_kernel_is_printed_for_people(model):
@@ -363,7 +414,11 @@ def test_rows_may_go_on_by_one_step_of_their_slope(n):
     onward = Stencil(lambda y: y(0), rows=("y",), onward=True)
     y = np.random.default_rng(n).normal(size=(1, 2, n))
     onward(out := np.empty_like(y), [slice(0, n)], np.array([-n - 2, n + 2]), y=y)
-    before, after = (2 * y[..., 0] - y[..., 1], 2 * y[..., -1] - y[..., -2]) if n > 1 else (y[..., 0], y[..., 0])
+    before, after = (
+        (2 * y[..., 0] - y[..., 1], 2 * y[..., -1] - y[..., -2])
+        if n > 1
+        else (y[..., 0], y[..., 0])
+    )
     assert out[0, 0] == pytest.approx(np.full(n, before[0, 0]))
     assert out[0, 1] == pytest.approx(np.full(n, after[0, 1]))
 
@@ -380,7 +435,12 @@ def test_a_running_sum_goes_on_as_a_straight_line_and_hangs_on_no_other_row(n):
     for k, reach in enumerate(ahead):
         theirs = [held(y[0, k], np.arange(t - reach + 1, t + reach + 1)).sum() for t in range(n)]
         assert out[0, k] == pytest.approx(theirs, rel=1e-12, abs=1e-12)
-    summed(alone := np.empty((1, 1, n)), [slice(0, n)], {"ahead": ahead[1:2], "behind": -ahead[1:2]}, y=y[:, 1:2])
+    summed(
+        alone := np.empty((1, 1, n)),
+        [slice(0, n)],
+        {"ahead": ahead[1:2], "behind": -ahead[1:2]},
+        y=y[:, 1:2],
+    )
     assert np.array_equal(alone[0, 0], out[0, 1])
 
 
@@ -406,7 +466,9 @@ def test_a_stencil_does_not_read_or_write_beside_its_arrays(change, why):
 def test_constants_of_the_exponential_are_those_of_a_polynomial_close_to_it():
     x = np.linspace(-np.log(2) / 2, np.log(2) / 2, 10001).astype(np.longdouble)
     exact = np.exp(x)
-    assert np.abs(np.polyval(np.array(math.EXP, dtype=np.longdouble), x) / exact - 1).max() < 1.7e-14
+    assert (
+        np.abs(np.polyval(np.array(math.EXP, dtype=np.longdouble), x) / exact - 1).max() < 1.7e-14
+    )
 
 
 CROWDED = """
@@ -414,7 +476,8 @@ import ctypes
 from tractexp.kernel import objects, steady
 
 memory = ctypes.CDLL(None)
-memory.mmap.restype, memory.mmap.argtypes = ctypes.c_void_p, [ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_int] * 4]
+memory.mmap.restype, memory.mmap.argtypes = ctypes.c_void_p, [ctypes.c_void_p, ctypes.c_size_t, \
+*[ctypes.c_int] * 4]
 memory.munmap.argtypes = [ctypes.c_void_p, ctypes.c_size_t]
 UNUSED = 0x4022  # private, of no file, and never reserved: it costs addresses alone
 room = lambda size: memory.mmap(None, size, 0, UNUSED, -1, 0)

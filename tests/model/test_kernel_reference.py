@@ -1,4 +1,6 @@
-"""Every model of the catalogue against what kernels compiled by Numba gave, stored before those went."""
+"""Every model of the catalogue against what kernels compiled by Numba gave, stored before those
+went.
+"""
 
 import json
 
@@ -7,7 +9,8 @@ import numpy as np
 import pytest
 
 CASES = [*kernel_reference.stored()]
-NUDGES = (1e-12, -1e-12, 3e-12)  # relative: by which candidates are moved, to see what they make of a rounding
+# relative: by which candidates are moved, to see what they make of a rounding
+NUDGES = (1e-12, -1e-12, 3e-12)
 CHAOTIC = 1e-8  # relative: of a candidate whose sums follow a nudge so far, digits say nothing
 SAME = 1e-11  # relative, beside ten times what a nudge does
 LANES = (1, 2, 7, 8, 9, 57)
@@ -23,7 +26,9 @@ def named(case):
 def test_a_model_gives_what_its_kernel_by_numba_gave(case):
     of, before = case
     model, values = kernel_reference.model(of), before["values"].astype(float)
-    now, *nudged = (kernel_reference.played(model, values * (1 + nudge)) for nudge in (0.0, *NUDGES))
+    now, *nudged = (
+        kernel_reference.played(model, values * (1 + nudge)) for nudge in (0.0, *NUDGES)
+    )
     fits = before["miss"] == 0
     assert np.array_equal(now["miss"] == 0, fits)
     with np.errstate(all="ignore"):
@@ -53,7 +58,9 @@ def test_a_lane_has_its_bits_wherever_it_stands_and_in_any_batch(case):
         part = kernel_reference.played(model, values[some], shown=False)
         assert np.array_equal(part["miss"], whole["miss"][:, some])
         sums = np.where(fits[:, None], whole["sums"], 0.0)[..., some]
-        assert np.array_equal(np.where(fits[:, None, some], part["sums"], 0.0), sums, equal_nan=True)
+        assert np.array_equal(
+            np.where(fits[:, None, some], part["sums"], 0.0), sums, equal_nan=True
+        )
 
 
 def test_the_reference_has_refused_and_diverging_candidates_of_both_domains():

@@ -59,12 +59,18 @@ def polar_right_hand_side(t, y, U, omega_s, p):
 
 
 def reference(excitation, values, rtol=1e-12):
-    """P and Q by DOP853 on the printed polar equations, restarted at each sample; the voltage by SciPy's makima."""
+    """P and Q by DOP853 on the printed polar equations, restarted at each sample; the voltage by
+    SciPy's makima.
+    """
     *p, p_v, q_v = values
     T_prime, X_prime, C, _, T_m = p
     U, U0, h = excitation.U, excitation.U0, excitation.step
     delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))  # Eq. (3)
-    state = [C * U0 * np.cos(delta), delta, np.sin(delta) * C * U0 / (T_prime * C * U0 * np.cos(delta))]
+    state = [
+        C * U0 * np.cos(delta),
+        delta,
+        np.sin(delta) * C * U0 / (T_prime * C * U0 * np.cos(delta)),
+    ]
     states = [state]
     t = np.arange(len(U)) * h
     voltage = Akima1DInterpolator(t, U, method="makima")
@@ -94,7 +100,11 @@ def test_right_hand_side_is_the_printed_polar_equation(model):
         U = rng.uniform(0.2, 1.2)
         dE, ddelta, domega = polar_right_hand_side(0, (E, delta, omega), U, omega_s, values[:5])
         phasor = (dE + 1j * E * ddelta) * np.exp(1j * delta)
-        known = dict(zip(model.names, values, strict=True)) | {"U": U, "omega_s": omega_s, "omega": omega}
+        known = dict(zip(model.names, values, strict=True)) | {
+            "U": U,
+            "omega_s": omega_s,
+            "omega": omega,
+        }
         known |= {"E_re": E * np.cos(delta), "E_im": E * np.sin(delta)}
         got = [float(d.subs({s: known[s.name] for s in d.free_symbols})) for _, d, _ in rows]
         assert got == pytest.approx([phasor.real, phasor.imag, domega], rel=1e-12, abs=1e-12)
@@ -121,12 +131,16 @@ def test_a_slow_record_is_as_accurate_as_a_fast_one(model, step):
 
 
 def test_a_long_simulation_is_done_in_calls_between_which_signals_are_heard(model, monkeypatch):
-    """Their results are those of one call, bit for bit; each is as short as a block of candidates allows."""
+    """Their results are those of one call, bit for bit; each is as short as a block of candidates
+    allows.
+    """
     drive = Drive.of([dip(), dip(depth=0.5)])
     values = TRUTH * np.random.default_rng(3).uniform(0.9, 1.1, (3 * LANES + 5, len(TRUTH)))
     whole, sums = model.simulate(drive, values, 2), model.errors(drive, values, 2)
     run, calls = model.kernel.run, []
-    monkeypatch.setattr(model.kernel, "run", lambda *arrays: (calls.append(arrays[0].shape[2]), run(*arrays)))
+    monkeypatch.setattr(
+        model.kernel, "run", lambda *arrays: (calls.append(arrays[0].shape[2]), run(*arrays))
+    )
     monkeypatch.setattr("tractexp.model.model.MOST_STEPS_A_CALL", 2 * LANES * 2 * drive.samples + 1)
     parts = model.simulate(drive, values, 2)
     assert calls == [2 * LANES, LANES + 5]
@@ -141,9 +155,11 @@ def test_a_long_simulation_is_done_in_calls_between_which_signals_are_heard(mode
 
 @pytest.mark.parametrize(("integration", "order"), [("classical", 4), ("printed", 1)])
 def test_the_kernel_is_of_the_order_that_its_integration_has(model, integration, order):
-    """Eq. (4) as printed goes h/6 ahead in its second and third stage, which leaves one order of the four.
+    """Eq. (4) as printed goes h/6 ahead in its second and third stage, which leaves one order of
+    the four.
 
-    The voltage is a smooth one, sampled so finely that the cubic between its samples is not what limits.
+    The voltage is a smooth one, sampled so finely that the cubic between its samples is not what
+    limits.
     """
     t = np.arange(401) * 2.5e-3
     U = 1 - 0.3 * np.sin(np.pi * t) ** 4
@@ -163,14 +179,17 @@ def test_integrated_as_printed_a_model_takes_one_step_per_sample_and_says_what_t
     assert error[0] > 1e-4
     assert model.substeps(drive, TRUTH)[1][0] < 1e-7
     assert printed.source != model.source
-    with pytest.raises(UserError, match=r"model\.integration=euler is not one of classical, printed"):
+    with pytest.raises(
+        UserError, match=r"model\.integration=euler is not one of classical, printed"
+    ):
         compose(model.motor, model.static, integration="euler")
 
 
 def test_the_operations_of_a_step_are_those_counted_by_hand(model):
-    """Eq. (1) in rectangular form: 9 multiplications and 6 additions four times, 9 of each to go ahead in three stages,
-    6 and 12 for the sum; a constant times the voltage serves both stages in the middle. All lanes share two cubics of 8
-    and 8 and two straight lines of 1 and 2: the end of a step is the beginning of the next.
+    """Eq. (1) in rectangular form: 9 multiplications and 6 additions four times, 9 of each to go
+    ahead in three stages, 6 and 12 for the sum; a constant times the voltage serves both stages in
+    the middle. All lanes share two cubics of 8 and 8 and two straight lines of 1 and 2: the end of
+    a step is the beginning of the next.
     """
     step = operations.count(model.source).step
     assert step.multiplications == pytest.approx(4 * 9 - 1 + 9 + 6 + 2 * (8 + 1) / LANES)
@@ -179,21 +198,31 @@ def test_the_operations_of_a_step_are_those_counted_by_hand(model):
 
 
 def test_the_operations_of_a_sample_are_those_of_both_powers_and_the_errors(model):
-    """A ZIP load instead of two powers saves what two exponentials cost; a load without a motor makes no steps."""
+    """A ZIP load instead of two powers saves what two exponentials cost; a load without a motor
+    makes no steps.
+    """
     zip_load, none = get("model/static", "zip")(), get("model/motor", "none")()
-    powers, polynomial = operations.count(model.source), operations.count(compose(none, zip_load).source)
+    powers, polynomial = (
+        operations.count(model.source),
+        operations.count(compose(none, zip_load).source),
+    )
     assert polynomial.step.total == 0
-    # two exponents, each clamped and put into the exponent of a number; all lanes share two shifts of a logarithm
+    # two exponents, each clamped and put into the exponent of a number; all lanes share two shifts
+    # of a logarithm
     assert powers.sample.others == pytest.approx(2 * 3 + 2 / LANES)
     assert powers.sample.total > polynomial.sample.total + 2 * 24
     assert powers.per_sample(3).total == pytest.approx(powers.sample.total + 3 * powers.step.total)
 
 
 def test_recorded_frequency_moves_the_synchronous_speed(model):
-    """At a constant off-nominal frequency the load is in the same steady state: flat stays flat, slip unchanged."""
+    """At a constant off-nominal frequency the load is in the same steady state: flat stays flat,
+    slip unchanged.
+    """
     t = np.arange(500) * 1e-3
     speed = np.full(len(t), -3.0)
-    flat = Excitation(1e-3, np.ones(len(t)), np.ones(len(t)), np.full(len(t), 0.6), 1.0, 1.0, 0.6, speed, -3.0)
+    flat = Excitation(
+        1e-3, np.ones(len(t)), np.ones(len(t)), np.full(len(t), 0.6), 1.0, 1.0, 0.6, speed, -3.0
+    )
     response = model.simulate(Drive.of([flat]), TRUTH)
     assert np.abs(response.P - 1.0).max() < 1e-12
 
@@ -211,9 +240,13 @@ def test_steady_state_is_the_equivalent_circuit(model):
     flat = Excitation(1e-3, np.full(50, U), np.zeros(50), np.zeros(50), U, S.real, S.imag)
     eq = model.equations
     known = dict(zip(model.names, values, strict=True)) | {"U0": U, "omega_s0": 0.0}
-    starts = {s.name: complex(i.subs({x: known[x.name] for x in i.free_symbols})).real for s, _, i in eq.real_states()}
+    starts = {
+        s.name: complex(i.subs({x: known[x.name] for x in i.free_symbols})).real
+        for s, _, i in eq.real_states()
+    }
     assert starts["omega"] == pytest.approx(-slip * OMEGA_S, rel=1e-9)
-    # all of P and Q is the motor's, so nothing is left to the static part: flat at S whatever its exponents
+    # all of P and Q is the motor's, so nothing is left to the static part: flat at S whatever its
+    # exponents
     response = model.simulate(Drive.of([flat]), values)
     assert response.Q[0] == pytest.approx(np.full(50, S.imag), abs=1e-12)
     assert U * (U - starts["E_re"]) / X_prime == pytest.approx(S.imag, rel=1e-9)
@@ -239,7 +272,8 @@ def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_pat
         from tractexp.model.model import ModelResponse, compose
         from tractexp.plugin import get
         model = compose(get("model/motor", "double_cage")(), get("model/static", "exponential")())
-        values = np.array([p.default for p in model.parameters]) * np.linspace(0.95, 1.05, 20)[:, None]
+        values = np.array([p.default for p in model.parameters]) * \
+np.linspace(0.95, 1.05, 20)[:, None]
         U = 1 - 0.5 * (np.arange(100) // 30 == 1)
         drive = Drive.of([Excitation(1e-3, U, np.ones(100), np.ones(100), 1.0, 1.0, 0.6)])
         response = model.simulate(drive, values)
@@ -248,7 +282,13 @@ def test_a_kernel_just_compiled_gives_the_bits_of_the_same_kernel_loaded(tmp_pat
     """
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
     told = [
-        subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+        )
         for _ in range(2)
     ]
     assert told[0].stdout == told[1].stdout
@@ -266,18 +306,27 @@ def test_sums_are_those_of_the_responses(model):
 
 
 def test_errors_of_what_diverges_behind_a_measurement_are_infinite_without_a_warning(monkeypatch):
-    behind = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(),
-                     [get("effect", "time_skew")()])  # fmt: skip
+    behind = compose(
+        get("model/motor", "electromechanical")(),
+        get("model/static", "exponential")(),
+        [get("effect", "time_skew")()],
+    )
     drive = Drive.of([dip()])
     outputs = np.full((2, 1, drive.samples), 1e200)
-    monkeypatch.setattr(type(behind), "simulate", lambda *_: ModelResponse(outputs, np.zeros((1, 1))))
+    monkeypatch.setattr(
+        type(behind), "simulate", lambda *_: ModelResponse(outputs, np.zeros((1, 1)))
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert np.isinf(behind.errors(drive, np.r_[TRUTH, 0.0]).sums).all()
 
 
 def test_events_in_one_pass_are_the_events_one_by_one(model):
-    events = [dip(), dip(step=2e-3, depth=0.3, P0=0.8, Q0=0.5, U0=0.98), dip(depth=0.65, duration=0.1)]
+    events = [
+        dip(),
+        dip(step=2e-3, depth=0.3, P0=0.8, Q0=0.5, U0=0.98),
+        dip(depth=0.65, duration=0.1),
+    ]
     values = candidates(20, np.random.default_rng(5))
     substeps = [1, 3, 2]
     together = model.errors(Drive.of(events), values, substeps).sums
@@ -298,7 +347,9 @@ def test_a_gap_in_the_measurement_is_left_out(model):
 
 
 def test_candidates_without_a_steady_state_are_refused_and_ranked(model):
-    """|2 T_m X'/(C U0^2)| = 1.25, 2.5, 5: each misses by what exceeds 1; a feasible neighbor is untouched."""
+    """|2 T_m X'/(C U0^2)| = 1.25, 2.5, 5: each misses by what exceeds 1; a feasible neighbor
+    is untouched.
+    """
     values = np.tile(TRUTH, (4, 1))
     values[1:, 1] = np.array([1.25, 2.5, 5.0]) * 0.9 / (2 * 0.55)
     errors = model.errors(Drive.of([dip()]), values)
@@ -315,7 +366,9 @@ def test_candidates_without_a_steady_state_are_refused_and_ranked(model):
         ("PSO", [2.1863, 0.75606, 0.627, 1.7738, 1.2298, 2.5629, 1.286], "2.97"),
     ],
 )
-def test_the_papers_own_values_get_the_reason_why_they_cannot_be_simulated(model, column, values, limit):
+def test_the_papers_own_values_get_the_reason_why_they_cannot_be_simulated(
+    model, column, values, limit
+):
     sentence = model.refusal(values, Drive.of([dip()]))
     assert f"it is {limit}" in sentence, column
     assert "Eq. (3)" in sentence
@@ -330,7 +383,8 @@ def test_good_values_are_not_refused(model):
 def test_a_kernel_is_shared_by_processes_that_start_together(tmp_path):
     program = (
         "from tractexp.plugin import get; from tractexp.model.model import compose;"
-        "m = compose(get('model/motor', 'electromechanical')(), get('model/static', 'exponential')());"
+        "m = compose(get('model/motor', 'electromechanical')(), get('model/static',"
+        " 'exponential')());"
         "m.compile()"
     )
     environment = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
@@ -371,7 +425,9 @@ class Renamed(Static):
 
     def __init__(self, names):
         self.name = "renamed"
-        self.parameters = tuple(Parameter(1.5, (0.0, 3.0), "1", "exponent", "test", name=name) for name in names)
+        self.parameters = tuple(
+            Parameter(1.5, (0.0, 3.0), "1", "exponent", "test", name=name) for name in names
+        )
 
     def law(self, u, **exponents):
         return tuple(u**e for e in exponents.values())
@@ -407,24 +463,36 @@ def test_the_sites_of_a_model_are_a_table_of_what_stands_there(model):
     table = tractexp.sites(model)
     rows = {row[0]: dict(zip(table.columns, row, strict=True)) for row in table.rows}
     of_waves = {"bus_voltage", "bus_voltage_rate", "motor_current", "current", "zero_current"}
-    assert set(rows) == set(SITES) - of_waves - {"internal_voltage"}  # which this motor has as a state
+    # which this motor has as a state
+    assert set(rows) == set(SITES) - of_waves - {"internal_voltage"}
     assert rows["coupling"]["expression"] == "C"
     assert rows["load_torque"]["could be edited by"] == "speed_dependent_torque, torque_curve"
     assert "undervoltage_trip" in rows["P"]["could be edited by"].split(", ")
     assert not any(row["edited by"] for row in rows.values())
-    assert "phasor" in next(line for line in str(table).splitlines() if line.lstrip().startswith("stator_impedance"))
+    assert "phasor" in next(
+        line for line in str(table).splitlines() if line.lstrip().startswith("stator_impedance")
+    )
     slowed = compose(model.motor, model.static, [get("effect", "speed_dependent_torque")()])
     (torque,) = (row for row in tractexp.sites(slowed).rows if row[0] == "load_torque")
     assert torque[-2:] == ("speed_dependent_torque", "torque_curve")
     alone = compose(get("model/motor", "none")(), get("model/static", "exponential")())
-    assert [row[0] for row in tractexp.sites(alone).rows] == ["static_voltage", "P_static", "Q_static", "P", "Q"]
+    assert [row[0] for row in tractexp.sites(alone).rows] == [
+        "static_voltage",
+        "P_static",
+        "Q_static",
+        "P",
+        "Q",
+    ]
     with pytest.raises(UserError, match="sites\\(\\) takes a model"):
         tractexp.sites("third_order")
 
 
-def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_without_deriving_anything(tmp_path):
+def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_without_deriving(
+    tmp_path,
+):
     program = (
-        "import sys, numpy as np; from tractexp.plugin import discover, get; from tractexp.model.model import compose;"
+        "import sys, numpy as np; from tractexp.plugin import discover, get; from"
+        " tractexp.model.model import compose;"
         "from tractexp.model.drive import Drive, Excitation;"
         "m = compose(get('model/motor', 'voltage')(), get('model/static', 'exponential')());"
         "names = ('stator_resistance', 'speed_dependent_torque', 'time_skew');"
@@ -434,7 +502,11 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
         "print('sympy' in sys.modules, 'scipy.signal' in sys.modules)"
     )
     there = os.environ | {"TRACTEXP_CACHE_DIR": str(tmp_path)}
-    run = lambda: subprocess.check_output([sys.executable, "-c", program], env=there, text=True).splitlines()  # noqa: E731
+
+    def run():
+        told = subprocess.check_output([sys.executable, "-c", program], env=there, text=True)
+        return told.splitlines()
+
     *derived, loaded = run()
     assert derived[0] == "[None, 'its equations have no speed that moves', None]"
     assert "'P_motor': " in derived[1]
@@ -444,7 +516,11 @@ def test_whether_an_effect_fits_and_what_stands_before_an_event_are_remembered_w
 
 @pytest.mark.parametrize("motor", ["electromechanical", "stator_flux"])
 def test_what_stands_before_an_event_is_what_the_equations_say(motor):
-    of = compose(get("model/motor", motor)(), get("model/static", "zip")(), [get("effect", "feeder_impedance")()])
+    of = compose(
+        get("model/motor", motor)(),
+        get("model/static", "zip")(),
+        [get("effect", "feeder_impedance")()],
+    )
     flat, values = np.full(2, 0.97), np.array([p.default for p in of.parameters])
     before = of.at_rest(values, Drive.of([Excitation(1e-3, flat, flat, flat, 0.97, 1.0, 0.5)]))
     for symbol in of.equations.definitions:
@@ -455,7 +531,9 @@ def test_what_stands_before_an_event_is_what_the_equations_say(motor):
             assert before[symbol.name] == pytest.approx(float(number), rel=1e-13, abs=1e-15)
 
 
-def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(tmp_path, monkeypatch):
+def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(
+    tmp_path, monkeypatch
+):
     from tractexp import texts
 
     monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
@@ -463,7 +541,11 @@ def test_two_plugins_of_one_class_name_in_one_folder_have_sources_of_their_own(t
     for name in ("one", "two"):
         monkeypatch.setitem(sys.modules, f"load_{name}", module := ModuleType(f"load_{name}"))
         module.__file__ = str(tmp_path / f"load_{name}.py")
-        exec("class Load:\n    def __repr__(self): return 'Load()'", {"__name__": f"load_{name}"}, namespace := {})
+        exec(
+            "class Load:\n    def __repr__(self): return 'Load()'",
+            {"__name__": f"load_{name}"},
+            namespace := {},
+        )
         made.append(texts.text_of((namespace["Load"](),), lambda name=name: name, "text"))
     assert made == ["one", "two"]
 
@@ -480,9 +562,15 @@ def test_whether_a_declared_steady_state_is_exact_is_found(motor, exact):
 
 @pytest.mark.parametrize("motor", sorted(discover()["model/motor"]))
 def test_a_kernel_is_written_of_every_motor_with_the_effects_that_every_fit_compares_it_with(motor):
-    """Rival structures: behind a resistance the first-order motor's current is a quotient that SymPy does not split."""
+    """Rival structures: behind a resistance the first-order motor's current is a quotient that
+    SymPy does not split.
+    """
     parts = get("model/motor", motor)(), get("model/static", "exponential")()
-    domains = [d for d in (PHASORS, WAVES) if not any(p.phasors_only if d == WAVES else p.waves_only for p in parts)]
+    domains = [
+        d
+        for d in (PHASORS, WAVES)
+        if not any(p.phasors_only if d == WAVES else p.waves_only for p in parts)
+    ]
     effects = [e for e in (get("effect", name)() for name in discover()["effect"]) if e.rival]
     for domain, effect in itertools.product(domains, effects):
         if compose(*parts, domain=domain).acceptance(effect).refusal is None:

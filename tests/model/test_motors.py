@@ -15,12 +15,34 @@ from tractexp.model.model import compose
 from tractexp.plugin import discover, get
 
 MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage")
-STATICS = ("exponential", "zip", "constant_impedance", "constant_power", "exponential_frequency", "branch", "none")
+STATICS = (
+    "exponential",
+    "zip",
+    "constant_impedance",
+    "constant_power",
+    "exponential_frequency",
+    "branch",
+    "none",
+)
 VALUES = {
-    "T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "R_s": 0.02, "T_second": 0.01,
-    "X_second": 0.18, "p_v": 1.4, "q_v": 3.0, "a_Z": 0.4, "a_I": 0.3, "b_Z": 0.7, "b_I": 0.2, "p_f": 1.3, "q_f": -1.1,
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "R_s": 0.02,
+    "T_second": 0.01,
+    "X_second": 0.18,
+    "p_v": 1.4,
+    "q_v": 3.0,
+    "a_Z": 0.4,
+    "a_I": 0.3,
+    "b_Z": 0.7,
+    "b_I": 0.2,
+    "p_f": 1.3,
+    "q_f": -1.1,
     "branch_resistance": 0.3,
-}  # fmt: skip
+}
 
 
 @functools.cache
@@ -35,7 +57,9 @@ def values(of, **changed):
 
 
 def dip(step=1e-3, length=1.0, depth=0.4, start=0.2, duration=0.15, edge=0.02, U0=1.0, swing=0.0):
-    """A dip with smooth edges, sampled uniformly; the frequency swings by `swing` rad/s where it is not 0."""
+    """A dip with smooth edges, sampled uniformly; the frequency swings by `swing` rad/s where it is
+    not 0.
+    """
     t = np.arange(round(length / step) + 1) * step
     smooth = lambda x: 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0, 1))  # noqa: E731
     U = U0 * (1 - depth * (smooth((t - start) / edge) - smooth((t - start - duration) / edge)))
@@ -71,13 +95,18 @@ def real_states(of):
 
 
 def at_rest(of, excitation, parameters):
-    """The steady state by name: the declared one where the balances vanish there, else SciPy's, begun from it."""
+    """The steady state by name: the declared one where the balances vanish there, else SciPy's,
+    begun from it.
+    """
     from scipy.optimize import root
 
     numbers = known(of, excitation, parameters, U=excitation.U0, omega_s=excitation.omega_s0)
     start = {s.name: number(i, numbers).real for s, _, i in real_states(of)}
     balances = of.equations.real_balances()
-    missed = lambda x: [number(b, numbers | dict(zip(start, x, strict=True))).real for b in balances]  # noqa: E731
+
+    def missed(x):
+        return [number(b, numbers | dict(zip(start, x, strict=True))).real for b in balances]
+
     if np.abs(missed(start.values())).max(initial=0.0) < 1e-9:
         return start
     found = root(missed, list(start.values()), tol=1e-12)
@@ -86,7 +115,9 @@ def at_rest(of, excitation, parameters):
 
 
 def functions(of, *names):
-    """Real right-hand side, and the real named quantities `names`, as one function of numbers by name."""
+    """Real right-hand side, and the real named quantities `names`, as one function of numbers by
+    name.
+    """
     eq, rows = of.equations, real_states(of)
     states = [s.name for s, _, _ in rows]
     compute = compiled(*(d for _, d, _ in rows), *(eq.real(eq[name]) for name in names))
@@ -99,7 +130,8 @@ def functions(of, *names):
 
 
 def play(of, excitation, parameters, names=("P_motor", "Q_motor"), rtol=1e-11):
-    """States and named quantities at the samples by DOP853 on the declared equations, restarted at each sample.
+    """States and named quantities at the samples by DOP853 on the declared equations, restarted at
+    each sample.
 
     Between samples the voltage is SciPy's makima, the speed a straight line.
     """
@@ -138,7 +170,9 @@ def test_the_kernel_agrees_with_dop853(motor):
 def test_the_state_before_the_event_is_a_zero_of_the_right_hand_side(motor, speed):
     """Of derivatives where states move, and of the torque balance where the speed does not."""
     of = model(motor)
-    excitation = Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 0.97, 1.0, 0.6, np.full(5, speed), speed)
+    excitation = Excitation(
+        1e-3, np.ones(5), np.ones(5), np.ones(5), 0.97, 1.0, 0.6, np.full(5, speed), speed
+    )
     rest = at_rest(of, excitation, values(of))
     numbers = known(of, excitation, values(of), U=0.97, omega_s=speed) | rest
     for balance in of.equations.real_balances():
@@ -151,19 +185,25 @@ def test_the_state_before_the_event_is_a_zero_of_the_right_hand_side(motor, spee
 def test_input_power_is_losses_and_shaft_power_and_what_is_stored(motor):
     """P = T_e (1 + omega/omega_n) + losses + rate of stored energy, along a dip.
 
-    A rotor circuit of inductance x and open time constant T carries the magnetizing current i = e/(jx), of which the
-    rotor supplies i_r = i - I through its resistance x/(T omega_n). What is stored, x |i|^2/(2 omega_n), changes at
-    the rate x Re(i' i*)/omega_n; without stator transients the stator does not see the voltage i' induces, and only
-    the rotor's share of that rate, x Re(i' i_r*)/omega_n, is left. `stator_flux` also stores X' |I|^2/(2 omega_n).
+    A rotor circuit of inductance x and open time constant T carries the magnetizing current i =
+    e/(jx), of which the rotor supplies i_r = i - I through its resistance x/(T omega_n). What is
+    stored, x |i|^2/(2 omega_n), changes at the rate x Re(i' i*)/omega_n; without stator transients
+    the stator does not see the voltage i' induces, and only the rotor's share of that rate, x Re(i'
+    i_r*)/omega_n, is left. `stator_flux` also stores X' |I|^2/(2 omega_n).
     """
     of, excitation = model(motor, "none"), dip(length=0.4)
     p = dict(zip(of.names, values(of), strict=True))
     rows, (P, torque) = play(of, excitation, values(of), ("P_motor", "electrical_torque"))
     names, compute = functions(of)
     before = known(of, excitation, values(of), omega_s=0.0)
-    slopes = [compute(before | {"U": u} | dict(zip(names, x, strict=True)))[0]
-              for u, x in zip(excitation.U, rows.T, strict=True)]  # fmt: skip
-    state, slope = dict(zip(names, rows, strict=True)), dict(zip(names, np.array(slopes).T, strict=True))
+    slopes = [
+        compute(before | {"U": u} | dict(zip(names, x, strict=True)))[0]
+        for u, x in zip(excitation.U, rows.T, strict=True)
+    ]
+    state, slope = (
+        dict(zip(names, rows, strict=True)),
+        dict(zip(names, np.array(slopes).T, strict=True)),
+    )
     phasor = lambda of, name: of[f"{name}_re"] + 1j * of[f"{name}_im"]  # noqa: E731
 
     leakage, x, T = p["X_prime"], p["X_prime"] * p["C"] / (1 - p["C"]), p["T_prime"] / (1 - p["C"])
@@ -239,19 +279,35 @@ def test_third_order_with_a_great_inertia_becomes_second_order():
 
 
 def test_double_cage_with_an_open_second_cage_is_third_order():
-    assert gap("double_cage", "electromechanical", dip(), {"X_second": VALUES["X_prime"]}, {}) < 1e-9
+    assert (
+        gap("double_cage", "electromechanical", dip(), {"X_second": VALUES["X_prime"]}, {}) < 1e-9
+    )
 
 
 def test_double_cage_whose_second_cage_fades_at_once_becomes_third_order():
-    gaps = [gap("double_cage", "electromechanical", dip(), {"T_second": T}, {}, 256) for T in (1e-2, 1e-3, 1e-4)]
+    gaps = [
+        gap("double_cage", "electromechanical", dip(), {"T_second": T}, {}, 256)
+        for T in (1e-2, 1e-3, 1e-4)
+    ]
     assert gaps[1] < 0.2 * gaps[0]
     assert gaps[2] < 0.02 * gaps[0]
 
 
 def test_fifth_order_at_slow_inputs_becomes_third_order():
-    """Without resistance the stator flux follows the voltage up to the offset an edge leaves, less the slower it is."""
-    gaps = [gap("stator_flux", "electromechanical", dip(length=4, duration=1, edge=e), {"R_s": 1e-9}, {}, 8)
-            for e in (0.02, 0.2, 0.8)]  # fmt: skip
+    """Without resistance the stator flux follows the voltage up to the offset an edge leaves, less
+    the slower it is.
+    """
+    gaps = [
+        gap(
+            "stator_flux",
+            "electromechanical",
+            dip(length=4, duration=1, edge=e),
+            {"R_s": 1e-9},
+            {},
+            8,
+        )
+        for e in (0.02, 0.2, 0.8)
+    ]
     assert gaps[0] > 0.05
     assert gaps[1] < 0.2 * gaps[0]
     assert gaps[2] < 0.02 * gaps[0]
@@ -259,8 +315,11 @@ def test_fifth_order_at_slow_inputs_becomes_third_order():
 
 def test_fifth_order_without_inputs_to_excite_it_is_third_order_with_resistance():
     """The effect `stator_resistance` on the third order has the steady state of the fifth."""
-    third = compose(get("model/motor", "electromechanical")(), get("model/static", "constant_impedance")(),
-                    [get("effect", "stator_resistance")()])  # fmt: skip
+    third = compose(
+        get("model/motor", "electromechanical")(),
+        get("model/static", "constant_impedance")(),
+        [get("effect", "stator_resistance")()],
+    )
     excitation = Excitation(1e-3, np.ones(5), np.ones(5), np.ones(5), 1.0, 1.0, 0.6)
     rests = [at_rest(of, excitation, values(of, R_s=0.05)) for of in (third, model("stator_flux"))]
     for name in ("E_re", "E_im", "omega"):
@@ -279,7 +338,12 @@ def test_an_oscillation_at_supply_frequency_follows_a_sudden_dip_in_the_fifth_or
 
 
 def test_the_lists_above_are_all_there_is():
-    assert set(discover()["model/motor"]) == {*MOTORS, "none", "motor_groups", "line_side_converter"}
+    assert set(discover()["model/motor"]) == {
+        *MOTORS,
+        "none",
+        "motor_groups",
+        "line_side_converter",
+    }
     assert set(discover()["model/static"]) == set(STATICS)
 
 
@@ -301,7 +365,9 @@ def test_values_without_a_steady_state_get_a_sentence(motor, changed, sentence):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_the_double_cage_finds_the_stable_slip_where_there_is_one(seed):
-    """Against a scan of the impedance of both cages: torque over slip, its first crossing of T_m."""
+    """Against a scan of the impedance of both cages: torque over slip, its first
+    crossing of T_m.
+    """
     of = model("double_cage", "none")
     rng = np.random.default_rng(seed)
     low, high = np.array([p.bounds for p in of.parameters]).T
@@ -315,12 +381,14 @@ def test_the_double_cage_finds_the_stable_slip_where_there_is_one(seed):
     first = np.argmax(S.real > p["T_m"], axis=1)
     carried = (S.real.max(axis=1) > 1.02 * p["T_m"][:, 0]) & (p["X_second"] < p["X_prime"])[:, 0]
     peak = np.argmax(np.diff(S.real) < 0, axis=1)
-    strongest = S.real[np.arange(len(rows)), peak]  # of the first cage; past it a motor crawls, and is not meant
+    # of the first cage; past it a motor crawls, and is not meant
+    strongest = S.real[np.arange(len(rows)), peak]
     near = carried & (strongest > 1.02 * p["T_m"][:, 0])
     response = of.simulate(Drive.of([dip(length=0.01)]), rows, 64)
     found = response.miss[0] == 0
     assert near.sum() > 100
-    assert found[near].mean() > 0.99  # a shoulder of the torque curve may stop Newton's method: refused, not wrong
+    # a shoulder of the torque curve may stop Newton's method: refused, not wrong
+    assert found[near].mean() > 0.99
     near &= found
     assert not found[~carried & (S.real.max(axis=1) < 0.98 * p["T_m"][:, 0])].any()
     assert response.P[near, 0] == pytest.approx(rows[near, of.names.index("T_m")], abs=1e-9)

@@ -43,7 +43,9 @@ def values(problem, n=5):
 def test_residuals_squared_sum_to_the_objective_of_every_loss(event, name):
     problem = Problem(study.model(), [event], loss=loss(name))
     x = values(problem)
-    np.testing.assert_allclose((problem.residuals(x) ** 2).sum(axis=1), problem.objective(x), rtol=1e-9)
+    np.testing.assert_allclose(
+        (problem.residuals(x) ** 2).sum(axis=1), problem.objective(x), rtol=1e-9
+    )
 
 
 def test_losses_are_the_formulas_of_their_papers():
@@ -123,14 +125,18 @@ def test_the_probes_of_the_step_fill_the_cube_evenly():
 
 def test_what_cannot_be_fitted_is_refused_in_a_sentence(event):
     silent = replace(event, noise_Q=0.0)
-    with pytest.raises(UserError, match=r"Q shows no noise before the dip.*objective\.scale \[pu\]"):
+    with pytest.raises(
+        UserError, match=r"Q shows no noise before the dip.*objective\.scale \[pu\]"
+    ):
         Problem(study.model(), [silent], loss=loss("huber"))
     Problem(study.model(), [silent], loss=loss("huber", scale=0.01))
     with pytest.raises(UserError, match=r"objective\.weight_P and objective\.weight_Q are both 0"):
         loss("squares", weight_P=0.0, weight_Q=0.0)
     with pytest.raises(UserError, match=r"objective\.tuning=0 is out of range"):
         loss("huber", tuning=0)
-    with pytest.raises(UserError, match=r"model\.per_event\.T_n: this model has no parameter 'T_n'; did you mean"):
+    with pytest.raises(
+        UserError, match=r"model\.per_event\.T_n: this model has no parameter 'T_n'; did you mean"
+    ):
         Problem(study.model(), [event], per_event=["T_n"])
     with pytest.raises(UserError, match=r"model\.per_event names M, which model\.fixed fixes"):
         Problem(study.model(), [event], fixed={"M": 0.006}, per_event=["M"])
@@ -139,4 +145,6 @@ def test_what_cannot_be_fitted_is_refused_in_a_sentence(event):
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
 def test_a_fixed_value_that_is_no_number_is_refused_by_its_name(value):
     with pytest.raises(UserError, match=r"fixed.C=(nan|inf) is out of range: it must be finite"):
-        tractexp.identify("tibet_50pct", fixed={"C": value}, optimizer="multistart_least_squares", budget=20)
+        tractexp.identify(
+            "tibet_50pct", fixed={"C": value}, optimizer="multistart_least_squares", budget=20
+        )

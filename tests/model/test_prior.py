@@ -1,4 +1,6 @@
-"""Weak priors: what machines usually are holds what records do not tell, and moves nothing that they do."""
+"""Weak priors: what machines usually are holds what records do not tell, and moves nothing that
+they do.
+"""
 
 from dataclasses import replace
 
@@ -50,10 +52,18 @@ def problem():
 
 
 def test_a_quantity_at_its_median_departs_by_nothing_and_at_its_factor_by_one(problem):
-    values = {"T_prime": 0.027, "C": 1 - 0.082 * 1.33, "T_m": 0.5, "X_prime": 0.15 / 0.5, "M": 0.0068 * 0.5 / 2.2}
+    values = {
+        "T_prime": 0.027,
+        "C": 1 - 0.082 * 1.33,
+        "T_m": 0.5,
+        "X_prime": 0.15 / 0.5,
+        "M": 0.0068 * 0.5 / 2.2,
+    }
     row = np.array([[values[name] for name in problem.space.names]])
     assert departures(problem, row)[0] == pytest.approx([1.0, 0.0, 0.0, -1.0], abs=1e-9)
-    assert held_in_words(problem, row[0]).endswith("and is 1 standard deviations off where it is farthest")
+    assert held_in_words(problem, row[0]).endswith(
+        "and is 1 standard deviations off where it is farthest"
+    )
 
 
 def test_a_motor_of_which_nothing_is_known_is_held_by_nothing(problem):
@@ -66,13 +76,17 @@ def test_rows_of_the_records_are_the_same_beside_a_prior(problem):
     held, unit = replace(squares, prior=3.0), np.full((2, problem.space.dimension), 0.4)
     rows, beside = squares.rows(unit), held.rows(unit)
     np.testing.assert_array_equal(beside[:, : rows.shape[1]], rows)
-    np.testing.assert_allclose(beside[:, rows.shape[1] :], 3 * departures(problem, squares.values(unit)))
+    np.testing.assert_allclose(
+        beside[:, rows.shape[1] :], 3 * departures(problem, squares.values(unit))
+    )
     np.testing.assert_array_equal(held.of_records.rows(unit), rows)
     assert held.scaled(2.0).prior == 1.5
 
 
 def test_a_parameter_that_the_prior_alone_holds_scatters_as_it_says(problem):
-    """However much it weighs: log(1 - C) by log 1.33, and so on; a jackknife is some percent off."""
+    """However much it weighs: log(1 - C) by log 1.33, and so on; a jackknife is some
+    percent off.
+    """
     for prior in (1e4, 1e5):
         held = replace(Likelihood.of_squares(problem, 0.01), prior=prior)
         start = problem.space.to_unit(problem.defaults)[None]
@@ -89,4 +103,7 @@ def test_a_block_of_samples_counts_as_one_row_of_the_prior(problem):
     held = held_to_usual(squares)
     blocks = blocks_of(problem.events, problem.drive, problem.space.dimension)
     assert held.prior**2 * len(blocks) == pytest.approx(squares.samples)
-    assert held.of_records.rows(np.full((1, 5), 0.4)).tolist() == squares.rows(np.full((1, 5), 0.4)).tolist()
+    assert (
+        held.of_records.rows(np.full((1, 5), 0.4)).tolist()
+        == squares.rows(np.full((1, 5), 0.4)).tolist()
+    )

@@ -1,4 +1,6 @@
-"""The scatter of least squares where what is left is no noise: by its formula, by refits, and by how often it holds."""
+"""The scatter of least squares where what is left is no noise: by its formula, by refits, and by
+how often it holds.
+"""
 
 import numpy as np
 import pytest
@@ -37,7 +39,9 @@ def test_eq_8_is_the_sum_of_squares_and_holds_the_power_before():
     unit = squares.to_unit(study.TYPICAL)
     assert unit.shape == (1, 7)
     rows = squares.rows(unit)[0]
-    assert rows @ rows * 0.01**2 / case.drive.samples == pytest.approx(case.objective(study.TYPICAL[None])[0], rel=1e-9)
+    assert rows @ rows * 0.01**2 / case.drive.samples == pytest.approx(
+        case.objective(study.TYPICAL[None])[0], rel=1e-9
+    )
     assert squares.apart.count == 0
     assert squares.with_initial_power.placed(unit).shape == (1, 9)
 
@@ -46,7 +50,9 @@ def test_blocks_hold_every_sample_once_and_begin_with_the_dip():
     case = problem()
     (event,) = case.events
     blocks = blocks_of(case.events, case.drive, 7)
-    assert np.array_equal(np.concatenate([np.arange(b.start, b.stop) for b in blocks]), np.arange(case.drive.samples))
+    assert np.array_equal(
+        np.concatenate([np.arange(b.start, b.stop) for b in blocks]), np.arange(case.drive.samples)
+    )
     assert event.start in [b.start for b in blocks]
     (length,) = {round((b.stop - b.start) * event.record.step, 3) for b in blocks[1:-1]}
     assert 0.9 * LENGTH < length <= LENGTH
@@ -72,7 +78,9 @@ def test_leaving_out_a_block_is_what_a_refit_without_it_gives():
         other.drive.before[0] = other.drive.measured[:, rest].mean(axis=1)
         part = Likelihood(problem=other, noise=squares.noise, valid=known, initial_power=False)
         moved.append(descend(part.rows, unit[None], tolerance=1e-9).unit[0] - unit)
-    errors = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum(np.square(moved), axis=0)) * (case.upper - case.lower)
+    errors = np.sqrt((len(blocks) - 1) / len(blocks) * np.sum(np.square(moved), axis=0)) * (
+        case.upper - case.lower
+    )
     ratio = scattered.information.standard_errors / errors
     assert np.median(ratio) == pytest.approx(1.0, abs=0.15)
     assert (ratio > 0.85).all()  # in no direction less than that of independent residuals
@@ -106,7 +114,9 @@ def test_intervals_hold_the_truth_under_a_correlated_error_that_the_usual_ones_m
         off = np.abs(known.values - study.TYPICAL)[own]
         told.append(off <= known.half[own])
         rows, J = squares.jacobian(unit)[0], dense(squares.jacobian(unit)[1])
-        plain = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * np.mean(rows**2)) * (case.upper - case.lower)
+        plain = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * np.mean(rows**2)) * (
+            case.upper - case.lower
+        )
         usual.append(off <= 1.96 * plain[own])
     assert np.mean(told) > 0.8
     assert np.mean(usual) < 0.6
@@ -116,9 +126,12 @@ def test_a_parameter_on_a_bound_is_held_for_the_others_and_has_an_error_of_its_o
     t, U = study.Shape(0.5).voltage()
     power = study.printed(study.TYPICAL, t, U, 0.35)
     power += NOISE * np.random.default_rng(1).standard_normal(power.shape)
-    case = Problem(study.model(), [study.event(t, U, power)], {"M": [0.001, 0.005]})  # the truth is 0.006
+    # the truth is 0.006
+    case = Problem(study.model(), [study.event(t, U, power)], {"M": [0.001, 0.005]})
     squares = Likelihood.of_squares(case, NOISE)
-    unit = descend(squares.rows, squares.to_unit(np.minimum(study.TYPICAL, case.upper)), tolerance=1e-8).unit[0]
+    unit = descend(
+        squares.rows, squares.to_unit(np.minimum(study.TYPICAL, case.upper)), tolerance=1e-8
+    ).unit[0]
     assert unit[3] == 1.0
     errors = scatter(squares, unit).information.standard_errors
     assert np.isfinite(errors).all()
@@ -126,7 +139,9 @@ def test_a_parameter_on_a_bound_is_held_for_the_others_and_has_an_error_of_its_o
 
 
 def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
-    """Of a parameter by itself, others free: the parabola of the sandwich, by the likelihood as wide as the scatter."""
+    """Of a parameter by itself, others free: the parabola of the sandwich, by the likelihood as
+    wide as the scatter.
+    """
     squares, unit = least_squares(problem())
     known = conclude(squares, unit, squares.with_initial_power)
     j = known.names.index("T_m")
@@ -134,7 +149,10 @@ def test_the_deviance_rises_to_its_limit_where_the_interval_ends():
     moved[j] += known.half[j] / (known.upper[j] - known.lower[j])
     held = np.zeros((1, len(unit)), dtype=bool)
     held[0, j] = True
-    rise = descend(known.likelihood.rows, moved[None], held, tolerance=1e-8).deviance[0] - known.deviance
+    rise = (
+        descend(known.likelihood.rows, moved[None], held, tolerance=1e-8).deviance[0]
+        - known.deviance
+    )
     assert rise == pytest.approx(known.limits[j], rel=0.25)
     assert known.limits[j] != pytest.approx(threshold(), rel=0.01)
 

@@ -35,7 +35,12 @@ SHARES = VOLTAGES / 0.98
     ("static", "values", "P", "Q"),
     [
         ("exponential", [1.3, 2.6], SHARES**1.3, SHARES**2.6),
-        ("zip", [0.4, 0.35, 0.7, 0.1], 0.4 * SHARES**2 + 0.35 * SHARES + 0.25, 0.7 * SHARES**2 + 0.1 * SHARES + 0.2),
+        (
+            "zip",
+            [0.4, 0.35, 0.7, 0.1],
+            0.4 * SHARES**2 + 0.35 * SHARES + 0.25,
+            0.7 * SHARES**2 + 0.1 * SHARES + 0.2,
+        ),
         ("constant_impedance", [], SHARES**2, SHARES**2),
         ("constant_power", [], np.ones(5), np.ones(5)),
     ],
@@ -53,7 +58,9 @@ class Dimmed(Static):
     """
 
     name = "dimmed"
-    parameters = (Parameter(0.7, (0.4, 0.95), "1", "voltage below which it is out", "made here", name="cut"),)
+    parameters = (
+        Parameter(0.7, (0.4, 0.95), "1", "voltage below which it is out", "made here", name="cut"),
+    )
 
     def law(self, u, cut):
         P = Piecewise((0, u < 0.3), ((u - 0.3) / (cut - 0.3), u < cut), (1, True))
@@ -86,7 +93,9 @@ def test_the_frequency_exponent_counts_from_the_frequency_before_the_event():
 
 def test_without_a_recorded_frequency_its_exponents_change_nothing():
     drive = Drive.of([event(VOLTAGES)])
-    response = alone("exponential_frequency").simulate(drive, [[1.3, 2.6, 1.7, -2.2], [1.3, 2.6, 0.0, 3.0]])
+    response = alone("exponential_frequency").simulate(
+        drive, [[1.3, 2.6, 1.7, -2.2], [1.3, 2.6, 0.0, 3.0]]
+    )
     assert np.array_equal(response.P[0], response.P[1])
     assert np.array_equal(response.Q[0], response.Q[1])
 
@@ -96,7 +105,8 @@ def test_its_identification_from_a_record_without_frequency_is_refused():
     U = np.where((t > 0.4) & (t < 0.55), 0.6, 1.0)
     recorded = detect(Record("plain", t, U, U**1.5, 0.5 * U**2))
     sentence = (
-        "the model/static 'exponential_frequency' reads f, which plain does not have; record f, or choose another"
+        "the model/static 'exponential_frequency' reads f, which plain does not have; record f, or"
+        " choose another"
         " model/static"
     )
     with pytest.raises(UserError, match=f"^{sentence}$"):
@@ -171,6 +181,10 @@ def test_a_motor_alone_draws_its_own_power_before_the_event():
 
 
 def test_a_model_without_parameters_cannot_be_identified():
-    records = build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}).read()
-    with pytest.raises(UserError, match="none motor and constant_power static load has no parameters"):
+    records = build(
+        "data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}
+    ).read()
+    with pytest.raises(
+        UserError, match="none motor and constant_power static load has no parameters"
+    ):
         Problem(alone("constant_power"), [detect(records.train[0])])

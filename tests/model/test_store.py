@@ -1,4 +1,6 @@
-"""What is stored on disk and may be executed: only what was written there whole, in a folder of the user's own."""
+"""What is stored on disk and may be executed: only what was written there whole, in a folder of the
+user's own.
+"""
 
 import ctypes
 import io
@@ -16,7 +18,9 @@ from tractexp.errors import UserError
 from tractexp.kernel import objects, target
 
 ONES = store.Store("ones")
-WITHOUT_OWNERS = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="folders have no owner in this system")
+WITHOUT_OWNERS = pytest.mark.skipif(
+    not hasattr(os, "geteuid"), reason="folders have no owner in this system"
+)
 
 
 @pytest.fixture
@@ -51,7 +55,9 @@ class Nameless:
 def test_an_entry_is_read_as_it_was_written_and_computed_once(folder):
     ONES.write("one", b"content")
     assert ONES.read("one") == b"content"
-    assert [str(p.relative_to(folder)) for p in folder.rglob("*.*")] == [os.path.join("ones", "one.entry")]
+    assert [str(p.relative_to(folder)) for p in folder.rglob("*.*")] == [
+        os.path.join("ones", "one.entry")
+    ]
     assert ONES.get("one", lambda: b"other") == b"content"
     assert ONES.get("two", lambda: b"other") == ONES.read("two") == b"other"
 
@@ -73,7 +79,9 @@ def test_the_oldest_entries_are_forgotten(folder):
 
 def test_a_large_store_stays_near_its_limit_and_is_seldom_listed(folder, monkeypatch):
     many, listed, forget = store.Store("many", limit=640), [], store.Store._forget
-    monkeypatch.setattr(store.Store, "_forget", lambda self, *given: (listed.append(1), forget(self, *given)))
+    monkeypatch.setattr(
+        store.Store, "_forget", lambda self, *given: (listed.append(1), forget(self, *given))
+    )
     (folder / "many").mkdir()
     for k in range(640):  # of an earlier process
         many.path(f"{k:04}").touch()
@@ -83,7 +91,8 @@ def test_a_large_store_stays_near_its_limit_and_is_seldom_listed(folder, monkeyp
         os.utime(many.path(f"{k:04}"), (k, k))
         kept = sorted(path.stem for path in (folder / "many").iterdir())
         assert 560 <= len(kept) <= 650
-        assert kept == [f"{n:04}" for n in range(k + 1 - len(kept), k + 1)]  # the newest, without a gap
+        # the newest, without a gap
+        assert kept == [f"{n:04}" for n in range(k + 1 - len(kept), k + 1)]
     assert len(listed) == 19
 
 
@@ -113,7 +122,8 @@ def test_arrays_are_read_back_to_the_bit_and_never_for_another_key(folder):
     assert store.find_damaged_files(folder) == []
     earlier = folder / "code_0.kept"  # of a version before 0.2
     earlier.write_bytes(b"")
-    for name in ("best.kept", "mine.entry", "descents/mine.entry"):  # of the user, whose folder it may be
+    # of the user, whose folder it may be
+    for name in ("best.kept", "mine.entry", "descents/mine.entry"):
         (folder / name).write_bytes(b"mine")
     assert store.find_damaged_files(folder) == [earlier]
 
@@ -129,7 +139,10 @@ def test_no_entry_is_unpickled(folder):
 @pytest.mark.parametrize(
     "damage",
     [
-        *(lambda b, k=k: b[:k] + bytes([b[k] ^ 1]) + b[k + 1 :] for k in (0, store.SUM - 1, store.SUM, -2)),
+        *(
+            lambda b, k=k: b[:k] + bytes([b[k] ^ 1]) + b[k + 1 :]
+            for k in (0, store.SUM - 1, store.SUM, -2)
+        ),
         lambda b: b[:-1],
         lambda b: b + b"\0",
         lambda b: b[: store.SUM],
@@ -155,7 +168,9 @@ def test_a_sound_file_in_the_place_of_another_is_none(folder):
 
 
 def test_planted_code_is_not_run_and_the_file_heals(folder):
-    """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its place, too."""
+    """A file whose sum is not its own is none, and is compiled anew; one of another kernel in its
+    place, too.
+    """
     answer, other = (objects.object_code(stored(number)) for number in (42.0, 7.0))
     assert called(42.0) == 42.0
     path, theirs = (code_path(stored(number)) for number in (42.0, 7.0))
@@ -174,7 +189,10 @@ def code_path(text):
 
 def stored(number):
     """IR of a function that stores a number."""
-    return f"define void @run(ptr %out) {{\n  store double {number:e}, ptr %out, align 8\n  ret void\n}}\n"
+    return (
+        f"define void @run(ptr %out) {{\n  store double {number:e}, ptr %out, align 8\n  ret"
+        f" void\n}}\n"
+    )
 
 
 def called(number):
@@ -203,7 +221,10 @@ def test_code_for_another_machine_or_of_another_text_is_another_file(folder, mon
 def test_a_changed_digit_in_a_text_is_not_compiled(folder):
     made = []
     for _ in range(2):
-        assert texts.text_of((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text") == "TORQUE = 0.55"
+        assert (
+            texts.text_of((Part(),), lambda: made.append(1) or "TORQUE = 0.55", "text")
+            == "TORQUE = 0.55"
+        )
         (text,) = folder.glob("texts/*.entry")
         text.write_bytes(text.read_bytes().replace(b"0.55", b"0.66"))
     assert len(made) == 2
@@ -302,15 +323,24 @@ def no_folder(folder, monkeypatch):
 
 
 def read_only(folder, monkeypatch):
-    monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.W_OK)  # root may write anywhere
+    # root may write anywhere
+    monkeypatch.setattr(os, "access", lambda path, mode: not mode & os.W_OK)
     return "it cannot be written to"
 
 
 FAULTS = [
-    foreign, open_to_all, open_to_a_group, within_reach, no_folder, read_only, in_a_folder_of_a_group,
-    in_a_folder_of_another_user, with_a_kind_that_is_open, with_a_kind_that_is_a_link,
+    foreign,
+    open_to_all,
+    open_to_a_group,
+    within_reach,
+    no_folder,
+    read_only,
+    in_a_folder_of_a_group,
+    in_a_folder_of_another_user,
+    with_a_kind_that_is_open,
+    with_a_kind_that_is_a_link,
     behind_a_link_that_others_can_change,
-]  # fmt: skip
+]
 
 
 @WITHOUT_OWNERS
@@ -326,14 +356,17 @@ def test_a_chosen_folder_that_is_not_the_users_own_is_refused(folder, monkeypatc
 
 @WITHOUT_OWNERS
 @pytest.mark.parametrize("fault", [open_to_all, open_to_a_group, within_reach, no_folder])
-def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_one(home, monkeypatch, capsys, fault):
+def test_in_the_place_of_a_usual_folder_that_is_not_the_users_own_comes_a_new_one(
+    home, monkeypatch, capsys, fault
+):
     reason = fault(store.cache_folder(), monkeypatch)
     undone: list = []
     monkeypatch.setattr(store.atexit, "register", undone.append)
     made = store.cache_folder()
     assert f"({home}: {reason}" in capsys.readouterr().err
     assert stat.S_IMODE(made.stat().st_mode) == 0o700
-    assert store.cache_folder() == made  # the same one next time, and in the processes that this one starts
+    # the same one next time, and in the processes that this one starts
+    assert store.cache_folder() == made
     assert not capsys.readouterr().err
     undone[0]()
     assert not made.exists()
@@ -348,9 +381,17 @@ def test_without_a_home_a_command_stores_kernels_until_it_ends(home):
         "    Path.home = unknown\n"  # as for a user that the system does not know
         "CODE.write('x', b'1'); assert CODE.read('x') == b'1'; print(cache_folder())"
     )
-    there = {k: v for k, v in os.environ.items() if k not in (store.CHOICE, "XDG_CACHE_HOME", "LOCALAPPDATA")}
+    there = {
+        k: v
+        for k, v in os.environ.items()
+        if k not in (store.CHOICE, "XDG_CACHE_HOME", "LOCALAPPDATA")
+    }
     ran = subprocess.run(
-        [sys.executable, "-c", program, home], env=there | {"HOME": home}, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program, home],
+        env=there | {"HOME": home},
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert "kernels are compiled anew for every command" in ran.stderr
     assert len(ran.stderr.splitlines()) == 1

@@ -43,7 +43,11 @@ def records(depths, deviation, seed=1, truth=study.TYPICAL, correlation=0.0, Q_s
     for k, depth in enumerate(depths):
         t, U = study.Shape(depth).voltage()
         clean = study.printed(truth, t, U, Q_s0)
-        made.append(study.event(t, U, clean + study.noise(rng, len(t), deviation, correlation), f"dip {k + 1}"))
+        made.append(
+            study.event(
+                t, U, clean + study.noise(rng, len(t), deviation, correlation), f"dip {k + 1}"
+            )
+        )
     return made
 
 
@@ -70,7 +74,9 @@ def test_burg_finds_the_coefficients_and_aicc_the_order():
 
 
 def test_whitening_is_the_inverse_of_the_cholesky_factor_of_the_covariance():
-    """For AR(1) the exact whitener is known: both are lower triangular with a positive diagonal, hence equal."""
+    """For AR(1) the exact whitener is known: both are lower triangular with a positive diagonal,
+    hence equal.
+    """
     a, n = 0.7, 12
     noise = Autoregression(np.array([[0.0], [a]]), np.array([1 / np.sqrt(1 - a * a), 1.0]))
     exact = np.linalg.inv(cholesky(toeplitz(a ** np.arange(n)) / (1 - a * a), lower=True))
@@ -103,7 +109,8 @@ def test_whiteness_and_normality_speak_when_they_should_and_are_silent_when_not(
 
 def test_descent_solves_many_linear_problems_and_keeps_to_walls_and_frozen_columns():
     rng = np.random.default_rng(2)
-    A, truth = rng.standard_normal((30, 3)), np.array([0.2, 0.9, 1.4])  # the last lies beyond the wall
+    # the last lies beyond the wall
+    A, truth = rng.standard_normal((30, 3)), np.array([0.2, 0.9, 1.4])
 
     def rows(unit, lanes):
         return (unit - truth) @ A.T
@@ -131,7 +138,9 @@ def test_information_of_a_straight_line_is_the_textbooks():
 
 
 def test_a_difference_is_one_sided_where_the_other_side_is_lost():
-    """Rows A x that cannot be simulated above 0.5 in the second, below 0.5 in the third; the fourth is on a wall."""
+    """Rows A x that cannot be simulated above 0.5 in the second, below 0.5 in the third; the fourth
+    is on a wall.
+    """
     A = np.random.default_rng(1).normal(size=(6, 4))
 
     class Straight(Likelihood):
@@ -141,14 +150,19 @@ def test_a_difference_is_one_sided_where_the_other_side_is_lost():
             return made
 
     at = np.array([0.3, 0.5, 0.5, 1.0])
-    rows, J = central_differences(Straight(problem=None, valid=None, noise=None).rows, at[None], np.zeros(1, dtype=int))
+    rows, J = central_differences(
+        Straight(problem=None, valid=None, noise=None).rows, at[None], np.zeros(1, dtype=int)
+    )
     np.testing.assert_allclose(rows[0], A @ at)
     np.testing.assert_allclose(J[0].T, A, rtol=1e-6, atol=1e-9)
 
 
 def test_jacobian_agrees_with_the_printed_equations(model):
-    """Central differences of an independent solution of Eqs. (1)-(7), not of the model's own kernel."""
-    events = [replace(records((0.5,), 0.005)[0], U0=1.0)]  # the mean before a smooth fall is a little lower
+    """Central differences of an independent solution of Eqs. (1)-(7), not of the model's own
+    kernel.
+    """
+    # the mean before a smooth fall is a little lower
+    events = [replace(records((0.5,), 0.005)[0], U0=1.0)]
     problem = Problem(model, events, substeps=16)
     white = Noise.white(1.0, 1.0)
     likelihood = Likelihood.of(problem, white)
@@ -163,7 +177,9 @@ def test_jacobian_agrees_with_the_printed_equations(model):
             P, Q = study.printed(moved, t, U, 0.0, P0=events[0].P0)
             sides.append(np.concatenate((P, Q + (events[0].Q0 - Q[0]) * U ** moved[6])))
         expected = (sides[0] - sides[1]) / (2 * h) * (problem.upper - problem.lower)[j]
-        np.testing.assert_allclose(J.shared[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name)
+        np.testing.assert_allclose(
+            J.shared[:, j], expected, atol=1e-4 * np.abs(expected).max(), err_msg=name
+        )
 
 
 def test_the_t_circuits_fourth_number_is_found_to_be_one_too_many(model):
@@ -173,7 +189,8 @@ def test_the_t_circuits_fourth_number_is_found_to_be_one_too_many(model):
     assert np.count_nonzero(direction) == 4
     circuit = ("X_s", "X_m", "X_r", "R_r")
     assert {n for n, v in known.verdicts.items() if v.word == UNIDENTIFIED} == set(circuit)
-    # Along that direction X, X' and T0' do not change to first order: that is what the terminals show.
+    # Along that direction X, X' and T0' do not change to first order: that is what the terminals
+    # show.
     X_s, X_m, X_r, R_r = (known.values[known.names.index(n)] for n in circuit)
     relative = np.array([direction[known.names.index(n)] for n in circuit])
 
@@ -206,8 +223,11 @@ def test_one_shallow_dip_leaves_c_weak_and_three_dips_identify_it(model):
     """Noise of 1 % throughout; what C trades against is said."""
     truth = study.TYPICAL
     one = check_by_profiles(study.judged(Problem(model, records((0.15,), 0.01)), truth).uncertainty)
-    three = check_by_profiles(study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty)
-    assert one.verdicts["C"].word == UNIDENTIFIED  # beyond a crest at 0.75 smaller values fit as well
+    three = check_by_profiles(
+        study.judged(Problem(model, records((0.15, 0.3, 0.5), 0.01)), truth).uncertainty
+    )
+    # beyond a crest at 0.75 smaller values fit as well
+    assert one.verdicts["C"].word == UNIDENTIFIED
     assert "trades against" in one.verdicts["C"].detail
     assert "q_v (correlation -0.9" in one.verdicts["C"].detail
     assert "open upwards" in one.verdicts["C"].detail
@@ -220,7 +240,9 @@ def test_without_static_load_its_exponent_means_nothing(model):
     t, U = study.Shape(0.5).voltage()
     rng = np.random.default_rng(4)
     power = study.printed(truth, t, U, 0.35, P0=truth[4]) + study.noise(rng, len(t), 0.002, 0.0)
-    known = check_by_profiles(study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty)
+    known = check_by_profiles(
+        study.judged(Problem(model, [study.event(t, U, power)]), truth).uncertainty
+    )
     assert known.verdicts["p_v"].word == UNIDENTIFIED
     assert known.verdicts["M"].word == IDENTIFIED
 
@@ -244,7 +266,9 @@ def test_intervals_shrink_with_the_root_of_the_samples_and_grow_with_the_noise(m
 
 
 def test_another_valley_is_found_where_the_search_missed_it(model):
-    """At q_v = 2 the static load takes over U²/X' and any C fits; the judgement looks beyond that valley."""
+    """At q_v = 2 the static load takes over U²/X' and any C fits; the judgement looks beyond that
+    valley.
+    """
     events = records((0.5,), 0.002)
     stuck = study.TYPICAL.copy()
     stuck[[1, 2, 6]] = [0.35 * 0.4 / 0.85, 0.4, 2.0]
@@ -266,10 +290,16 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 
 def test_an_interval_that_reaches_past_the_bounds_says_so():
     information = SimpleNamespace(
-        names=("T_m",), values=np.array([0.5]), unseen=np.zeros((0, 1)), identifiable=np.array([True])
+        names=("T_m",),
+        values=np.array([0.5]),
+        unseen=np.zeros((0, 1)),
+        identifiable=np.array([True]),
     )
     half = np.array([0.02])
-    inside, past = (judge(information, np.array([0.0]), np.array([upper]), half, 1.96)["T_m"] for upper in (1.0, 0.51))
+    inside, past = (
+        judge(information, np.array([0.0]), np.array([upper]), half, 1.96)["T_m"]
+        for upper in (1.0, 0.51)
+    )
     assert str(inside) == IDENTIFIED
     assert str(past) == f"{IDENTIFIED}: the interval reaches past its bounds"
 
@@ -295,7 +325,9 @@ def test_each_event_is_credited_and_the_one_that_does_not_belong_is_named(model)
 
 def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monkeypatch):
     """Of P before the dips and of Q, however many events there are."""
-    known = study.judged(Problem(model, records((0.3, 0.4, 0.5, 0.6), 0.003)), study.TYPICAL).uncertainty
+    known = study.judged(
+        Problem(model, records((0.3, 0.4, 0.5, 0.6), 0.003)), study.TYPICAL
+    ).uncertainty
     assert known.exact
     only, sizes = agreement.only, []
 
@@ -310,22 +342,35 @@ def test_the_powers_of_all_events_take_one_simulation_of_differences(model, monk
 
 def test_a_jacobian_takes_as_many_simulations_for_many_events_and_no_more_fits(model, monkeypatch):
     """Time and memory grow with the records, not with their number of events, too."""
-    known = study.judged(Problem(model, records((0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6), 0.003)), study.TYPICAL)
+    known = study.judged(
+        Problem(model, records((0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6), 0.003)), study.TYPICAL
+    )
     uncertainty, rows, taken = known.uncertainty, Likelihood.rows, []
-    monkeypatch.setattr(Likelihood, "rows", lambda self, unit, *lanes: (taken.append(len(unit)), rows(self, unit))[1])
+    monkeypatch.setattr(
+        Likelihood,
+        "rows",
+        lambda self, unit, *lanes: (taken.append(len(unit)), rows(self, unit))[1],
+    )
     _, J = uncertainty.likelihood.jacobian(uncertainty.unit)
     assert taken == [2 * (uncertainty.likelihood.free + 2) + 1]
-    assert J.columns.shape == (uncertainty.likelihood.free + 2, uncertainty.likelihood.problem.drive.measured.size)
+    assert J.columns.shape == (
+        uncertainty.likelihood.free + 2,
+        uncertainty.likelihood.problem.drive.measured.size,
+    )
     only, fits = agreement.only, []
     monkeypatch.setattr(
-        agreement, "only", lambda likelihood, groups: (fits.append(groups), only(likelihood, groups))[1]
+        agreement,
+        "only",
+        lambda likelihood, groups: (fits.append(groups), only(likelihood, groups))[1],
     )
     assert agreement.find_disagreeing_events(uncertainty) == ([], [])
     assert [len(groups) for groups in fits] == [1 + 2 * agreement.SUSPECTS]
 
 
 def test_the_events_that_are_fitted_by_themselves_are_those_that_disagree_most(model, monkeypatch):
-    """Among twice as many as are fitted, what is linear finds the same as a fit without and of each."""
+    """Among twice as many as are fitted, what is linear finds the same as a fit without and of
+    each.
+    """
     changed = study.TYPICAL.copy()
     changed[3] *= 1.15
     depths = (0.3, 0.35, 0.45, 0.5, 0.55, 0.6, 0.65)
@@ -346,7 +391,9 @@ def test_the_gain_of_an_event_is_that_of_all_rows_against_those_without_its_own(
 
     def errors(rows):
         own, nuisances = J[rows][:, : likelihood.free], J[rows][:, likelihood.free :]
-        information = Information.of(known.names, known.values, known.upper - known.lower, own, nuisances)
+        information = Information.of(
+            known.names, known.values, known.upper - known.lower, own, nuisances
+        )
         return information.standard_errors
 
     whole = errors(np.arange(len(J)))
@@ -361,7 +408,10 @@ def test_the_normal_equations_of_the_likelihood_are_those_of_every_column_by_its
     likelihood = Likelihood.of(Problem(model, records((0.3, 0.5), 0.003)))
     unit, lanes = likelihood.to_unit(study.TYPICAL), np.zeros(1, dtype=int)
     base = likelihood.rows(unit)
-    alone, together = (normal(likelihood.rows, unit, base, lanes, apart) for apart in (NOT_SEPARABLE, likelihood.apart))
+    alone, together = (
+        normal(likelihood.rows, unit, base, lanes, apart)
+        for apart in (NOT_SEPARABLE, likelihood.apart)
+    )
     for one, other in (alone[0], together[0]), (dense_normal(alone[1]), dense_normal(together[1])):
         assert other == pytest.approx(one, rel=1e-6, abs=1e-6 * np.abs(one).max())
     assert (dense_normal(together[1]) == np.swapaxes(dense_normal(together[1]), 1, 2)).all()
@@ -376,7 +426,9 @@ def test_a_fit_at_a_bound_says_so(model):
 
 
 def test_what_a_requirement_of_the_model_holds_is_not_called_without_effect():
-    """All of P_s of constant impedance: a_I has no room below, and above it a share of constant power is negative."""
+    """All of P_s of constant impedance: a_I has no room below, and above it a share of constant
+    power is negative.
+    """
     load = tractexp.compose({"motor": "electromechanical", "static": "zip"}).model
     problem = Problem(load, records((0.5,), 0.002))
     values = np.array([{"a_Z": 1.0, "a_I": 0.0}.get(p.name, p.default) for p in load.parameters])
@@ -388,7 +440,9 @@ def test_what_a_requirement_of_the_model_holds_is_not_called_without_effect():
     )
     assert not any("requirement" in str(v) for name, v in known.verdicts.items() if name != "a_I")
     sentences = advise(known, SimpleNamespace(grade=None))
-    assert any(sentence.startswith("fix a_I by model.fixed: a requirement") for sentence in sentences)
+    assert any(
+        sentence.startswith("fix a_I by model.fixed: a requirement") for sentence in sentences
+    )
     assert not any("does not change with it" in sentence for sentence in sentences)
 
 
@@ -397,10 +451,18 @@ def test_where_every_depth_would_do_any_dip_is_advised(monkeypatch):
     known = SimpleNamespace(names=("M",), lower=[0.0], upper=[1.0], values=[0.5])
     monkeypatch.setattr(advice, "_goal", lambda *_: (0.1, []))
     told = [
-        advice._further(known, 0, [SimpleNamespace(half=[h], shape=SimpleNamespace(depth=d)) for h, d in plan], "more")
+        advice._further(
+            known,
+            0,
+            [SimpleNamespace(half=[h], shape=SimpleNamespace(depth=d)) for h, d in plan],
+            "more",
+        )
         for plan in ([(0.05, 0.2), (0.05, 0.4)], [(0.5, 0.2), (0.05, 0.4)])
     ]
-    assert [line.partition(" more")[0] for line in told] == ["for M: any further dip", "for M: a further dip of 40 %"]
+    assert [line.partition(" more")[0] for line in told] == [
+        "for M: any further dip",
+        "for M: a further dip of 40 %",
+    ]
 
 
 def test_gaps_cost_precision_and_nothing_else(model):
@@ -408,9 +470,12 @@ def test_gaps_cost_precision_and_nothing_else(model):
     P = event.record.P.copy()
     P[300:600:3] = np.nan
     holed = replace(event, record=replace(event.record, P=P))
-    whole, gaps = (study.judged(Problem(model, [e]), study.TYPICAL).uncertainty for e in (event, holed))
+    whole, gaps = (
+        study.judged(Problem(model, [e]), study.TYPICAL).uncertainty for e in (event, holed)
+    )
     assert gaps.likelihood.samples == whole.likelihood.samples - 100
-    assert not any(row["wanders"] for row in (*whole.noise, *gaps.noise))  # or the two would stand on other noise
+    # or the two would stand on other noise
+    assert not any(row["wanders"] for row in (*whole.noise, *gaps.noise))
     off = np.abs(gaps.values - study.TYPICAL) / gaps.information.standard_errors
     assert off.max() < 4
     assert (gaps.half >= 0.95 * whole.half).all()

@@ -1,4 +1,6 @@
-"""Effects in waveforms: which make sense, that they are nested in the base model, and what circuits say of each."""
+"""Effects in waveforms: which make sense, that they are nested in the base model, and what circuits
+say of each.
+"""
 
 import dataclasses
 import functools
@@ -17,13 +19,36 @@ from tractexp.testing import drives
 OMEGA_N, P0, Q0 = 100 * np.pi, drives.P0, drives.Q0
 OMEGA = OMEGA_N - 1.5  # of the frame of the drives
 NAMES = sorted(discover()["effect"])
-PHASORS_ONLY = {"frequency_dependence", "measurement_window", "negative_sequence_braking", "transformer_inrush",
-                 "polynomial_static_load", "rotor_flux", "second_cage", "stator_transients"}  # fmt: skip
-WAVES_ONLY = {"zero_sequence_path", "transformer_saturation", "negative_sequence_path", "fault_resistance",
-              "stuck_pole", "current_transformer_saturation", "transformer_error", "harmonics_source",
-              "resonant_branch"}  # fmt: skip
-STACK = ("feeder_impedance", "shunt_capacitor", "second_motor_group", "undervoltage_trip", "transformer_saturation",
-         "current_transformer_saturation", "harmonics_source")  # fmt: skip
+PHASORS_ONLY = {
+    "frequency_dependence",
+    "measurement_window",
+    "negative_sequence_braking",
+    "transformer_inrush",
+    "polynomial_static_load",
+    "rotor_flux",
+    "second_cage",
+    "stator_transients",
+}
+WAVES_ONLY = {
+    "zero_sequence_path",
+    "transformer_saturation",
+    "negative_sequence_path",
+    "fault_resistance",
+    "stuck_pole",
+    "current_transformer_saturation",
+    "transformer_error",
+    "harmonics_source",
+    "resonant_branch",
+}
+STACK = (
+    "feeder_impedance",
+    "shunt_capacitor",
+    "second_motor_group",
+    "undervoltage_trip",
+    "transformer_saturation",
+    "current_transformer_saturation",
+    "harmonics_source",
+)
 DIP = drives.wave_dip(0.5)
 DIPS = Drive.of([DIP])
 
@@ -39,21 +64,27 @@ def model(*names, motor="none", static="branch"):
 
 
 def run(*names, motor="none", substeps=16, drive=DIPS, **chosen):
-    """The current's space vector in its frame and the zero sequence, (N,) each, at defaults but for what is chosen."""
+    """The current's space vector in its frame and the zero sequence, (N,) each, at defaults but for
+    what is chosen.
+    """
     of = model(*names, motor=motor)
     response = of.simulate(drive, [chosen.pop(p.name, p.default) for p in of.parameters], substeps)
     assert not chosen
     assert (response.miss == 0).all()
     rows = dict(zip(INPUTS, drive.inputs, strict=True))
-    turned = (response.outputs[0, 0] + 1j * response.outputs[1, 0]) * (rows["turn_re"] - 1j * rows["turn_im"])
+    turned = (response.outputs[0, 0] + 1j * response.outputs[1, 0]) * (
+        rows["turn_re"] - 1j * rows["turn_im"]
+    )
     return turned, response.outputs[2, 0]
 
 
 def smooth(*names):
     """A row of the drive between samples, or two as real and imaginary part, and its slope."""
     rows = dict(zip(INPUTS, DIPS.inputs, strict=True))
-    value, rate = (sum(unit * rows[n] for unit, n in zip((1, 1j), which, strict=False)) for which in
-                   (names, [SMOOTH[n] for n in names]))  # fmt: skip
+    value, rate = (
+        sum(unit * rows[n] for unit, n in zip((1, 1j), which, strict=False))
+        for which in (names, [SMOOTH[n] for n in names])
+    )
     curve = CubicHermiteSpline(rows["t"], value, rate)
     return curve, curve.derivative()
 
@@ -62,7 +93,9 @@ def solved(slope, start):
     """States (k, N), complex."""
     t = DIPS.inputs[INPUTS.index("t")]
     start = np.asarray(start, dtype=complex)
-    return solve_ivp(slope, (0, t[-1]), start, "DOP853", t, rtol=1e-9, atol=1e-11, max_step=DIP.step).y
+    return solve_ivp(
+        slope, (0, t[-1]), start, "DOP853", t, rtol=1e-9, atol=1e-11, max_step=DIP.step
+    ).y
 
 
 # which there are
@@ -89,7 +122,9 @@ def test_several_at_their_nulls_are_the_base_model():
 
 
 def branch_of(P, Q, v=1.0, r=0.3):
-    """Conductance, susceptance of the branch's inductance and its resistance over reactance, that draw P + jQ at v."""
+    """Conductance, susceptance of the branch's inductance and its resistance over reactance, that
+    draw P + jQ at v.
+    """
     speed = OMEGA / OMEGA_N
     B = Q * (speed**2 + r**2) / speed / abs(v) ** 2
     return (P - Q * r / speed) / abs(v) ** 2, B, r
@@ -99,14 +134,19 @@ def test_a_capacitor_draws_what_the_slope_of_the_voltage_says():
     b = 0.4
     v, rate = smooth("v_d", "v_q")
     G, B, r = branch_of(P0, Q0 + b * OMEGA / OMEGA_N)
-    (psi,) = solved(lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y, [1 / (r + 1j * OMEGA / OMEGA_N)])
+    (psi,) = solved(
+        lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y,
+        [1 / (r + 1j * OMEGA / OMEGA_N)],
+    )
     t = DIPS.inputs[INPUTS.index("t")]
     known = G * v(t) + B * psi + b * (rate(t) / OMEGA_N + 1j * OMEGA / OMEGA_N * v(t))
     assert np.abs(run("shunt_capacitor", capacitor=b)[0] - known).max() < 1e-6
 
 
 def test_a_feeder_is_its_circuit():
-    """Its reactance with what lies beside it, before conductance and branch: states are the two inductors' currents."""
+    """Its reactance with what lies beside it, before conductance and branch: states are the two
+    inductors' currents.
+    """
     R, X, T = 0.02, 0.1, 5e-5
     R_p = X / OMEGA_N / T
     i_0 = P0 - 1j * Q0
@@ -120,7 +160,10 @@ def test_a_feeder_is_its_circuit():
     def slope(t, y):
         node = at(t, y)
         drawn = G * node + B * y[1]
-        return [(drawn - y[0]) / T - 1j * OMEGA * y[0], OMEGA_N * node - (r * OMEGA_N + 1j * OMEGA) * y[1]]
+        return [
+            (drawn - y[0]) / T - 1j * OMEGA * y[0],
+            OMEGA_N * node - (r * OMEGA_N + 1j * OMEGA) * y[1],
+        ]
 
     y = solved(slope, [inductor_0, v_0 / (r + 1j * OMEGA / OMEGA_N)])
     t = DIPS.inputs[INPUTS.index("t")]
@@ -131,7 +174,9 @@ def test_a_feeder_is_its_circuit():
 
 
 def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
-    """b = 1 behind X = 0.12, beside a branch of Q0 + b: the step rings at sqrt(1/X + Q0 + b) times nominal."""
+    """b = 1 behind X = 0.12, beside a branch of Q0 + b: the step rings at sqrt(1/X + Q0 + b) times
+    nominal.
+    """
     n = 3200
     still = drives.wave_flat(1.0, rate=12800.0, samples=n)
     step = np.where(np.arange(n) < 600, 1.0, 0.9)
@@ -139,9 +184,9 @@ def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
         array[:] = values
     drive = Drive.of([still])
     seen, _ = run("feeder_impedance", "shunt_capacitor", X_f=0.12, capacitor=1.0, drive=drive)
-    ringing = (seen * still.turn)[620:1100] - (run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn)[
-        620:1100
-    ]
+    ringing = (seen * still.turn)[620:1100] - (
+        run("shunt_capacitor", capacitor=1.0, drive=drive)[0] * still.turn
+    )[620:1100]
     spectrum = np.abs(np.fft.fft(ringing * np.hanning(480), 1 << 16))
     f = np.fft.fftfreq(1 << 16, 1 / 12800.0)
     high = np.abs(f) > 90
@@ -151,12 +196,16 @@ def test_a_feeder_and_a_capacitor_ring_at_their_resonance():
 
 def test_a_load_behind_a_feeder_draws_before_the_dip_what_was_recorded():
     for motor in ("stator_flux", "electromechanical"):
-        seen, _ = run("feeder_impedance", "shunt_capacitor", motor=motor, R_f=0.02, X_f=0.1, capacitor=0.3)
+        seen, _ = run(
+            "feeder_impedance", "shunt_capacitor", motor=motor, R_f=0.02, X_f=0.1, capacitor=0.3
+        )
         assert np.abs(seen[:380] - (P0 - 1j * Q0)).max() < 1e-6
 
 
 def test_a_resonant_branch_is_its_resistance_inductance_and_capacitor():
-    """In the stationary frame, where it is not declared: 1/b = X_L (n² - 1), R = 2 X_L/(omega_n T)."""
+    """In the stationary frame, where it is not declared: 1/b = X_L (n² - 1), R = 2
+    X_L/(omega_n T).
+    """
     b, f, T = 0.3, 190.0, 0.02
     square = (f / 50) ** 2
     X, speed = 1 / (b * (square - 1)), OMEGA / OMEGA_N
@@ -173,7 +222,10 @@ def test_a_resonant_branch_is_its_resistance_inductance_and_capacitor():
     t = DIPS.inputs[INPUTS.index("t")]
     drawn = admittance.conjugate()
     G, B, r = branch_of(P0 - drawn.real, Q0 - drawn.imag)
-    (psi,) = solved(lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y, [1 / (r + 1j * OMEGA / OMEGA_N)])
+    (psi,) = solved(
+        lambda t, y: OMEGA_N * v(t) - (r * OMEGA_N + 1j * OMEGA) * y,
+        [1 / (r + 1j * OMEGA / OMEGA_N)],
+    )
     known = G * v(t) + B * psi + i / angle(t)
     chosen = {"resonant_susceptance": b, "resonance_frequency": f, "ringing_time": T}
     assert np.abs(run("resonant_branch", substeps=32, **chosen)[0] - known).max() < 2e-6
@@ -195,7 +247,12 @@ def test_the_zero_sequence_follows_its_branch():
     b, r = 20.0, 0.03
     v, _ = smooth("v_zero")
     (psi,) = solved(lambda t, y: OMEGA_N * (v(t) - r * y), [1e-9])
-    assert np.abs(run("zero_sequence_path", zero_susceptance=b, zero_resistance=r)[1] - b * psi.real).max() < 1e-6
+    assert (
+        np.abs(
+            run("zero_sequence_path", zero_susceptance=b, zero_resistance=r)[1] - b * psi.real
+        ).max()
+        < 1e-6
+    )
     assert b * psi.real.max() > 0.2
 
 
@@ -244,7 +301,9 @@ def test_a_core_that_a_dip_leaves_offset_draws_peaks_of_one_sign_until_the_offse
     chosen = {"saturated_admittance": y, "flux_knee": knee, "flux_decay": T}
     extra = run("transformer_saturation", **chosen)[0] - run()[0]
     v, _ = smooth("v_d", "v_q")
-    (psi,) = solved(lambda t, x: OMEGA_N * v(t) - (1 / T + 1j * OMEGA) * x, [OMEGA_N / (1 / T + 1j * OMEGA)])
+    (psi,) = solved(
+        lambda t, x: OMEGA_N * v(t) - (1 / T + 1j * OMEGA) * x, [OMEGA_N / (1 / T + 1j * OMEGA)]
+    )
     limit = knee * abs(psi[0])
     flux = np.array([of_phase(psi, k) for k in range(3)])
     drawn = y * np.sign(flux) * np.maximum(0, abs(flux) - limit)
@@ -261,7 +320,9 @@ def test_a_saturated_current_transformer_loses_what_its_core_takes():
     seen, zero = run(*names, zero_susceptance=10.0, **chosen)
     whole, whole_zero = run("zero_sequence_path", zero_susceptance=10.0)
     size = abs(P0 - 1j * Q0)
-    flux = np.array([0 - 1j * (P0 - 1j * Q0) * OMEGA_N / OMEGA * DIP.turn[0] * TURN ** (-k) for k in range(3)]).real
+    flux = np.array(
+        [0 - 1j * (P0 - 1j * Q0) * OMEGA_N / OMEGA * DIP.turn[0] * TURN ** (-k) for k in range(3)]
+    ).real
     phases = np.array([of_phase(seen, k) + zero for k in range(3)])
     true = np.array([of_phase(whole, k) + whole_zero for k in range(3)])
     lost = true - phases
@@ -272,8 +333,12 @@ def test_a_saturated_current_transformer_loses_what_its_core_takes():
         if i > 381:
             assert pytest.approx(lost[:, i], abs=0.03) == now
         if i == 380:
-            flux = np.array([of_phase(np.full(896, -1j * (P0 - 1j * Q0) * OMEGA_N / (OMEGA - 10j)), k)[i]
-                             for k in range(3)])  # fmt: skip
+            flux = np.array(
+                [
+                    of_phase(np.full(896, -1j * (P0 - 1j * Q0) * OMEGA_N / (OMEGA - 10j)), k)[i]
+                    for k in range(3)
+                ]
+            )
         mean = (phases[:, i] + phases[:, i + 1]) / 2
         flux = (flux * (1 - 0.5 / 3200 / 0.1) + OMEGA_N * mean / 3200) / (1 + 0.5 / 3200 / 0.1)
 
@@ -282,7 +347,9 @@ def test_a_power_that_is_held_is_the_conjugate_path_to_first_order():
     """i = conj(S/v) less its value before is -conj(S) conj(dv) for a small dv that moves slowly."""
     drive = Drive.of([drives.wave_dip(0.01, edge=0.04)])
     chosen = {"conjugate_conductance": -0.5, "conjugate_susceptance": 0.2, "conjugate_lag": 3e-4}
-    extra = run("negative_sequence_path", drive=drive, substeps=16, **chosen)[0] - run(drive=drive)[0]
+    extra = (
+        run("negative_sequence_path", drive=drive, substeps=16, **chosen)[0] - run(drive=drive)[0]
+    )
     v = drive.inputs[INPUTS.index("v_d")] + 1j * drive.inputs[INPUTS.index("v_q")]
     held = np.conj((0.5 + 0.2j) / v) - np.conj(0.5 + 0.2j)
     late = np.roll(held, 1)  # 0.3 ms
@@ -291,7 +358,9 @@ def test_a_power_that_is_held_is_the_conjugate_path_to_first_order():
 
 def test_a_fault_inside_the_load_lasts_as_long_as_the_voltage_is_off():
     g = 0.7
-    extra, zero = (a - b for a, b in zip(run("fault_resistance", fault_conductance=g), run(), strict=True))
+    extra, zero = (
+        a - b for a, b in zip(run("fault_resistance", fault_conductance=g), run(), strict=True)
+    )
     inside, outside = slice(392, 540), np.r_[0:383, 575:896]
     assert pytest.approx(g * DIP.v[inside], abs=1e-9) == extra[inside]
     assert pytest.approx(g * DIP.v_zero[inside], abs=1e-9) == zero[inside]

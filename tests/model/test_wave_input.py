@@ -12,7 +12,12 @@ from tractexp.record import in_waves
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.measure import FeederWaves
 
-QUICK = {"domain": "waves", "optimizer": "multistart_least_squares", "budget": 60, "check_intervals": False}
+QUICK = {
+    "domain": "waves",
+    "optimizer": "multistart_least_squares",
+    "budget": 60,
+    "check_intervals": False,
+}
 
 
 def table(path, columns, rate=RATE):
@@ -48,18 +53,26 @@ def test_a_record_of_phasors_has_no_waveforms():
 
 def test_fewer_than_sixteen_samples_in_a_cycle_are_too_few(tmp_path):
     path = table(tmp_path / "slow.csv", columns(sampled(600.0)), rate=600.0)
-    refused(path, "600 samples per second are 12 per cycle, and domain=waves needs 16; take domain=phasors")
+    refused(
+        path,
+        "600 samples per second are 12 per cycle, and domain=waves needs 16; take domain=phasors",
+    )
 
 
 def test_less_than_two_cycles_before_the_dip_are_too_few(tmp_path):
     path = table(tmp_path / "early.csv", columns(constant(start=0.05, end=0.25)))
-    refused(path, r"ms of waveforms before the dip .* needs 2 cycles \(40 ms\).*a record that starts earlier")
+    refused(
+        path,
+        r"ms of waveforms before the dip .* needs 2 cycles \(40 ms\).*a record that starts earlier",
+    )
 
 
 def test_a_missing_current_is_reckoned_from_the_others_where_the_connection_says_so(tmp_path):
     rows = constant()
     whole = tractexp.read(table(tmp_path / "whole.csv", columns(rows)))[0]
-    two = table(tmp_path / "two.csv", columns(rows[[0, 1, 2, 3, 5]], ("ua", "ub", "uc", "ia", "ic")))
+    two = table(
+        tmp_path / "two.csv", columns(rows[[0, 1, 2, 3, 5]], ("ua", "ub", "uc", "ia", "ic"))
+    )
     (dip,) = tractexp.read(two, voltages=["ua", "ub", "uc"], currents=["ia", "ic"])
     assert any("minus the sum of the others" in note for note in dip.record.notes)
     np.testing.assert_allclose(in_waves(dip).currents[:2], in_waves(whole).currents[:2], atol=1e-6)
@@ -71,13 +84,21 @@ def test_one_current_of_three_is_refused(tmp_path):
         tractexp.read(path, voltages=["ua", "ub", "uc"], currents=["ia"])
 
 
-@pytest.mark.parametrize("channels", [{}, {"voltages": ["ua", "ub", "uc"], "currents": ["ia", "ib", "ic"]}])
+@pytest.mark.parametrize(
+    "channels", [{}, {"voltages": ["ua", "ub", "uc"], "currents": ["ia", "ib", "ic"]}]
+)
 def test_voltage_and_current_of_different_rates_are_refused(tmp_path, channels):
     path = table(tmp_path / "rates.csv", columns(constant()))
     head, *rows = path.read_text().splitlines()
-    slower = [row if k % 2 == 0 else ",".join([*row.split(",")[:4], "", "", ""]) for k, row in enumerate(rows)]
+    slower = [
+        row if k % 2 == 0 else ",".join([*row.split(",")[:4], "", "", ""])
+        for k, row in enumerate(rows)
+    ]
     path.write_text("\n".join([head, *slower]))
-    told = r"column ia has a number in 10 of its first 20 rows only; voltage and current .* at the same times: keep the"
+    told = (
+        r"column ia has a number in 10 of its first 20 rows only; voltage and current .* at the"
+        r" same times: keep the"
+    )
     with pytest.raises(UserError, match=told):
         tractexp.read(path, **channels)
 
@@ -110,7 +131,10 @@ def test_a_single_phase_feeder_is_read_and_fitted(tmp_path):
     assert event.compared == (True, False, False)
     np.testing.assert_allclose(np.abs(event.v[event.steady]), event.U0, rtol=2e-3)
     fit = tractexp.identify(
-        dip, tractexp.compose(motor="none", static="branch", domain="waves"), progress=False, **QUICK
+        dip,
+        tractexp.compose(motor="none", static="branch", domain="waves"),
+        progress=False,
+        **QUICK,
     )
     assert fit.result.events[0]["epsilon_i"] < 0.12
 
@@ -121,4 +145,6 @@ def test_files_of_comtrade_keep_their_samples(tmp_path, ending):
     tractexp.convert(source, to="cff" if ending == ".cff" else "comtrade", folder=tmp_path / "out")
     (dip,) = tractexp.read(tmp_path / "out" / f"made{ending}")
     event, direct = in_waves(dip), in_waves(tractexp.read(source)[0])
-    np.testing.assert_allclose(event.currents[:2, event.lead :], direct.currents[:2, direct.lead :], atol=2e-3)
+    np.testing.assert_allclose(
+        event.currents[:2, event.lead :], direct.currents[:2, direct.lead :], atol=2e-3
+    )

@@ -1,4 +1,6 @@
-"""The equations on waveforms: against equations written out by hand, and against what phasors and physics say."""
+"""The equations on waveforms: against equations written out by hand, and against what phasors and
+physics say.
+"""
 
 import functools
 import itertools
@@ -18,10 +20,24 @@ from tractexp.plugin import discover, get
 MOTORS = ("stator_flux", "electromechanical", "double_cage", "voltage")
 STATICS = ("branch", "constant_impedance", "exponential", "zip", "constant_power", "none")
 VALUES = {
-    "T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "R_s": 0.03, "T_second": 0.01,
-    "X_second": 0.18, "p_v": 1.4, "q_v": 3.0, "a_Z": 0.4, "a_I": 0.3, "b_Z": 0.7, "b_I": 0.2, "branch_resistance": 0.3,
-    "capacitor": 0.2, "zero_conductance": 0.4,
-}  # fmt: skip
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "R_s": 0.03,
+    "T_second": 0.01,
+    "X_second": 0.18,
+    "p_v": 1.4,
+    "q_v": 3.0,
+    "a_Z": 0.4,
+    "a_I": 0.3,
+    "b_Z": 0.7,
+    "b_I": 0.2,
+    "branch_resistance": 0.3,
+    "capacitor": 0.2,
+    "zero_conductance": 0.4,
+}
 
 
 class Shunt(Effect):
@@ -54,10 +70,12 @@ def played(of, made, chosen=None, substeps=16):
 
 
 def by_hand(made, p):
-    """Currents (N,) complex and zero sequence (N,) of a machine, a branch beside a conductance, and a capacitor.
+    """Currents (N,) complex and zero sequence (N,) of a machine, a branch beside a conductance, and
+    a capacitor.
 
-    Written in the stationary frame with stator and rotor flux linkages, as textbooks do, and solved by DOP853 from the
-    phasors of the circuit before the event. Between samples the voltage is SciPy's cubic spline in the turning frame.
+    Written in the stationary frame with stator and rotor flux linkages, as textbooks do, and solved
+    by DOP853 from the phasors of the circuit before the event. Between samples the voltage is
+    SciPy's cubic spline in the turning frame.
     """
     w = OMEGA + made.omega_s0  # rad/s of the frame
     X, T0 = p["X_prime"] / (1 - p["C"]), p["T_prime"] / (1 - p["C"])
@@ -73,12 +91,16 @@ def by_hand(made, p):
         """The rotor's linkage referred to the stator (behind X'), so that i = (psi - rotor)/X'."""
         i = (psi - rotor) / p["X_prime"]
         torque = (np.conj(rotor) * i).imag
-        fluxes = OMEGA * (u - p["R_s"] * i), (-rotor + (X - p["X_prime"]) * i) / T0 + 1j * speed * rotor
+        fluxes = (
+            OMEGA * (u - p["R_s"] * i),
+            (-rotor + (X - p["X_prime"]) * i) / T0 + 1j * speed * rotor,
+        )
         return i, torque, (*fluxes, (torque - p["T_m"]) / p["M"])
 
     def before(slip):
         """Phasors of the machine at a slip [rad/s] at U0."""
-        share = (X - p["X_prime"]) / (1 + 1j * slip * T0)  # rotor linkage over current, at rest in the rotor's frame
+        # rotor linkage over current, at rest in the rotor's frame
+        share = (X - p["X_prime"]) / (1 + 1j * slip * T0)
         i = made.U0 / (p["R_s"] + 1j * w / OMEGA * (p["X_prime"] + share))
         return i, share * i
 
@@ -103,7 +125,9 @@ def by_hand(made, p):
     start = turn(t[0])
     psi0 = (p["X_prime"] * i0 + rotor0) * start
     branch0, rotor0 = made.U0 / (r + 1j * w / OMEGA) * start, rotor0 * start
-    y = np.array([psi0.real, psi0.imag, rotor0.real, rotor0.imag, w - slip, branch0.real, branch0.imag])
+    y = np.array(
+        [psi0.real, psi0.imag, rotor0.real, rotor0.imag, w - slip, branch0.real, branch0.imag]
+    )
     rows = [y]
     for first, last in itertools.pairwise(t):
         y = solve_ivp(rhs, (first, last), y, method="DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
@@ -141,7 +165,10 @@ def test_a_voltage_turned_by_an_angle_gives_currents_turned_by_it(angle):
 
 
 def test_third_order_with_a_stator_resistance_is_fifth_order_with_its_stator_flux():
-    third, fifth = model("electromechanical", "branch", "stator_resistance"), model("stator_flux", "branch")
+    third, fifth = (
+        model("electromechanical", "branch", "stator_resistance"),
+        model("stator_flux", "branch"),
+    )
     made = event(dip(0.5, jump=0.7, negative=0.25), length=0.3, f0=49.6, U0=1.02)
     assert played(third, made) == pytest.approx(played(fifth, made), abs=1e-11)
 
@@ -169,17 +196,24 @@ def test_an_offset_decays_where_the_stator_has_a_resistance():
 
 # One kernel for each motor, and each static load beside one of them
 PAIRS = (
-    ("stator_flux", "branch", "shunt"), ("electromechanical", "branch", "stator_resistance"),
-    ("double_cage", "exponential", "stator_resistance"), ("voltage", "zip"), ("stator_flux", "exponential"),
-    ("none", "constant_power"), ("none", "constant_impedance"), ("double_cage", "none"),
+    ("stator_flux", "branch", "shunt"),
+    ("electromechanical", "branch", "stator_resistance"),
+    ("double_cage", "exponential", "stator_resistance"),
+    ("voltage", "zip"),
+    ("stator_flux", "exponential"),
+    ("none", "constant_power"),
+    ("none", "constant_impedance"),
+    ("double_cage", "none"),
     ("double_cage", "none", "stator_resistance"),
-)  # fmt: skip
+)
 
 
 @pytest.mark.parametrize("names", PAIRS, ids=" ".join)
 def test_before_the_event_nothing_moves(names):
     of, U0 = model(*names), 0.97
-    made = event(lambda t: U0 * np.exp(2j * np.pi * 49.6 * t), f0=49.6, U0=U0, length=0.3, rate=2000.0)
+    made = event(
+        lambda t: U0 * np.exp(2j * np.pi * 49.6 * t), f0=49.6, U0=U0, length=0.3, rate=2000.0
+    )
     current = vector(of.simulate(Drive.of([made]), values(of), 8)) / made.turn
     assert np.abs(current - current[0]).max() < 1e-9
     if names[1] != "none":  # what is recorded before is drawn before
@@ -190,8 +224,11 @@ def test_the_pairs_are_all_there_is():
     refused = {"mechanical", "exponential_frequency"}
     assert {p[0] for p in PAIRS} == set(MOTORS) | {"none"}
     assert set(discover()["model/motor"]) == set(MOTORS) | {
-        "none", "mechanical", "motor_groups", "line_side_converter",
-    }  # fmt: skip
+        "none",
+        "mechanical",
+        "motor_groups",
+        "line_side_converter",
+    }
     assert {p[1] for p in PAIRS} == set(STATICS)
     assert set(discover()["model/static"]) == set(STATICS) | refused - {"mechanical"}
 
@@ -199,8 +236,16 @@ def test_the_pairs_are_all_there_is():
 @pytest.mark.parametrize(
     ("motor", "static", "sentence"),
     [
-        ("mechanical", "branch", "the motor 'mechanical' does not go with domain=waves: its fluxes are in equilibrium"),
-        ("none", "exponential_frequency", "the static load 'exponential_frequency' does not go with domain=waves"),
+        (
+            "mechanical",
+            "branch",
+            "the motor 'mechanical' does not go with domain=waves: its fluxes are in equilibrium",
+        ),
+        (
+            "none",
+            "exponential_frequency",
+            "the static load 'exponential_frequency' does not go with domain=waves",
+        ),
     ],
 )
 def test_what_makes_no_sense_of_waveforms_is_refused_in_a_sentence(motor, static, sentence):
@@ -216,8 +261,14 @@ def test_laws_of_a_constant_impedance_are_one_circuit():
     assert fluxes == pytest.approx(plain, abs=1e-12)
     branch = model("stator_flux", "branch")
     share = played(branch, made, values(branch, branch_resistance=0.05))
-    assert share == pytest.approx(played(model("stator_flux", "exponential"), made, values(
-        model("stator_flux", "exponential"), p_v=2.0, q_v=2.0)), abs=1e-12)  # fmt: skip
+    assert share == pytest.approx(
+        played(
+            model("stator_flux", "exponential"),
+            made,
+            values(model("stator_flux", "exponential"), p_v=2.0, q_v=2.0),
+        ),
+        abs=1e-12,
+    )
 
 
 def test_a_constant_power_is_drawn_once_half_a_cycle_has_passed():
@@ -226,7 +277,8 @@ def test_a_constant_power_is_drawn_once_half_a_cycle_has_passed():
     power = made.v * np.conj(vector(of.simulate(Drive.of([made]), values(of), 4)) / made.turn)
     t = times(made)
     assert np.abs(power[t > 0.0121] - 1).max() < 1e-9
-    assert power.real[np.argmin(np.abs(t - 0.002))] == pytest.approx(0.36, abs=0.06)  # its admittance is as before
+    # its admittance is as before
+    assert power.real[np.argmin(np.abs(t - 0.002))] == pytest.approx(0.36, abs=0.06)
 
 
 def test_a_dead_short_leaves_numbers():
@@ -236,18 +288,24 @@ def test_a_dead_short_leaves_numbers():
         assert np.isfinite(played(of, made, substeps=4)).all()
 
 
-@pytest.mark.parametrize("names", [("stator_flux", "branch"), ("double_cage", "branch", "stator_resistance")])
+@pytest.mark.parametrize(
+    "names", [("stator_flux", "branch"), ("double_cage", "branch", "stator_resistance")]
+)
 def test_input_power_is_losses_and_shaft_power_and_what_is_stored(names):
     """At any state and voltage: v.i = T_e (1 + omega/omega_n) + losses + rate of what is stored."""
     of = model(*names)
     eq, rows = of.equations, of.equations.real_states()
     rng, states = np.random.default_rng(3), [s.name for s, _, _ in rows]
     p = dict(zip(of.names, values(of), strict=True))
-    before = dict(U0=1.0, U=0.8, omega_s0=0.0, omega_s=0.0, omega_n=OMEGA, P0=1.0, Q0=0.6, step=1e-3)
+    before = dict(
+        U0=1.0, U=0.8, omega_s0=0.0, omega_s=0.0, omega_n=OMEGA, P0=1.0, Q0=0.6, step=1e-3
+    )
     at_rest = of.at_rest(values(of), Drive.of([event(dip())]))
     x = dict(zip(states, rng.normal(0, 0.5, len(states)), strict=True))
     v = complex(*rng.normal(0, 1, 2))
-    known = p | before | at_rest | x | {"v_d": v.real, "v_q": v.imag, "turn_re": 1.0, "turn_im": 0.0}
+    known = (
+        p | before | at_rest | x | {"v_d": v.real, "v_q": v.imag, "turn_re": 1.0, "turn_im": 0.0}
+    )
     compute = lambda e: complex(e.subs({s: known[s.name] for s in e.free_symbols}))  # noqa: E731
     slope = {s.name: compute(d).real for s, d, _ in rows}
     vec = lambda of, name: of[f"{name}_re"] + 1j * of[f"{name}_im"]  # noqa: E731
@@ -278,14 +336,29 @@ def test_input_power_is_losses_and_shaft_power_and_what_is_stored(names):
 
 
 def test_a_capacitor_draws_its_susceptance_times_the_slope_of_the_voltage():
-    """In the stationary frame b (dv/dt)/omega_n; the frame turns at 52 Hz, and where U is 0 the load draws nothing."""
+    """In the stationary frame b (dv/dt)/omega_n; the frame turns at 52 Hz, and where U is 0 the
+    load draws nothing.
+    """
     eq, turning = model("none", "constant_impedance", "shunt").equations, 2 * np.pi * 2.0
     v, slope, turn = 0.7 + 0.3j, 40.0 - 90.0j, np.exp(0.6j)
     known = {
-        "capacitor": 0.2, "U": 0.0, "U0": 1.0, "P0": 1.0, "Q0": 0.6, "omega_s": turning, "omega_s0": 0.0,
-        "omega_n": OMEGA, "v_d": v.real, "v_q": v.imag, "v_d_rate": slope.real, "v_q_rate": slope.imag,
-        "branch_flux_re": 0.4, "branch_flux_im": 0.1, "turn_re": turn.real, "turn_im": turn.imag,
-    }  # fmt: skip
+        "capacitor": 0.2,
+        "U": 0.0,
+        "U0": 1.0,
+        "P0": 1.0,
+        "Q0": 0.6,
+        "omega_s": turning,
+        "omega_s0": 0.0,
+        "omega_n": OMEGA,
+        "v_d": v.real,
+        "v_q": v.imag,
+        "v_d_rate": slope.real,
+        "v_q_rate": slope.imag,
+        "branch_flux_re": 0.4,
+        "branch_flux_im": 0.1,
+        "turn_re": turn.real,
+        "turn_im": turn.imag,
+    }
     outputs = [eq.real(e) for e in eq.outputs().values()]
     alpha, beta = (float(e.subs({s: known[s.name] for s in e.free_symbols})) for e in outputs[:2])
     stationary = (slope + 1j * (OMEGA + turning) * v) * turn  # d(v turn)/dt
@@ -293,7 +366,9 @@ def test_a_capacitor_draws_its_susceptance_times_the_slope_of_the_voltage():
 
 
 def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
-    """The error of P and Q against the third order with its resistance falls with the slope of the voltage."""
+    """The error of P and Q against the third order with its resistance falls with the slope of the
+    voltage.
+    """
     waves = model("stator_flux", "exponential")
     phasors = model("electromechanical", "exponential", "stator_resistance", domain="phasors")
     gaps = []
@@ -302,7 +377,9 @@ def test_a_slow_symmetric_dip_draws_the_power_that_phasors_say():
         current = vector(waves.simulate(Drive.of([made]), values(waves), 4)) / made.turn
         S = made.v * np.conj(current)
         n = len(made.v)
-        still = Excitation(made.step, made.v.real.copy(), np.ones(n), np.full(n, 0.6), 1.0, 1.0, 0.6)
+        still = Excitation(
+            made.step, made.v.real.copy(), np.ones(n), np.full(n, 0.6), 1.0, 1.0, 0.6
+        )
         plain = phasors.simulate(Drive.of([still]), values(phasors), 4)
         gaps.append(np.abs(S - plain.P[0] - 1j * plain.Q[0]).max())
     assert gaps[0] > 5e-3

@@ -1,4 +1,6 @@
-"""The generator of hidden effects judged: the base against the printed equations, each effect against its physics."""
+"""The generator of hidden effects judged: the base against the printed equations, each effect
+against its physics.
+"""
 
 import ast
 import json
@@ -65,14 +67,17 @@ LOAD = Load(
 DIP = Dip(depth=0.4, start=0.5, duration=0.25, sag=0.2, before=1.02, negative=0.1, swing=0.8)
 LONG = Dip(depth=0.25, start=0.4, duration=0.9, fall=0.02, rise=0.03)
 CLEAN = Noise(level=0.0)
-SOLVED = 3e-7  # what the solver's tolerance, 1e-9 of a slip of 1e-2 in each of some hundred steps, leaves in P
+# what the solver's tolerance, 1e-9 of a slip of 1e-2 in each of some hundred steps, leaves in P
+SOLVED = 3e-7
 
 
 def case(name: str | None = None, size: float = 1.0, dip: Dip = DIP, **settings) -> Case:
     return Case(name, size, (dip,), CLEAN, load=LOAD, spread=0.0, **settings)
 
 
-def clean(name: str | None = None, size: float = 1.0, dip: Dip = DIP, **settings) -> dict[str, np.ndarray]:
+def clean(
+    name: str | None = None, size: float = 1.0, dip: Dip = DIP, **settings
+) -> dict[str, np.ndarray]:
     return make(case(name, size, dip, **settings), 1)[0]
 
 
@@ -97,7 +102,17 @@ def test_the_package_imports_nothing_of_the_product():
                 names.update(alias.name.partition(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom):
                 names.add((node.module or "").partition(".")[0])
-    standard = {"bisect", "collections", "dataclasses", "functools", "itertools", "json", "math", "pathlib", "typing"}
+    standard = {
+        "bisect",
+        "collections",
+        "dataclasses",
+        "functools",
+        "itertools",
+        "json",
+        "math",
+        "pathlib",
+        "typing",
+    }
     assert names == {"numpy", "scipy", "hidden_effects", "independent", "zlib"} | standard
 
 
@@ -118,7 +133,9 @@ def printed_equations(load: Load, dip: Dip, t: np.ndarray) -> np.ndarray:
     delta = 0.5 * np.arcsin(-2 * p["T_m"] * p["X_prime"] / (p["C"] * U0**2))
     E = p["C"] * U0 * np.cos(delta)
     begin = [E, delta, OMEGA + p["C"] * U0 * np.sin(delta) / (p["T_prime"] * E)]
-    E, delta, _ = solve_ivp(equation_1, (0.0, t[-1]), begin, "DOP853", t, rtol=1e-10, atol=1e-12, max_step=0.004).y
+    E, delta, _ = solve_ivp(
+        equation_1, (0.0, t[-1]), begin, "DOP853", t, rtol=1e-10, atol=1e-12, max_step=0.004
+    ).y
     U = dip.magnitude(t)
     static_power = static.P * (U / U0) ** static.p_v + 1j * static.Q * (U / U0) ** static.q_v
     return static_power + (-U * E * np.sin(delta) + 1j * U * (U - E * np.cos(delta))) / p["X_prime"]
@@ -148,7 +165,9 @@ def test_the_scalar_supply_is_the_array_one():
 def test_an_effect_of_size_zero_is_no_effect(name):
     base, record = clean(), clean(name, 0.0)
     for channel in ("U", "P", "Q"):
-        np.testing.assert_allclose(record[channel], base[channel], rtol=0, atol=SOLVED, err_msg=channel)
+        np.testing.assert_allclose(
+            record[channel], base[channel], rtol=0, atol=SOLVED, err_msg=channel
+        )
 
 
 @pytest.mark.parametrize("name", EFFECTS)
@@ -175,7 +194,9 @@ def test_stator_resistance_takes_its_copper_loss_from_the_static_load():
     _, states = motor.settled(DIP.before + 0j)
     current = motor.flow(steady(DIP.before), DIP.before + 0j, states)[0]
     P0 = LOAD.torque * LOAD.rating + LOAD.static.P
-    assert static.S.real == pytest.approx(P0 - LOAD.torque * LOAD.rating - 0.04 * abs(current) ** 2, rel=1e-10)
+    assert static.S.real == pytest.approx(
+        P0 - LOAD.torque * LOAD.rating - 0.04 * abs(current) ** 2, rel=1e-10
+    )
 
 
 def test_a_fan_needs_the_square_of_the_speed():
@@ -183,7 +204,9 @@ def test_a_fan_needs_the_square_of_the_speed():
     slower = [states[0], 0.9 * states[1]]
     constant = replace(motor, fan=0.0)
     swing = [m.flow(steady(), 1 + 0j, slower)[1][1] for m in (motor, constant)]
-    assert swing[0] - swing[1] == pytest.approx(0.7 * 0.5 * (1 - 0.9**2) / (2 * LOAD.machine.H), rel=1e-12)
+    assert swing[0] - swing[1] == pytest.approx(
+        0.7 * 0.5 * (1 - 0.9**2) / (2 * LOAD.machine.H), rel=1e-12
+    )
 
 
 def test_the_saturated_air_gap_obeys_its_magnetizing_curve():
@@ -198,21 +221,30 @@ def test_the_saturated_air_gap_obeys_its_magnetizing_curve():
 
 def test_a_second_group_like_the_first_is_no_second_group():
     made = scene(case("second_motor_group"), 1)
-    twin = replace(made, effects=((("second_motor_group"), CATALOG["second_motor_group"](0.4, ratio=1.0)),))
+    twin = replace(
+        made, effects=((("second_motor_group"), CATALOG["second_motor_group"](0.4, ratio=1.0)),)
+    )
     np.testing.assert_allclose(twin.records()[0]["P"], clean()["P"], atol=1e-7)
 
 
 def test_the_static_load_goes_with_powers_of_the_frequency():
     base, record = clean(), clean("frequency_dependence", 1.0)
     u, f = base["U"] / DIP.before, base["f"] / 50
-    np.testing.assert_allclose(record["P"] - base["P"], LOAD.static.P * u**1.3 * (f**1.5 - 1), atol=1e-8)
-    np.testing.assert_allclose(record["Q"] - base["Q"], LOAD.static.Q * u**2.6 * (f**-1.05 - 1), atol=1e-8)
+    np.testing.assert_allclose(
+        record["P"] - base["P"], LOAD.static.P * u**1.3 * (f**1.5 - 1), atol=1e-8
+    )
+    np.testing.assert_allclose(
+        record["Q"] - base["Q"], LOAD.static.Q * u**2.6 * (f**-1.05 - 1), atol=1e-8
+    )
 
 
 def test_active_power_recovers_to_the_smaller_exponent():
     dip = replace(LONG, duration=40.0)
     recorder = Recorder(10.0, 400)
-    base, record = clean(None, dip=dip, recorder=recorder), clean("exponential_recovery", dip=dip, recorder=recorder)
+    base, record = (
+        clean(None, dip=dip, recorder=recorder),
+        clean("exponential_recovery", dip=dip, recorder=recorder),
+    )
     recovered = LOAD.static.P * (0.75 ** (1.3 - 0.6) - 0.75**1.3)
     assert record["P"][-1] - base["P"][-1] == pytest.approx(recovered, abs=1e-7)
 
@@ -222,10 +254,18 @@ def test_the_relay_s_timers_open_and_close_when_they_should():
     opened = Relay(level=0.8, reset=0.9, delay=0.05, wait=0.3, ramp=0.2).opened(dip, 2.0)
     falls = 0.5 + 0.02 / 2  # a raised cosine is at half its depth, 0.8, halfway
     rises = 0.75 + 0.04 * np.arccos(1 - 2 * 0.75) / np.pi  # three quarters of the depth are back
-    np.testing.assert_allclose(opened.times, [falls + 0.05, falls + 0.0501, rises + 0.3, rises + 0.5], atol=2.5e-4)
-    assert [opened(t) for t in (0.54, 0.7, 1.2, 1.9)] == pytest.approx([0.0, 1.0, 0.49, 0.0], abs=0.2)
-    assert Relay(0.8, 0.9, 0.3, 0.3, 0.2).opened(dip, 2.0)(0.8) == 0.0, "the dip is shorter than the delay"
-    assert Relay(0.55, 0.9, 0.05, 0.3, 0.2).opened(dip, 2.0)(0.7) == 0.0, "the dip is shallower than the level"
+    np.testing.assert_allclose(
+        opened.times, [falls + 0.05, falls + 0.0501, rises + 0.3, rises + 0.5], atol=2.5e-4
+    )
+    assert [opened(t) for t in (0.54, 0.7, 1.2, 1.9)] == pytest.approx(
+        [0.0, 1.0, 0.49, 0.0], abs=0.2
+    )
+    assert Relay(0.8, 0.9, 0.3, 0.3, 0.2).opened(dip, 2.0)(0.8) == 0.0, (
+        "the dip is shorter than the delay"
+    )
+    assert Relay(0.55, 0.9, 0.05, 0.3, 0.2).opened(dip, 2.0)(0.7) == 0.0, (
+        "the dip is shallower than the level"
+    )
 
 
 def test_a_trip_takes_its_share_of_the_whole_load():
@@ -239,7 +279,9 @@ def test_a_trip_takes_its_share_of_the_whole_load():
     np.testing.assert_allclose(record["Q"] / base["Q"], left, atol=1e-6)
 
 
-@pytest.mark.parametrize(("u", "limit", "power"), [(0.9, 1.3, 1.0), (0.7, 1.3, 0.91), (0.2, 1.3, 0.39 * (2 / 3) ** 2)])
+@pytest.mark.parametrize(
+    ("u", "limit", "power"), [(0.9, 1.3, 1.0), (0.7, 1.3, 0.91), (0.2, 1.3, 0.39 * (2 / 3) ** 2)]
+)
 def test_a_converter_keeps_its_power_up_to_its_current_limit(u, limit, power):
     converter, _ = Converter(0.5, limit=limit).settled(1.02 + 0j)
     V = 1.02 * u * np.exp(0.3j)
@@ -248,7 +290,9 @@ def test_a_converter_keeps_its_power_up_to_its_current_limit(u, limit, power):
     assert rates[0] == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize(("u", "power"), [(0.95, 1.0), (0.9, 1.0), (0.8, 0.55), (0.7, 0.1), (0.6, 0.1)])
+@pytest.mark.parametrize(
+    ("u", "power"), [(0.95, 1.0), (0.9, 1.0), (0.8, 0.55), (0.7, 0.1), (0.6, 0.1)]
+)
 def test_trains_take_less_where_the_line_voltage_is_low(u, power):
     converter, _ = Converter(1.0, full=0.9, empty=0.7, rest=0.1).settled(1 + 0j)
     assert converter.allowed(u) == pytest.approx(power, rel=1e-12)
@@ -297,8 +341,11 @@ def test_the_feeder_obeys_kirchhoff():
 def test_a_capacitor_gives_with_the_square_of_the_voltage_and_with_frequency():
     base, record = clean(), clean("shunt_capacitor")
     b, U = 0.3, base["U"]
-    taken_over = b * DIP.before**2 * (U / DIP.before) ** 2.6  # the static load is larger by what the bank gave before
-    np.testing.assert_allclose(record["Q"] - base["Q"], taken_over - b * U**2 * base["f"] / 50, atol=1e-9)
+    # the static load is larger by what the bank gave before
+    taken_over = b * DIP.before**2 * (U / DIP.before) ** 2.6
+    np.testing.assert_allclose(
+        record["Q"] - base["Q"], taken_over - b * U**2 * base["f"] / 50, atol=1e-9
+    )
     np.testing.assert_allclose(record["P"], base["P"], atol=1e-9)
 
 
@@ -333,7 +380,9 @@ def test_there_is_no_inrush_before_the_voltage_returns():
 def test_a_compensator_gives_in_proportion_up_to_its_rating(depth, given):
     dip = replace(LONG, depth=depth)
     change = clean("static_var_compensator", dip=dip)["Q"] - clean(None, dip=dip)["Q"]
-    assert change[bottom(clean(None, dip=dip))] == pytest.approx(-0.05 * given * (1 - depth), rel=1e-6)
+    assert change[bottom(clean(None, dip=dip))] == pytest.approx(
+        -0.05 * given * (1 - depth), rel=1e-6
+    )
     assert Statcom(0.05).settled(1 + 0j)[1] == [0j]
 
 
@@ -356,12 +405,16 @@ def test_a_window_is_the_mean_over_it():
 
 @pytest.mark.parametrize("frequency", [0.0, 3.0, 12.5, 25.0, 40.0])
 def test_a_measurement_unit_passes_what_its_class_passes(frequency):
-    """The triangle's gain is the square of a box's; the M class stops what is above half the reporting rate."""
+    """The triangle's gain is the square of a box's; the M class stops what is above half the
+    reporting rate.
+    """
     fine, t = np.arange(-0.2, 1.2, 0.001), np.linspace(0.0, 1.0, 41)
     turning = lambda at: np.exp(2j * np.pi * frequency * at)  # noqa: E731
     gains = {pmu: weighed(fine, turning(fine), t, pmu) / turning(t) for pmu in ("P", "M")}
     np.testing.assert_allclose(gains["P"], np.sinc(0.02 * frequency) ** 2, atol=2e-3)
-    expected = {0.0: (1.0, 1e-6), 3.0: (1.0, 0.05)}.get(frequency, (0.0, 0.1) if frequency >= 25 else (0.7, 0.3))
+    expected = {0.0: (1.0, 1e-6), 3.0: (1.0, 0.05)}.get(
+        frequency, (0.0, 0.1) if frequency >= 25 else (0.7, 0.3)
+    )
     np.testing.assert_allclose(gains["M"], expected[0], atol=expected[1])
 
 
@@ -383,14 +436,18 @@ def test_a_drifting_load_grows_by_what_it_says():
 
 
 def test_stator_transients_are_those_of_the_waveform_simulator():
-    """The same machine in two frames and by two programs: waveforms at the bus, and phasors here."""
+    """The same machine in two frames and by two programs: waveforms at the bus, and
+    phasors here.
+    """
     machine = replace(LOAD.machine, Rs=0.03)
     whole = Motor(machine, 0.6, 0.7, stator=True)
     dip = replace(DIP, negative=0.0, swing=0.0)
     site = replace(response(dip=dip).site, motors=(whole,))
     t = np.linspace(0.4, 1.2, 801)
     V, current = site.response().at(t)
-    waves = simulate(Load(machine, 0.6, 0.7, Static(0.0, 0.0, 1.0, 1.0)), dip, np.concatenate([[0.0], t]))
+    waves = simulate(
+        Load(machine, 0.6, 0.7, Static(0.0, 0.0, 1.0, 1.0)), dip, np.concatenate([[0.0], t])
+    )
     motor = waves.current[1:] * np.exp(-1j * OMEGA * t)
     u, S = np.abs(V) / dip.before, site.S - dip.before * waves.current[0].conjugate()
     static = ((S.real * u**1.3 + 1j * S.imag * u**2.6) / V).conj()
@@ -415,13 +472,19 @@ def rates_of(device, x: list[float], u: float = 1.0) -> np.ndarray:
 def modes(device, x: list[float]) -> np.ndarray:
     """Eigenvalues of a device about states at rest."""
     h = 1e-6 * np.eye(len(x))
-    return np.linalg.eigvals(np.stack([(rates_of(device, x + d) - rates_of(device, x - d)) / 2e-6 for d in h], axis=1))
+    return np.linalg.eigvals(
+        np.stack([(rates_of(device, x + d) - rates_of(device, x - d)) / 2e-6 for d in h], axis=1)
+    )
 
 
 def at_rest(device, u: float, x: list[float]) -> tuple[complex, np.ndarray]:
     """Power over that before, and states, in the steady state at u, found from x."""
-    found = solve_ivp(lambda t, x: rates_of(device, x, u), (0, 60), x, "LSODA", rtol=1e-10, atol=1e-12).y[:, -1]
-    return u * device.flow(steady(u), u + 0j, found.astype(complex).tolist())[0].conjugate() / device.power, found
+    found = solve_ivp(
+        lambda t, x: rates_of(device, x, u), (0, 60), x, "LSODA", rtol=1e-10, atol=1e-12
+    ).y[:, -1]
+    return u * device.flow(steady(u), u + 0j, found.astype(complex).tolist())[
+        0
+    ].conjugate() / device.power, found
 
 
 @pytest.mark.parametrize(
@@ -455,7 +518,9 @@ def test_controls_end_where_they_aim(device, u, power):
 
 
 def test_an_integral_control_brings_the_link_back_to_its_voltage_at_its_frequency():
-    """Linearised in a small dip: v'' + 2 zeta w v' + w^2 v, a constant current taking from the damping."""
+    """Linearised in a small dip: v'' + 2 zeta w v' + w^2 v, a constant current taking from the
+    damping.
+    """
     device = IntegralLink(0.3, frequency=4.0, damping=0.7)
     _, (v, z) = at_rest(device, 0.95, [1.0, 0.0])
     assert (v, 1 + z) == pytest.approx((1.0, 1 / 0.95), rel=1e-6)
@@ -492,7 +557,9 @@ def test_a_rectifier_holds_dc_power_and_pays_for_commutation(u, current):
 @pytest.mark.parametrize(("u", "b"), [(0.98, 0.4), (0.8, 1.0), (1.2, -1.0)])
 def test_an_integrating_compensator_ends_on_its_droop_or_at_its_rating(u, b):
     device = SusceptanceControl(0.2, droop=0.05)
-    solved = solve_ivp(lambda t, x: rates_of(device, x, u), (0, 5), [1.0, 0.0], max_step=1e-3).y[:, -1]
+    solved = solve_ivp(lambda t, x: rates_of(device, x, u), (0, 5), [1.0, 0.0], max_step=1e-3).y[
+        :, -1
+    ]
     current = device.flow(steady(u), u + 0j, solved.astype(complex).tolist())[0]
     assert current == pytest.approx(1j * 0.2 * b * u, rel=1e-4)
 
@@ -508,11 +575,19 @@ def test_froelich_s_curve_is_bounded_flux():
         assert a * abs(magnetizing) / (b + abs(magnetizing)) == pytest.approx(abs(gap), rel=1e-9)
 
 
-@pytest.mark.parametrize(("power", "head", "w", "driven"), [
-    (1.0, 0.0, 0.9, 0.9), (2.0, 0.8, 1.0, 1.0), (2.0, 0.8, 0.7, 0.0), (2.0, 0.6, 0.8, 0.28 / 0.64),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("power", "head", "w", "driven"),
+    [
+        (1.0, 0.0, 0.9, 0.9),
+        (2.0, 0.8, 1.0, 1.0),
+        (2.0, 0.8, 0.7, 0.0),
+        (2.0, 0.6, 0.8, 0.28 / 0.64),
+    ],
+)
 def test_what_is_driven_follows_its_own_curve(power, head, w, driven):
-    assert Motor(LOAD.machine, 1.0, 0.7, fan_power=power, head=head).driven(w) == pytest.approx(driven)
+    assert Motor(LOAD.machine, 1.0, 0.7, fan_power=power, head=head).driven(w) == pytest.approx(
+        driven
+    )
 
 
 def test_a_transformer_whose_ratio_steps_neither_gives_nor_takes_power():
@@ -540,7 +615,9 @@ def test_a_tap_changer_restores_its_voltage_to_a_step():
 def test_stages_act_one_by_one_and_return(name):
     dip = replace(LONG, depth=0.25, duration=0.6)
     profile = scene(case(name, 1.0, dip), 1).site(0).devices[-1].profile
-    assert profile(dip.start + 0.3) == pytest.approx(2 / 3), "levels 0.9 and 0.8 are passed, 0.7 is not"
+    assert profile(dip.start + 0.3) == pytest.approx(2 / 3), (
+        "levels 0.9 and 0.8 are passed, 0.7 is not"
+    )
     assert profile(1.9) == pytest.approx(0.0)
 
 
@@ -578,9 +655,15 @@ def test_a_compensator_with_a_dead_band_sleeps_in_it_and_moves_no_faster_than_it
 
 def test_every_effect_but_circuits_and_definitions_has_two_laws_of_others():
     one = {
-        "stator_resistance", "feeder_impedance", "shunt_capacitor", "negative_sequence_braking", "second_motor_group",
-        "time_skew", "measurement_window", "frequency_dependence",
-    }  # fmt: skip
+        "stator_resistance",
+        "feeder_impedance",
+        "shunt_capacitor",
+        "negative_sequence_braking",
+        "second_motor_group",
+        "time_skew",
+        "measurement_window",
+        "frequency_dependence",
+    }
     assert FAMILY.keys() == LAWS.keys()
     assert MEMBERS_LAW.keys() < FAMILY.keys()
     others = [family for hidden, family in FAMILY.items() if hidden not in MEMBERS_LAW]
@@ -607,7 +690,10 @@ def test_loads_that_step_do_so_once_and_stay():
 
 def test_an_angle_that_jumps_does_not_touch_a_static_load():
     only = Load(LOAD.machine, 1e-9, 0.0, Static(0.8, 0.3, 1.5, 2.5))
-    records = [make(Case(name, 4.0, (DIP,), CLEAN, load=only, spread=0.0), 1)[0] for name in (None, "phase_jump")]
+    records = [
+        make(Case(name, 4.0, (DIP,), CLEAN, load=only, spread=0.0), 1)[0]
+        for name in (None, "phase_jump")
+    ]
     np.testing.assert_allclose(records[1]["P"], records[0]["P"], atol=1e-8)
     assert np.abs(clean("phase_jump")["P"] - clean()["P"]).max() > 0.01
 
@@ -623,7 +709,9 @@ def test_a_current_transformer_is_exact_below_the_current_before():
 def test_a_drifting_ratio_scales_voltage_and_power_alike():
     base, record = clean(), clean("voltage_gain_drift")
     for channel in ("U", "P", "Q"):
-        np.testing.assert_allclose(record[channel], base[channel] * (1 + 0.01 * base["t"]), rtol=1e-12)
+        np.testing.assert_allclose(
+            record[channel], base[channel] * (1 + 0.01 * base["t"]), rtol=1e-12
+        )
 
 
 def test_one_seed_gives_one_data_set_and_sizes_share_everything_else():
@@ -636,7 +724,9 @@ def test_one_seed_gives_one_data_set_and_sizes_share_everything_else():
     assert small.dips == large.dips
     assert small.effects[0][1].lag == large.effects[0][1].lag
     noise = [
-        make(Case("dc_link_lag", s, 2), 5)[1]["P"] - make(Case("dc_link_lag", s, 2, CLEAN), 5)[1]["P"] for s in (1, 2)
+        make(Case("dc_link_lag", s, 2), 5)[1]["P"]
+        - make(Case("dc_link_lag", s, 2, CLEAN), 5)[1]["P"]
+        for s in (1, 2)
     ]
     np.testing.assert_allclose(noise[0], noise[1], atol=1e-12)
 
@@ -651,24 +741,36 @@ def test_drawn_data_sets_are_as_wide_as_promised():
         assert dip.start >= 0.3
         assert 0.06 <= dip.duration - dip.fall <= 0.6
     for one in made:
-        assert sorted(int(d.depth > 0.05 + 0.55 / 3) + int(d.depth > 0.05 + 1.1 / 3) for d in one.dips) == [0, 1, 2]
+        assert sorted(
+            int(d.depth > 0.05 + 0.55 / 3) + int(d.depth > 0.05 + 1.1 / 3) for d in one.dips
+        ) == [0, 1, 2]
         assert 0 < one.load.truth()["C"] < 1
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.5, 0.8, 0.95])
 def test_noise_has_the_stated_spread_and_color(phi):
     n = 200_000
-    clean_record = {"t": np.arange(n) / 500, "U": np.ones(n), "P": np.full(n, 0.8), "Q": np.full(n, 0.3)}
+    clean_record = {
+        "t": np.arange(n) / 500,
+        "U": np.ones(n),
+        "P": np.full(n, 0.8),
+        "Q": np.full(n, 0.3),
+    }
     noisy = Noise(level=0.01, phi=phi, voltage=0.003).add(clean_record, np.random.default_rng(0))
     for channel, expected in (("P", 0.008), ("Q", 0.008), ("U", 0.003)):
         y = noisy[channel] - clean_record[channel]
         colored = phi if channel != "U" else 0.0
-        # The deviation of a variance and of a correlation estimated from n values, correlated by phi: five of each.
+        # The deviation of a variance and of a correlation estimated from n values, correlated by
+        # phi: five of each.
         spread = np.sqrt(2 / n * (1 + colored**2) / (1 - colored**2))
         assert y.var() == pytest.approx(expected**2, rel=5 * spread)
         for lag in (1, 3):
-            assert (y[lag:] * y[:-lag]).mean() / y.var() == pytest.approx(colored**lag, abs=5 * spread)
-    assert abs(np.corrcoef(noisy["P"], noisy["Q"])[0, 1]) < 5 * np.sqrt((1 + phi**2) / (1 - phi**2) / n)
+            assert (y[lag:] * y[:-lag]).mean() / y.var() == pytest.approx(
+                colored**lag, abs=5 * spread
+            )
+    assert abs(np.corrcoef(noisy["P"], noisy["Q"])[0, 1]) < 5 * np.sqrt(
+        (1 + phi**2) / (1 - phi**2) / n
+    )
 
 
 def test_heavy_tails_keep_the_variance_and_show_outliers():
@@ -735,10 +837,15 @@ def test_the_detection_limit_is_proportional_to_the_noise_and_rises_with_its_col
 
 
 def test_a_pair_s_joint_limit_is_where_no_single_effect_of_the_catalogue_could_take_it():
-    """Two effects that nothing else resembles need what each needs alone; two that resemble each other need more."""
+    """Two effects that nothing else resembles need what each needs alone; two that resemble each
+    other need more.
+    """
     apart, alike = (
         replace(case(), effect=names, size=(1.0, 1.0), noise=Noise(0.005))
-        for names in (("undervoltage_trip", "static_var_compensator"), ("stator_resistance", "feeder_impedance"))
+        for names in (
+            ("undervoltage_trip", "static_var_compensator"),
+            ("stator_resistance", "feeder_impedance"),
+        )
     )
     over = {}
     for pair in (apart, alike):
@@ -746,16 +853,21 @@ def test_a_pair_s_joint_limit_is_where_no_single_effect_of_the_catalogue_could_t
         ratios = np.array(joint_limit(pair, 1)) / alone
         assert ratios[0] == pytest.approx(ratios[1], rel=1e-9)
         over[pair.effect] = ratios[0]
-    assert 1 < over[apart.effect] < 1.05, "the best single effect is one of the two and leaves the other whole"
+    assert 1 < over[apart.effect] < 1.05, (
+        "the best single effect is one of the two and leaves the other whole"
+    )
     assert over[alike.effect] > 1.3
 
 
 def test_an_effect_is_measured_against_what_the_base_model_cannot_imitate():
-    """Load drift alone, nothing else to imitate it: its limit is that of a straight line in white noise."""
+    """Load drift alone, nothing else to imitate it: its limit is that of a straight line in white
+    noise.
+    """
     flat = Dip(depth=1e-6, start=0.5, duration=0.1)
     made = replace(case("load_change", dip=flat), noise=Noise(0.005))
     t, P0, Q0 = np.arange(1000) / 500, clean(None, dip=flat)["P"][0], clean(None, dip=flat)["Q"][0]
-    line = 0.01 * np.linalg.norm(t - t.mean()) / 0.005 * np.hypot(1, Q0 / P0)  # the level is free, per event
+    # the level is free, per event
+    line = 0.01 * np.linalg.norm(t - t.mean()) / 0.005 * np.hypot(1, Q0 / P0)
     z = 3.0048 + 1.2816  # one in 20 over 19 effects, two-sided, and nine in ten
     assert detection_limit(made, 1) == pytest.approx(z / line, rel=0.01)
 
@@ -777,7 +889,9 @@ def test_the_suites_hide_what_they_say():
     assert (trial.label, trial.seed) == (planned.label, planned.seed)
     made = scene(trial.case, trial.seed)
     assert trial.case.effect == ("undervoltage_trip",)
-    assert trial.case.size[0] == pytest.approx(2 * detection_limit(replace(trial.case, size=1.0), trial.seed))
+    assert trial.case.size[0] == pytest.approx(
+        2 * detection_limit(replace(trial.case, size=1.0), trial.seed)
+    )
     assert made.effects[0][1].level > min(1 - d.depth / d.before for d in made.dips)
     assert trial.multiples == (pytest.approx(2.0),)
     capped = cases.at_limit(("constant_power_converter",), 1e6, 1, events=(DIP,), load=LOAD)
@@ -785,7 +899,9 @@ def test_the_suites_hide_what_they_say():
     assert capped.case.size[0] * 0.2 < LOAD.static.P / (LOAD.static.P + LOAD.torque * LOAD.rating)
     assert [t.case.noise.phi for t in made_of(cases.nulls("AR(1) 0.95"), 2)] == [0.95, 0.95]
     for trial in made_of(cases.nuisances(), 3):
-        faults = dict((name, size * NUISANCES[name].reference) for name, size in trial.case.nuisances)
+        faults = dict(
+            (name, size * NUISANCES[name].reference) for name, size in trial.case.nuisances
+        )
         assert 0 <= faults["time_skew"] <= 0.003
         assert trial.case.effect is None
 
@@ -818,7 +934,9 @@ def test_data_sets_of_the_field_differ_in_recorder_noise_and_error():
 
 
 def test_a_loud_data_set_has_a_load_that_no_model_fits_to_twenty_times_its_noise():
-    """The effect leaves four times as much as the load's own error, or as much as there is room for."""
+    """The effect leaves four times as much as the load's own error, or as much as there is room
+    for.
+    """
     (made,) = made_of(cases.loud("feeder_impedance", 4.0, events=2), 1)
     alone = replace(made.case, effect=None, size=1.0)
     assert misfit(alone, made.seed) == pytest.approx(0.02, rel=0.2)
@@ -849,7 +967,9 @@ def test_what_makes_no_sense_is_refused(settings, message):
         make(Case(**settings), 1)
 
 
-@pytest.mark.parametrize("settings", [{"phi": 1.0}, {"tails": 2.0}, {"level": -0.1}, {"voltage": float("nan")}])
+@pytest.mark.parametrize(
+    "settings", [{"phi": 1.0}, {"tails": 2.0}, {"level": -0.1}, {"voltage": float("nan")}]
+)
 def test_impossible_noise_is_refused(settings):
     with pytest.raises(ValueError, match="noise"):
         Noise(**settings)
@@ -858,5 +978,7 @@ def test_impossible_noise_is_refused(settings):
 def test_a_control_that_chatters_about_its_limit_ends_with_a_sentence(monkeypatch):
     """Such a simulation once went on for more than ten minutes, in steps of a nanosecond."""
     monkeypatch.setattr("hidden_effects.site.MOST", 200)
-    with pytest.raises(ArithmeticError, match=r"the simulation chatters at t = \d\.\d+ s: 200 derivatives"):
+    with pytest.raises(
+        ArithmeticError, match=r"the simulation chatters at t = \d\.\d+ s: 200 derivatives"
+    ):
         make(Case("constant_power_converter", 2.0, events=1), 800001)

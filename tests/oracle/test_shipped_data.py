@@ -35,7 +35,9 @@ def sidecar(name: str) -> dict:
 
 def test_the_script_makes_the_shipped_files_bit_for_bit(tmp_path):
     made = make_tibet.make(tmp_path)
-    assert sorted(path.name for path in made) == sorted(f"{name}{end}" for name in NAMES for end in (".csv", ".json"))
+    assert sorted(path.name for path in made) == sorted(
+        f"{name}{end}" for name in NAMES for end in (".csv", ".json")
+    )
     for path in made:
         assert path.read_bytes() == (DATA / path.name).read_bytes(), path.name
 
@@ -49,7 +51,9 @@ def test_a_record_is_complete_uniform_and_small(name):
     assert (DATA / f"{name}.csv").stat().st_size < 100_000
 
 
-@pytest.mark.parametrize(("name", "depth"), [("tibet_50pct", 0.50), ("tibet_30pct", 0.30), ("tibet_65pct", 0.65)])
+@pytest.mark.parametrize(
+    ("name", "depth"), [("tibet_50pct", 0.50), ("tibet_30pct", 0.30), ("tibet_65pct", 0.65)]
+)
 def test_a_record_dips_as_its_name_says_and_the_motor_comes_back(name, depth):
     columns = read(name)
     before, bottom, end = columns["t"] < 0.28, columns["U"].argmin(), columns["t"] > 1.9
@@ -57,7 +61,9 @@ def test_a_record_dips_as_its_name_says_and_the_motor_comes_back(name, depth):
     for channel in ("U", "P", "Q"):
         noise = columns[channel][before].std()
         assert 1e-4 < noise < 5e-3
-        assert columns[channel][end].mean() == pytest.approx(columns[channel][before].mean(), abs=3 * noise)
+        assert columns[channel][end].mean() == pytest.approx(
+            columns[channel][before].mean(), abs=3 * noise
+        )
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -90,14 +96,21 @@ def test_the_truth_follows_from_the_machine_by_the_paper_s_definitions(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_record_starts_from_the_steady_state_of_the_truth(name):
-    """Eqs. (2) and (3) with the truth, and the static rest, against the mean of the samples before the dip."""
+    """Eqs. (2) and (3) with the truth, and the static rest, against the mean of the samples before
+    the dip.
+    """
     truth, start, columns = sidecar(name)["truth"], sidecar(name)["steady_state"], read(name)
     delta = 0.5 * np.arcsin(-2 * truth["T_m"] * truth["X_prime"] / truth["C"])
     E = truth["C"] * np.cos(delta)
     assert start["P_d0"] == pytest.approx(-E * np.sin(delta) / truth["X_prime"], rel=1e-7)
     assert start["Q_d0"] == pytest.approx((1 - E * np.cos(delta)) / truth["X_prime"], rel=1e-7)
     before = columns["t"] < 0.28
-    # 140 samples, ten to a window: some 14 independent ones, so the mean wanders by a quarter of the noise.
-    for channel, value in {"P": start["P_d0"] + start["P_s0"], "Q": start["Q_d0"] + start["Q_s0"], "U": 1.0}.items():
+    # 140 samples, ten to a window: some 14 independent ones, so the mean wanders by a quarter of
+    # the noise.
+    for channel, value in {
+        "P": start["P_d0"] + start["P_s0"],
+        "Q": start["Q_d0"] + start["Q_s0"],
+        "U": 1.0,
+    }.items():
         wander = columns[channel][before].std() / np.sqrt(14)
         assert columns[channel][before].mean() == pytest.approx(value, abs=4 * wander), channel

@@ -11,8 +11,17 @@ from command_line import run_command
 import tractexp.data
 from tractexp.cli.again import merge_settings
 
-TOLD = ["data=comtrade", "data.path=x.cfg", "data.train=[1]", "model=static_zip", "++model.bounds.a_Z=[0,1]", "seed=3",
-        "optimizer=pso", "optimizer.population=9", "domain=waves"]  # fmt: skip
+TOLD = [
+    "data=comtrade",
+    "data.path=x.cfg",
+    "data.train=[1]",
+    "model=static_zip",
+    "++model.bounds.a_Z=[0,1]",
+    "seed=3",
+    "optimizer=pso",
+    "optimizer.population=9",
+    "domain=waves",
+]
 RECORDS = TOLD[:3]
 
 
@@ -25,12 +34,18 @@ RECORDS = TOLD[:3]
         (["data=tibet"], [*TOLD[3:], "data=tibet"]),
         (["model=static_exponential"], [*RECORDS, *TOLD[5:], "model=static_exponential"]),
         (["optimizer=ssa"], [*TOLD[:6], "domain=waves", "optimizer=ssa"]),
-        (["task=discrepancy"], [*TOLD[:6], "domain=waves", "task=discrepancy"]),  # which searches nothing
-        (["task=export", "task.format=andes"],
-         ["seed=3", "task=export", "task.format=andes", "task.parameters={result}"]),
-        (["task=export", "task.parameters=r.json"], ["seed=3", "task=export", "task.parameters=r.json"]),
+        # which searches nothing
+        (["task=discrepancy"], [*TOLD[:6], "domain=waves", "task=discrepancy"]),
+        (
+            ["task=export", "task.format=andes"],
+            ["seed=3", "task=export", "task.format=andes", "task.parameters={result}"],
+        ),
+        (
+            ["task=export", "task.parameters=r.json"],
+            ["seed=3", "task=export", "task.parameters=r.json"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_settings_stay_but_for_what_is_chosen_anew_or_not_read(settings, expected, tmp_path):
     result = [text.format(result=tmp_path / "result.json") for text in expected]
     assert merge_settings(TOLD, settings, tmp_path) == result
@@ -41,39 +56,62 @@ def folder(tmp_path_factory):
     """Where a run of a record named from there has its folder."""
     place = tmp_path_factory.mktemp("again")
     shutil.copy(Path(tractexp.data.__file__).with_name("tibet_30pct.csv"), place / "my dip.csv")
-    done = run_command("data=csv", "data.train=[my dip.csv]", "optimizer=multistart_least_squares",
-                       "optimizer.starts=2", "tracking.enabled=false", "hydra.run.dir=first", cwd=place)  # fmt: skip
+    done = run_command(
+        "data=csv",
+        "data.train=[my dip.csv]",
+        "optimizer=multistart_least_squares",
+        "optimizer.starts=2",
+        "tracking.enabled=false",
+        "hydra.run.dir=first",
+        cwd=place,
+    )
     assert done.returncode == 0, done.stderr
     return place
 
 
 def test_a_run_is_done_again_with_another_setting_from_anywhere(folder, tmp_path):
-    done = run_command("again", f"{folder}/first", "model.fixed.C=0.8", "hydra.run.dir=second", cwd=tmp_path)
+    done = run_command(
+        "again", f"{folder}/first", "model.fixed.C=0.8", "hydra.run.dir=second", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     assert f"in {folder}, where that run was" in done.stdout
-    first, second = (json.loads((folder / name / "result.json").read_text()) for name in ("first", "second"))
+    first, second = (
+        json.loads((folder / name / "result.json").read_text()) for name in ("first", "second")
+    )
     assert second["parameters"]["C"] == 0.8
     assert second["records"] == first["records"]
     told = yaml.safe_load((folder / "second" / ".hydra" / "overrides.yaml").read_text())
-    assert set(yaml.safe_load((folder / "first" / ".hydra" / "overrides.yaml").read_text())) < set(told)
+    assert set(yaml.safe_load((folder / "first" / ".hydra" / "overrides.yaml").read_text())) < set(
+        told
+    )
     assert not (tmp_path / "second").exists()
 
 
 def test_its_result_is_exported_without_naming_it(folder):
-    done = run_command("again", "first", "task=export", "task.format=psse_dyr", "hydra.run.dir=export", cwd=folder)
+    done = run_command(
+        "again", "first", "task=export", "task.format=psse_dyr", "hydra.run.dir=export", cwd=folder
+    )
     assert done.returncode == 0, done.stderr
     assert (folder / "export" / "load.dyr").is_file()
 
 
 def test_a_result_may_be_named_by_the_folder_of_its_run(folder):
     for parameters in ("first", "first/result.json"):
-        arguments = ["task=export", "task.format=psse_dyr", f"task.parameters={parameters}", "hydra.run.dir=by_folder"]
+        arguments = [
+            "task=export",
+            "task.format=psse_dyr",
+            f"task.parameters={parameters}",
+            "hydra.run.dir=by_folder",
+        ]
         done = run_command(*arguments, cwd=folder)
         assert done.returncode == 0, done.stderr
         assert (folder / "by_folder" / "load.dyr").is_file()
     (folder / "empty").mkdir()
     done = run_command("task=export", "task.format=psse_dyr", "task.parameters=empty", cwd=folder)
-    assert (done.returncode, "there is no result file empty/result.json" in done.stderr) == (2, True)
+    assert (done.returncode, "there is no result file empty/result.json" in done.stderr) == (
+        2,
+        True,
+    )
 
 
 def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_path):
@@ -101,15 +139,23 @@ def test_a_folder_alone_is_a_survey_or_tells_the_page_of_its_run(folder, tmp_pat
 def test_a_word_that_is_nothing_is_told_what_it_looked_like(word, end, tmp_path):
     done = run_command(word, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr.startswith(f"tractexp: {word} is no setting (KEY=VALUE), no command, and no file or folder")
+    assert done.stderr.startswith(
+        f"tractexp: {word} is no setting (KEY=VALUE), no command, and no file or folder"
+    )
     assert done.stderr.strip().endswith(end)
 
 
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["nowhere"], "nowhere holds no run (.hydra is missing or damaged); give the folder of one"),
-        (["first", "discrepancy"], "discrepancy is no setting; give KEY=VALUE, as task=discrepancy"),
+        (
+            ["nowhere"],
+            "nowhere holds no run (.hydra is missing or damaged); give the folder of one",
+        ),
+        (
+            ["first", "discrepancy"],
+            "discrepancy is no setting; give KEY=VALUE, as task=discrepancy",
+        ),
         (["first", "task=identfy"], "there is no task 'identfy'; did you mean 'identify'?"),
     ],
 )

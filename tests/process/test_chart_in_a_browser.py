@@ -22,7 +22,12 @@ def test_a_folded_chart_is_drawn_when_it_is_opened(tmp_path, opened):
     with page.folded("more"):
         page.chart(chart, "folded")
     if opened:
-        page.add(Markup("<script>setTimeout(() => document.querySelector('details').open = true, 500)</script>"))
+        page.add(
+            Markup(
+                "<script>setTimeout(() => document.querySelector('details').open = true,"
+                " 500)</script>"
+            )
+        )
     dom, complaints = drawn(page, tmp_path)
     assert complaints == []
     assert dom.count('class="chart js-plotly-plot"') == 1 + opened
@@ -35,8 +40,14 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
     chart = Chart("t [s]", ["U", "P"]).line("U", x, x, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1)
     chart.shade(0.2, 0.3, BLUE, name="dip").edge(0.2).level(0.5, "half").limits(None, 0, 1)
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE, hover=["two", "one"])
-    forest = Chart("value", [""]).points("est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), hover=["C"])
-    fitness = Chart("n", ["f"], log_x=True, log_y=True).line("f", x + 1, x + 1, BLUE, step=True).level(1.5, "floor")
+    forest = Chart("value", [""]).points(
+        "est", [0.3], ["C"], BLUE, spans=np.array([[0.1, 0.4]]), hover=["C"]
+    )
+    fitness = (
+        Chart("n", ["f"], log_x=True, log_y=True)
+        .line("f", x + 1, x + 1, BLUE, step=True)
+        .level(1.5, "floor")
+    )
     page = Report("charts").chart(chart, "one").charts([bars, forest, fitness], "three")
     dom, complaints = drawn(page, tmp_path, f"--window-size={width},900")
     assert complaints == []
@@ -49,7 +60,12 @@ def test_a_browser_draws_every_kind_and_complains_of_nothing(tmp_path, width):
 @pytest.mark.skipif(BROWSER is None, reason="no browser")
 def test_a_chart_is_drawn_by_the_parts_of_the_library_as_by_the_whole(tmp_path, monkeypatch):
     x = np.linspace(0, 1, 50)
-    chart = Chart("t [s]", ["U", "P"]).line("U", x, x**2, BLUE).band("noise", x, x - 1, x + 1, BLUE, 1).edge(0.2)
+    chart = (
+        Chart("t [s]", ["U", "P"])
+        .line("U", x, x**2, BLUE)
+        .band("noise", x, x - 1, x + 1, BLUE, 1)
+        .edge(0.2)
+    )
     bars = Chart("gain", [""]).bars("gain", ["a", "b"], [2, 1], BLUE)
     page, drawings = Report("charts").charts([chart, bars], "two"), []
     whole = plotly.library().read_text(encoding="utf-8")
@@ -71,7 +87,8 @@ def test_a_browser_that_cannot_unpack_the_library_says_so(tmp_path):
     page.chart(Chart("x", ["y"]).line("one", np.arange(3), np.arange(3), BLUE), "one")
     dom, complaints = drawn(page, tmp_path)
     assert complaints == []
-    assert dom.count("Browsers older than 2023 do not draw this chart.") == 2  # in the script and in the chart
+    # in the script and in the chart
+    assert dom.count("Browsers older than 2023 do not draw this chart.") == 2
 
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")
@@ -82,7 +99,8 @@ def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_pat
     script = """
     const told = [], tell = () => {
       const {x, y} = charts[0].data[0];
-      told.push([x.length, Math.max(...y), Math.min(...y), x.filter(v => v >= 50 && v <= 50.5).length, x[0], x.at(-1)]);
+      told.push([x.length, Math.max(...y), Math.min(...y), \
+x.filter(v => v >= 50 && v <= 50.5).length, x[0], x.at(-1)]);
     };
     tell();
     Plotly.relayout(charts[0], {"xaxis.range": [50, 50.5]}).then(() => { tell();
@@ -102,15 +120,22 @@ def test_zoomed_in_every_sample_is_drawn_and_zoomed_out_no_spike_is_lost(tmp_pat
 
 @pytest.mark.skipif(BROWSER is None, reason="no browser")
 def test_the_cursor_reads_every_curve_and_turns_the_phasors(tmp_path):
-    """A quarter of a cycle later voltage and current have turned alike: their angles stay, values do not."""
+    """A quarter of a cycle later voltage and current have turned alike: their angles stay, values
+    do not.
+    """
     t = np.arange(4000) / 4000
-    u, i = np.sqrt(2) * 10 * np.cos(2 * np.pi * 50 * t), np.sqrt(2) * np.cos(2 * np.pi * 50 * t - np.pi / 6)
+    u, i = (
+        np.sqrt(2) * 10 * np.cos(2 * np.pi * 50 * t),
+        np.sqrt(2) * np.cos(2 * np.pi * 50 * t - np.pi / 6),
+    )
     chart = Chart("t [s]", ["u [kV]", "i [kA]", "status"])
     chart.samples("a", 0.0, 1 / 4000, u, BLUE, label="a (<b>U1)").samples(
         "a", 0.0, 1 / 4000, i, BLUE, 1, label="a (I1)"
     )
     turn = np.exp(2j * np.pi * 50 * t)[::4]
-    chart.phasors("a", 0.0, 1e-3, 10 * turn, BLUE, 0).phasors("a", 0.0, 1e-3, np.exp(-1j * np.pi / 6) * turn, BLUE, 1)
+    chart.phasors("a", 0.0, 1e-3, 10 * turn, BLUE, 0).phasors(
+        "a", 0.0, 1e-3, np.exp(-1j * np.pi / 6) * turn, BLUE, 1
+    )
     chart.states([("trip", np.array([0.0, 0.3, 1.0]), np.array([0, 1, 1]))], 2, BLUE)
     chart.cursor(0.2).edge(0.3, text="trigger")
     script = """

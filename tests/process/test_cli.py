@@ -1,4 +1,6 @@
-"""The command line as a person uses it: the main job, its files and its log, and every refusal in one sentence."""
+"""The command line as a person uses it: the main job, its files and its log, and every refusal in
+one sentence.
+"""
 
 import json
 import os
@@ -28,20 +30,40 @@ def main_job(tmp_path_factory):
 def test_the_main_job_prints_what_it_read_did_and_found(main_job):
     _, done = main_job
     for part in (
-        "dip of 50 %", "500 Hz", "noise", "synthetic stand-in for an unpublished record", "7 parameters",
-        "Runge-Kutta steps", "T_prime", "pu s²/rad", "95 % interval", "model error", "epsilon_p", "objective",
-        "simulations in", "below 5 %: holds", "report.html", "result.json", "tractexp ui", "search ended at",
-    ):  # fmt: skip
+        "dip of 50 %",
+        "500 Hz",
+        "noise",
+        "synthetic stand-in for an unpublished record",
+        "7 parameters",
+        "Runge-Kutta steps",
+        "T_prime",
+        "pu s²/rad",
+        "95 % interval",
+        "model error",
+        "epsilon_p",
+        "objective",
+        "simulations in",
+        "below 5 %: holds",
+        "report.html",
+        "result.json",
+        "tractexp ui",
+        "search ended at",
+    ):
         assert part in done.stdout, part
     assert done.stderr == ""
 
 
 def test_the_first_line_of_the_answer_is_what_it_is_good_for(main_job):
-    """The stand-in's stator transients are missing in the model: the size of its error comes first, then two tables."""
+    """The stand-in's stator transients are missing in the model: the size of its error comes first,
+    then two tables.
+    """
     _, done = main_job
     answer = done.stdout.partition("optimizer: issa, seed 0")[2]
-    answer = re.sub(r"(?m)^ *iteration .*\n", "", answer).strip()  # a slow machine tells how far the search is
-    assert answer.startswith("The model describes this load within 1.8 % of its response (0.47 % of S); an effect is")
+    # a slow machine tells how far the search is
+    answer = re.sub(r"(?m)^ *iteration .*\n", "", answer).strip()
+    assert answer.startswith(
+        "The model describes this load within 1.8 % of its response (0.47 % of S); an effect is"
+    )
     assert answer.count("95 % interval") == 2  # of the parameters and of the model's error
     assert "task=discrepancy" in answer
 
@@ -62,8 +84,12 @@ def test_the_main_job_writes_the_contracted_result(main_job):
     assert event["epsilon_p"] == result["epsilon_p"] < 0.05
     assert event["epsilon_q"] == result["epsilon_q"] < 0.05
     assert {p.name for p in (folder / "run").iterdir()} == {
-        ".hydra", "history.csv", "mlflow.json", "result.json", "report.html",
-    }  # fmt: skip
+        ".hydra",
+        "history.csv",
+        "mlflow.json",
+        "result.json",
+        "report.html",
+    }
     assert (folder / "run" / "report.html").stat().st_size < 1e6
     rows = np.genfromtxt(folder / "run" / "history.csv", delimiter=",", names=True)
     assert rows["objective"][-1] == result["search"]["objective"]
@@ -84,7 +110,9 @@ def test_the_objective_is_that_of_the_calculated_power(main_job):
     P, Q = result.predict(record.t, record.U)
     objective = np.mean((P - record.P) ** 2 + (Q - record.Q) ** 2)
     assert objective == pytest.approx(result.objective, rel=1e-4)
-    assert np.sqrt(np.mean((P - record.P) ** 2) / np.mean(record.P**2)) == pytest.approx(result.epsilon_p, rel=1e-4)
+    assert np.sqrt(np.mean((P - record.P) ** 2) / np.mean(record.P**2)) == pytest.approx(
+        result.epsilon_p, rel=1e-4
+    )
 
 
 def test_the_main_job_is_logged_as_contracted(main_job):
@@ -99,24 +127,33 @@ def test_the_main_job_is_logged_as_contracted(main_job):
         tags = dict(ask("select key, value from tags"))
         curves = dict(ask("select key, count(*) from metrics group by key"))
     assert parameters["optimizer.population"] == "50"
-    assert not set(result["parameters"]) & set(parameters), "what was found is a number, and no setting"
+    assert not set(result["parameters"]) & set(parameters), (
+        "what was found is a number, and no setting"
+    )
     low, high = result["intervals"]["T_prime"]
     assert (metrics["T_prime"], metrics["T_prime_low"], metrics["T_prime_high"]) == (
-        result["parameters"]["T_prime"], low, high,
-    )  # fmt: skip
+        result["parameters"]["T_prime"],
+        low,
+        high,
+    )
     assert metrics["search_T_prime"] == result["search"]["parameters"]["T_prime"]
     assert (tags["grade"], metrics["grade"]) == ("effect_missing", 1)
     assert metrics["objective"] == result["objective"]
     assert metrics["search_objective"] == result["search"]["objective"]
     assert metrics["train_1_epsilon_p"] == result["epsilon_p"]
     assert (
-        metrics["model_error_over_linear_network"] == result["linear_network"]["ratio"] == pytest.approx(0.25, abs=0.01)
+        metrics["model_error_over_linear_network"]
+        == result["linear_network"]["ratio"]
+        == pytest.approx(0.25, abs=0.01)
     )
     assert curves["fitness"] == 301
     assert 20 < curves["fitness_by_simulations"] < 301  # at steps that all runs share
     assert {tags[key] for key in ("optimizer", "data", "model", "seed")} == {
-        "issa", "tibet_50pct", "third_order_exponential", "0",
-    }  # fmt: skip
+        "issa",
+        "tibet_50pct",
+        "third_order_exponential",
+        "0",
+    }
     artifacts = {path.name for path in folder.rglob("outputs/*/**/*") if path.is_file()}
     assert {"report.html", "history.csv", "result.json", "config.yaml", "MLmodel"} <= artifacts
 
@@ -130,7 +167,9 @@ def test_the_logged_model_predicts_in_a_clean_process(main_job):
         "frame = mlflow.pyfunc.load_model(sys.argv[1]).predict(pd.DataFrame({'t': t, 'U': U}));"
         "print(json.dumps([list(frame.columns), frame.P.iloc[0], frame.P.min(), frame.Q.iloc[0]]))"
     )
-    done = subprocess.run([sys.executable, "-c", program, str(model)], capture_output=True, text=True, cwd="/")
+    done = subprocess.run(
+        [sys.executable, "-c", program, str(model)], capture_output=True, text=True, cwd="/"
+    )
     assert done.returncode == 0, done.stderr
     columns, before, dipped, Q = json.loads(done.stdout.splitlines()[-1])
     result = json.loads((folder / "run" / "result.json").read_text())
@@ -154,8 +193,13 @@ def quick(tmp_path_factory):
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_does_not(quick, tmp_path):
     again, other = (run_quickly(tmp_path, f"seed={seed}") for seed in (3, 4))
-    assert quick["search"]["parameters"] == again["search"]["parameters"] != other["search"]["parameters"]
-    assert quick["parameters"] == again["parameters"] == other["parameters"]  # one estimate, whatever was searched
+    assert (
+        quick["search"]["parameters"]
+        == again["search"]["parameters"]
+        != other["search"]["parameters"]
+    )
+    # one estimate, whatever was searched
+    assert quick["parameters"] == again["parameters"] == other["parameters"]
 
 
 def test_a_held_out_event_is_judged_but_not_fitted(quick, tmp_path):
@@ -167,7 +211,13 @@ def test_a_held_out_event_is_judged_but_not_fitted(quick, tmp_path):
 
 
 def test_bounds_and_fixed_values_are_kept_and_a_value_at_its_bound_is_marked(tmp_path):
-    done = run_command(*EXACT, "model.bounds.q_v=[0.2,0.4]", "model.fixed.C=0.85", "hydra.run.dir=run", cwd=tmp_path)
+    done = run_command(
+        *EXACT,
+        "model.bounds.q_v=[0.2,0.4]",
+        "model.fixed.C=0.85",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
     assert 0.2 <= result["parameters"]["q_v"] <= 0.4
@@ -188,9 +238,18 @@ def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["optimizer=isa"], "optimizer=isa: there is no such choice; did you mean 'issa'? Available:"),
-        (["optimzer=issa"], "optimzer: the configuration has no key 'optimzer'; did you mean 'optimizer'?"),
-        (["optimizer.populatoin=9"], "'optimizer' has no key 'populatoin'; did you mean 'population'?"),
+        (
+            ["optimizer=isa"],
+            "optimizer=isa: there is no such choice; did you mean 'issa'? Available:",
+        ),
+        (
+            ["optimzer=issa"],
+            "optimzer: the configuration has no key 'optimzer'; did you mean 'optimizer'?",
+        ),
+        (
+            ["optimizer.populatoin=9"],
+            "'optimizer' has no key 'populatoin'; did you mean 'population'?",
+        ),
         (["+sede=3"], "sede: there is no such key; did you mean 'seed'?"),
         (["+optimizer.sede=3"], "optimizer 'issa' has no setting 'sede'"),
         (["seed=abc"], "seed=abc is not a whole number"),
@@ -198,13 +257,25 @@ def test_a_budget_is_spent_to_the_last_simulation(tmp_path):
         (["budget=0"], "budget=0 is out of range: it must be at least 1"),
         (["optimizer.population=1"], "optimizer.population=1 is out of range"),
         (["optimizer.acceptance=best"], "optimizer.acceptance=best is not one of"),
-        (["model/motor=electromechancal"], "there is no such choice; did you mean 'electromechanical'?"),
-        (["model.bounds.C=[0.9,0.1]"], "model.bounds.C: bounds [0.9, 0.1] must be two finite numbers, the lower one"),
+        (
+            ["model/motor=electromechancal"],
+            "there is no such choice; did you mean 'electromechanical'?",
+        ),
+        (
+            ["model.bounds.C=[0.9,0.1]"],
+            "model.bounds.C: bounds [0.9, 0.1] must be two finite numbers, the lower one",
+        ),
         (["model.bounds.C=[0.9]"], "model.bounds.C=[0.9] must be two numbers, [lower, upper]"),
-        (["model.bounds.X_prim=[0,1]"], "this model has no parameter 'X_prim'; did you mean 'X_prime'?"),
+        (
+            ["model.bounds.X_prim=[0,1]"],
+            "this model has no parameter 'X_prim'; did you mean 'X_prime'?",
+        ),
         (["model.fixed.Cc=0.5"], "model.fixed.Cc: this model has no parameter 'Cc'"),
         (["model.substeps=0"], "model.substeps=0 is out of range: it must be 1 to"),
-        (["data=tibet_40pct"], "data=tibet_40pct: there is no such choice; did you mean 'tibet_50pct'?"),
+        (
+            ["data=tibet_40pct"],
+            "data=tibet_40pct: there is no such choice; did you mean 'tibet_50pct'?",
+        ),
         (["data=csv"], "data.train"),
         (["data=csv", "data.train=[nowhere.csv]"], "nowhere.csv"),
         (["data=csv", f"data.train=[{SHIPPED}]", "data.validate=[nowhere.csv]"], "nowhere.csv"),
@@ -223,7 +294,14 @@ def test_bad_input_gets_one_sentence_and_leaves_nothing_behind(arguments, senten
 
 def test_the_papers_values_get_the_reason_they_cannot_be_simulated(tmp_path):
     """Table 2, fixed all but one: no candidate has a steady state, and Eq. (3) is named."""
-    paper = {"T_prime": 4.1354, "X_prime": 1.6654, "C": -2.6241, "M": 0.82, "T_m": 3.378, "p_v": 3.5867}
+    paper = {
+        "T_prime": 4.1354,
+        "X_prime": 1.6654,
+        "C": -2.6241,
+        "M": 0.82,
+        "T_m": 3.378,
+        "p_v": 3.5867,
+    }
     fixed = [f"model.fixed.{name}={value}" for name, value in paper.items()]
     done = run_command(*QUICK, *fixed, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 2
@@ -272,10 +350,19 @@ def test_the_help_is_short_narrow_and_tells_what_each_task_does(tmp_path):
     assert len(lines) < 60
     assert max(map(len, lines)) <= 100
     for part in (
-        "  compare         Settle which optimizer is better", "identify by default", "issa and 12 variants",
-        "ssa and 15", "pso,", "pso_limited,", "covariant_sparrow",
-        "third_order_exponential, ", " others", "tractexp list GROUP", "tractexp ui", "-m optimizer=issa,ssa,pso",
-    ):  # fmt: skip
+        "  compare         Settle which optimizer is better",
+        "identify by default",
+        "issa and 12 variants",
+        "ssa and 15",
+        "pso,",
+        "pso_limited,",
+        "covariant_sparrow",
+        "third_order_exponential, ",
+        " others",
+        "tractexp list GROUP",
+        "tractexp ui",
+        "-m optimizer=issa,ssa,pso",
+    ):
         assert part in done.stdout, part
     assert "issa_no_levy" not in done.stdout
     assert " held_out" not in done.stdout  # no group that anyone may choose
@@ -306,7 +393,10 @@ def test_the_list_tells_every_choice_as_it_is_registered_and_composed(tmp_path):
     register()
     with initialize_config_dir(str(CONF), version_base="1.3"):
         for name in told["optimizer"]:
-            assert compose("config", [f"optimizer={name}"]).optimizer.name in classes | told["optimizer"]
+            assert (
+                compose("config", [f"optimizer={name}"]).optimizer.name
+                in classes | told["optimizer"]
+            )
 
 
 def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp_path):
@@ -314,7 +404,10 @@ def test_the_list_of_a_group_begins_with_its_default_and_counts_as_people_do(tmp
     assert "optimizer: how the parameters are searched; issa by default\n  issa  " in done.stdout
     assert "issa_no_levy" not in done.stdout  # the ablation's variants do not hide what there is
     assert "12 variants: tractexp list issa\n" in done.stdout
-    assert "ISSA without the Lévy flight of Eq. (16).\n" in run_command("list", "issa", cwd=tmp_path).stdout
+    assert (
+        "ISSA without the Lévy flight of Eq. (16).\n"
+        in run_command("list", "issa", cwd=tmp_path).stdout
+    )
     assert done.stdout.index("figure3 ") < done.stdout.index("figure10 ")
     assert "model/motor" not in done.stdout
 
@@ -323,7 +416,8 @@ def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
     done = run_command("list", "optimisers", cwd=tmp_path)
     assert done.returncode == 2
     assert done.stderr.startswith(
-        "tractexp: there is no group 'optimisers'; did you mean 'optimizer'? Groups: connection, data, "
+        "tractexp: there is no group 'optimisers'; did you mean 'optimizer'? Groups: connection,"
+        " data, "
     )
     assert done.stderr.count("\n") == 1
 
@@ -331,45 +425,63 @@ def test_a_group_that_is_none_gets_the_nearest_one(tmp_path):
 def test_a_name_given_for_a_group_gets_the_groups_that_have_it(tmp_path):
     done = run_command("list", "none", cwd=tmp_path)
     assert done.stderr == (
-        "tractexp: there is no group 'none', but there is such a name in 'tractexp list model/motor' and"
+        "tractexp: there is no group 'none', but there is such a name in 'tractexp list"
+        " model/motor' and"
         " 'tractexp list model/static'\n"
     )
 
 
 def test_plugins_of_others_are_listed_and_those_that_cannot_be_imported_say_why(tmp_path):
-    """Installed as a wheel would be: a base in one module, a plugin by it in another, and two that are broken."""
+    """Installed as a wheel would be: a base in one module, a plugin by it in another, and two that
+    are broken.
+    """
     package, record = tmp_path / "late_loads", tmp_path / "late_loads-1.dist-info"
     (package / "deep").mkdir(parents=True)
     record.mkdir()
     (record / "METADATA").write_text("Metadata-Version: 2.1\nName: late_loads\nVersion: 1\n")
-    (record / "entry_points.txt").write_text("[tractexp.plugins]\nlate = late_loads\ngone = gone_loads\n")
+    (record / "entry_points.txt").write_text(
+        "[tractexp.plugins]\nlate = late_loads\ngone = gone_loads\n"
+    )
     base = "from tractexp import extend\nclass Slow(extend.Static):\n    pass\n"
-    law = '    """A load{}. That is all.\n\n    Source: here.\n    """\n    def law(self, u):\n        return u, u\n'
+    law = (
+        '    """A load{}. That is all.\n\n    Source: here.\n    """\n    def law(self, u):\n      '
+        "  return u, u\n"
+    )
     for name, text in {
-        "__init__": "", "_bases": base, "deep/__init__": "",
-        "deep/late": "from tractexp.extend import plugin\nfrom .._bases import Slow\n@plugin\nclass Late(Slow):\n"
-        + law.format(" that comes late"),
-        "missing": "import nowhere\nfrom tractexp.extend import Static, plugin\n@plugin\nclass Missing(Static):\n"
-        + law.format(" of nowhere"),
+        "__init__": "",
+        "_bases": base,
+        "deep/__init__": "",
+        "deep/late": "from tractexp.extend import plugin\nfrom .._bases import Slow\n@plugin\nclass"
+        " Late(Slow):\n" + law.format(" that comes late"),
+        "missing": "import nowhere\nfrom tractexp.extend import Static, plugin\n@plugin\nclass"
+        " Missing(Static):\n" + law.format(" of nowhere"),
         "wrong": "def f(:\n",
         "made": "from tractexp.extend import Static, plugin\n"
-        "body = {'__doc__': 'Made here. Source: here.', '__module__': __name__, 'law': lambda self, u: (u, u)}\n"
+        "body = {'__doc__': 'Made here. Source: here.', '__module__': __name__, 'law': lambda self,"
+        " u: (u, u)}\n"
         "plugin(type('Made', (Static,), body))\n",
-    }.items():  # fmt: skip
+    }.items():
         (package / f"{name}.py").write_text(text)
     (package / "conf" / "optimizer").mkdir(parents=True)
-    (package / "conf" / "optimizer" / "pso_slow.yaml").write_text("# PSO, slowed down.\ndefaults: [pso]\n")
-    done = start_command("list", "model/static", "optimizer", cwd=tmp_path, PYTHONPATH=str(tmp_path))
+    (package / "conf" / "optimizer" / "pso_slow.yaml").write_text(
+        "# PSO, slowed down.\ndefaults: [pso]\n"
+    )
+    done = start_command(
+        "list", "model/static", "optimizer", cwd=tmp_path, PYTHONPATH=str(tmp_path)
+    )
     assert (done.returncode, done.stderr) == (0, "")
     told = " ".join(done.stdout.split())
     for part in (
-        "late A load that comes late. ", "pso_slow PSO, slowed down. ",
+        "late A load that comes late. ",
+        "pso_slow PSO, slowed down. ",
         "missing cannot be used: the plugin module 'late_loads.missing' cannot be imported: ",
         "missing.py, line 1: ModuleNotFoundError: No module named 'nowhere'",
-        "left out: the plugin module 'late_loads.wrong' cannot be imported: ", "wrong.py, line 1: SyntaxError: ",
-        "left out: the plugin package 'gone_loads' (entry point 'gone') cannot be imported: ModuleNotFoundError",
+        "left out: the plugin module 'late_loads.wrong' cannot be imported: ",
+        "wrong.py, line 1: SyntaxError: ",
+        "left out: the plugin package 'gone_loads' (entry point 'gone') cannot be imported:"
+        " ModuleNotFoundError",
         "made Made here. ",
-    ):  # fmt: skip
+    ):
         assert part in told, (part, told[-1500:])
 
 
@@ -378,16 +490,25 @@ def test_help_and_configuration_load_none_of_the_heavy_libraries(tmp_path):
         program = (
             f"import sys; sys.argv = ['tractexp', *{argument.split('=')!r}];"
             "import tractexp.__main__ as m; code = m.main();"
-            "heavy = {'mlflow', 'llvmlite', 'sympy', 'scipy', 'matplotlib', 'pandas', 'comtrade'} & sys.modules.keys();"
-            "lazy = {'numpy', 'hydra', 'omegaconf'} & sys.modules.keys() if '--help' in sys.argv else {};"
+            "heavy = {'mlflow', 'llvmlite', 'sympy', 'scipy', 'matplotlib', 'pandas', 'comtrade'} &"
+            " sys.modules.keys();"
+            "lazy = {'numpy', 'hydra', 'omegaconf'} & sys.modules.keys() if '--help' in sys.argv"
+            " else {};"
             "assert not heavy and not lazy, (heavy, lazy); sys.exit(code)"
         )
-        done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True
+        )
         assert done.returncode == 0, done.stderr
 
 
 def test_the_console_script_completes_words(tmp_path):
     script = os.path.join(os.path.dirname(sys.executable), "tractexp")
-    done = subprocess.run([script, "-sc", "query=bash"], cwd=tmp_path, capture_output=True, text=True,
-                          env=os.environ | {"COMP_LINE": "tractexp optimizer=is", "COMP_POINT": "21"})  # fmt: skip
+    done = subprocess.run(
+        [script, "-sc", "query=bash"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"COMP_LINE": "tractexp optimizer=is", "COMP_POINT": "21"},
+    )
     assert "optimizer=issa" in done.stdout

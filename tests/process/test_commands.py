@@ -1,7 +1,8 @@
-"""The commands that README, CONTRIBUTING and docs show: composed and built as they stand, and the quick ones run.
+"""The commands that README, CONTRIBUTING and docs show: composed and built as they stand, and the
+quick ones run.
 
-Files that a reader has are stood in for by shipped and made ones of the same name. `test_ten_minutes.py` and
-`test_tutorial.py` run all of their pages.
+Files that a reader has are stood in for by shipped and made ones of the same name.
+`test_ten_minutes.py` and `test_tutorial.py` run all of their pages.
 """
 
 import functools
@@ -46,10 +47,13 @@ RUN = {
     and c.arguments
     and {"look", "sync", "doctor", "list", "--help", "--cfg"} & {*c.arguments}
 }
-TWO = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")  # channels of two loads
+# channels of two loads
+TWO = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")
 QUICK = ("task=export", "task=simulate", "task=convert", "task=survey")  # tasks that search nothing
 RUN |= {" ".join(a): a for a in JOBS.values() if {*QUICK} & {*a}}
-RUN |= {" ".join(a): a for a in (c.arguments or [] for c in SHOWN) if "again" in a and {*QUICK} & {*a}}
+RUN |= {
+    " ".join(a): a for a in (c.arguments or [] for c in SHOWN) if "again" in a and {*QUICK} & {*a}
+}
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +77,12 @@ def desk(tmp_path_factory):
     )
     waveforms(folder)
     (folder / "report.cev").write_bytes("\r\n".join(test_cev.report()).encode("latin-1"))
-    quick = ("optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false", "hydra.run.dir=RUN")
+    quick = (
+        "optimizer=multistart_least_squares",
+        "optimizer.starts=2",
+        "tracking.enabled=false",
+        "hydra.run.dir=RUN",
+    )
     done = run_command("data=csv", "data.train=[dip1.csv]", *quick, cwd=folder)
     assert done.returncode == 0, done.stderr
     shutil.copytree(folder / "RUN", folder / "outputs" / "RUN")
@@ -82,7 +91,9 @@ def desk(tmp_path_factory):
 
 def waveforms(folder):
     """COMTRADE files and tables of samples."""
-    dips = np.concatenate([constant(depth=0.3, length=1.5), constant(depth=0.5, length=1.5)], axis=1)
+    dips = np.concatenate(
+        [constant(depth=0.3, length=1.5), constant(depth=0.5, length=1.5)], axis=1
+    )
     V, I, nothing = dips[:3], dips[3:], np.zeros_like(dips[:1])
     many = np.concatenate([nothing, nothing, nothing, nothing, V, nothing, I])
     names = [f"X{k}" for k in range(4)] + ["UA", "UB", "UC", "X7", "IA", "IB", "IC"]
@@ -92,11 +103,18 @@ def waveforms(folder):
     write(recording(dips[[0, 3]], ("UA", "IA")), folder / "arm.cfg", "BINARY", 1999)
     for name in ("day 1/e4.cfg", "day 3/e9.cfg"):
         (folder / "recordings" / name).parent.mkdir(parents=True)
-        write(recording(np.concatenate([dips, I / 2]), TWO), folder / "recordings" / name, "BINARY", 1999)
+        write(
+            recording(np.concatenate([dips, I / 2]), TWO),
+            folder / "recordings" / name,
+            "BINARY",
+            1999,
+        )
     t = np.arange(dips.shape[1]) / 3200
     V, A = 1e3 * dips[:3], 1e3 * dips[3:]
-    for name, of in (("rec.csv", dict(zip(("ua", "ub", "uc", "ia", "ib", "ic"), (*V, *A), strict=True))),
-                     ("feeder.csv", {"u": V[0], "i": A[0]})):  # fmt: skip
+    for name, of in (
+        ("rec.csv", dict(zip(("ua", "ub", "uc", "ia", "ib", "ic"), (*V, *A), strict=True))),
+        ("feeder.csv", {"u": V[0], "i": A[0]}),
+    ):
         pandas.DataFrame({"t": t, **of}).to_csv(folder / name, index=False)
 
 
@@ -112,18 +130,26 @@ def single(argument):
 
 def composed(arguments):
     """The configuration of a command and its plugins, checked as they are before anything runs."""
-    given = [a for a in arguments if not a.startswith("-") and a != "job" and not a.startswith("hydra")]
+    given = [
+        a for a in arguments if not a.startswith("-") and a != "job" and not a.startswith("hydra")
+    ]
     config = check(*map(single, overrides(given)))
     from omegaconf import OmegaConf
 
     plain = OmegaConf.to_container(config, resolve=False)
-    return {group: build(group, plain[group]) for group in ("data", "optimizer", "objective") if plain.get(group)}
+    return {
+        group: build(group, plain[group])
+        for group in ("data", "optimizer", "objective")
+        if plain.get(group)
+    }
 
 
 @pytest.mark.parametrize("arguments", JOBS.values(), ids=JOBS)
 def test_a_job_composes_and_its_records_are_read(arguments, desk, monkeypatch):
     if "hydra/sweeper=optuna" in arguments:
-        pytest.importorskip("hydra_plugins.hydra_optuna_sweeper", reason="the extra optuna is not installed")
+        pytest.importorskip(
+            "hydra_plugins.hydra_optuna_sweeper", reason="the extra optuna is not installed"
+        )
     monkeypatch.chdir(desk)
     built = composed(arguments)
     words = " ".join(arguments)
@@ -197,8 +223,14 @@ def test_scripts_and_their_options_are_there():
     for c in ALL:
         for before, word in pairwise(["", *c.words]):
             if before.endswith("python") and word.endswith(".py") and c.page.name not in TUTORIALS:
-                path = ROOT / word if word.startswith(("benchmarks", "tests")) else ROOT / "benchmarks" / word
-                script = (path if path.is_file() else ROOT / "tests" / word).read_text(encoding="utf-8")
+                path = (
+                    ROOT / word
+                    if word.startswith(("benchmarks", "tests"))
+                    else ROOT / "benchmarks" / word
+                )
+                script = (path if path.is_file() else ROOT / "tests" / word).read_text(
+                    encoding="utf-8"
+                )
                 for option in (w for w in c.words if w.startswith("--")):
                     assert f'"{option}"' in script, c.line
                 tried += 1
@@ -207,7 +239,13 @@ def test_scripts_and_their_options_are_there():
 
 def test_extras_files_and_modules_are_there():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    asked = [extra for c in ALL for w in c.words if "pip" in c.line for extra in re.findall(r"\[(\w+)\]$", w)]
+    asked = [
+        extra
+        for c in ALL
+        for w in c.words
+        if "pip" in c.line
+        for extra in re.findall(r"\[(\w+)\]$", w)
+    ]
     assert {"test", "benchmark", "posterior", "slurm", "dask", "cmaes", "dev"} <= {*asked}
     assert {*asked} <= project["optional-dependencies"].keys()
     for name in (".ci/run", ".ci/constraints.txt", "tests/process/test_cli.py"):
@@ -234,26 +272,36 @@ def test_every_command_is_seen_to():
         "pyright",
     ]
     for c in ALL:
-        seen = c.arguments is not None or any(kind in c.line for kind in kinds) or c.words[1].endswith(".py")
+        seen = (
+            c.arguments is not None
+            or any(kind in c.line for kind in kinds)
+            or c.words[1].endswith(".py")
+        )
         assert seen, f"{c.page.name}: {c.line}"
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/records.md", "docs/model.md"])
-def test_the_python_of_a_page_runs_and_has_what_its_comments_name(page, desk, resistive_dips, tmp_path, monkeypatch):
+def test_the_python_of_a_page_runs_and_has_what_its_comments_name(
+    page, desk, resistive_dips, tmp_path, monkeypatch
+):
     """README's on dips of a motor with a stator resistance, of a few effects.
 
-    That of docs/python.md is run by `test_docs_run.py`, which investigates with the whole catalogue, that of
-    docs/plugins.md by `test_plugins.py`.
+    That of docs/python.md is run by `test_docs_run.py`, which investigates with the whole
+    catalogue, that of docs/plugins.md by `test_plugins.py`.
     """
     monkeypatch.chdir(desk)
     if page == "README.md":
-        few = functools.partial(tractexp.investigate, effects=("stator_resistance", "exponential_recovery"))
+        few = functools.partial(
+            tractexp.investigate, effects=("stator_resistance", "exponential_recovery")
+        )
         monkeypatch.setattr(tractexp, "investigate", few)
         monkeypatch.chdir(tmp_path)
         for path in resistive_dips:
             shutil.copy(path, tmp_path)
     names = {}
-    for example in re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL):
+    for example in re.findall(
+        r"```python\n(.*?)```", (ROOT / page).read_text(encoding="utf-8"), flags=re.DOTALL
+    ):
         exec(compile(example, page, "exec"), names)
     if page == "README.md":
         assert names["found"].names == ("stator_resistance",)
@@ -264,4 +312,6 @@ def test_the_python_of_a_page_runs_and_has_what_its_comments_name(page, desk, re
         assert all(hasattr(names["event"], name) for name in told)
         told = ("t", "U", "P", "Q", "f", "U2", "base", "window", "more", "notes")
         assert all(hasattr(names["event"].record, name) for name in told)
-        assert all(hasattr(names["seen"], name) for name in ("feeders", "events", "commands", "report"))
+        assert all(
+            hasattr(names["seen"], name) for name in ("feeders", "events", "commands", "report")
+        )

@@ -30,10 +30,14 @@ SCREENSHOT = Path(__file__).parents[2] / "outputs" / "mlflow_comparison.png"
 
 
 def log(uri, run, parent=None, variant=None, **tags):
-    """Log a run as `task=identify` does: the estimate, half as far off as the search that it is polished from."""
+    """Log a run as `task=identify` does: the estimate, half as far off as the search that it is
+    polished from.
+    """
     ended = {key: getattr(run, key) for key in ("objective", "epsilon_p", "epsilon_q")}
     ended |= {"seconds": run.seconds[-1], "simulations": run.simulations[-1]}
-    metrics = {key: 0.5 * value for key, value in ended.items()} | {f"search_{k}": v for k, v in ended.items()}
+    metrics = {key: 0.5 * value for key, value in ended.items()} | {
+        f"search_{k}": v for k, v in ended.items()
+    }
     variant = variant or run.optimizer
     logged = tracking.TrackedRun(
         EXPERIMENT,
@@ -59,12 +63,16 @@ def log(uri, run, parent=None, variant=None, **tags):
 
 @pytest.fixture(scope="module")
 def filled(tmp_path_factory, empty_store):
-    """A folder with a store: a sweep of two variants and its own run, which is no identification."""
+    """A folder with a store: a sweep of two variants and its own run, which is no
+    identification.
+    """
     folder = tmp_path_factory.mktemp("filled")
     (folder / "outputs").mkdir()
     shutil.copy(empty_store, folder / "outputs")
     uri = tracking.default_uri(folder)
-    parent = tracking.start_parent(tracking.TrackedRun(EXPERIMENT, "sweep", tags={"task": "identify"}), uri)
+    parent = tracking.start_parent(
+        tracking.TrackedRun(EXPERIMENT, "sweep", tags={"task": "identify"}), uri
+    )
     runs = samples({"issa": 1.0, "ssa": 3.0}, seeds=range(8))
     for run in runs:
         log(uri, run, parent)
@@ -108,15 +116,23 @@ def test_more_runs_than_a_page_holds_come_all_and_oldest_first(filled, monkeypat
 
 def test_the_command_compares_what_a_filter_finds_and_logs_the_page(filled):
     folder, uri, _, _ = filled
-    done = compare_command("task.filter=\"tags.data = 'tibet_50pct'\"", "hydra.run.dir=out", cwd=folder)
+    done = compare_command(
+        "task.filter=\"tags.data = 'tibet_50pct'\"", "hydra.run.dir=out", cwd=folder
+    )
     assert (done.returncode, done.stderr) == (0, "")
-    assert "issa has the lowest median objective; it is significantly better than ssa." in done.stdout
+    assert (
+        "issa has the lowest median objective; it is significantly better than ssa." in done.stdout
+    )
     (run,) = find(uri, "tags.task = 'compare'")
     assert (run.experiment, run.tags["data"]) == ("compare tibet_50pct", "tibet_50pct")
     from mlflow import MlflowClient
 
-    assert {f.path for f in MlflowClient(uri).list_artifacts(run.run_id)} == {"comparison.html", "comparison.json"}
-    assert len(load.from_logged(find(uri, "tags.data = 'tibet_50pct'"), "x")) == 16  # the comparison is none of them
+    assert {f.path for f in MlflowClient(uri).list_artifacts(run.run_id)} == {
+        "comparison.html",
+        "comparison.json",
+    }
+    # the comparison is none of them
+    assert len(load.from_logged(find(uri, "tags.data = 'tibet_50pct'"), "x")) == 16
 
 
 def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
@@ -128,7 +144,10 @@ def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
     assert "logged on the run of the sweep" in done.stdout
     from mlflow import MlflowClient
 
-    assert {f.path for f in MlflowClient(uri).list_artifacts(parent)} == {"comparison.html", "comparison.json"}
+    assert {f.path for f in MlflowClient(uri).list_artifacts(parent)} == {
+        "comparison.html",
+        "comparison.json",
+    }
     assert MlflowClient(uri).get_run(parent).info.status == "FINISHED"
     assert not attach("0" * 32, uri, [])
 
@@ -136,11 +155,17 @@ def test_the_page_of_a_sweep_is_added_to_the_run_of_the_sweep(filled):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (("task.filter=\"tags.data = 'no'\"",), "the filter tags.data = 'no' matches no run of task=identify"),
+        (
+            ("task.filter=\"tags.data = 'no'\"",),
+            "the filter tags.data = 'no' matches no run of task=identify",
+        ),
         (("task.filter=nonsense",), "task.filter=nonsense is not a filter that MLflow understands"),
-        (("task.filter=\"tags.seed = '1'\"", "tracking.experiment=identify"), "has no experiment 'identify'; did"),
+        (
+            ("task.filter=\"tags.seed = '1'\"", "tracking.experiment=identify"),
+            "has no experiment 'identify'; did",
+        ),
     ],
-)  # fmt: skip
+)
 def test_a_filter_that_finds_nothing_is_one_sentence(filled, arguments, sentence):
     done = compare_command(*arguments, cwd=filled[0])
     assert done.returncode == 2
@@ -163,7 +188,9 @@ def test_a_run_that_failed_in_mlflow_is_a_failure(filled):
 def viewed(uri, mode="CHART"):
     """The view that is stored in the newest experiment."""
     page = comparison_view(uri)
-    experiment = re.fullmatch(rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}", page)[1]
+    experiment = re.fullmatch(
+        rf"#/experiments/(\d+)/runs\?viewStateShareKey=tractexp&compareRunsMode={mode}", page
+    )[1]
     from mlflow import MlflowClient
 
     kind, _, packed = MlflowClient(uri).get_experiment(experiment).tags[TAG].partition(";")
@@ -174,12 +201,20 @@ def viewed(uri, mode="CHART"):
 def test_the_view_groups_by_variant_and_draws_fitness_curves(filled):
     state = viewed(filled[1])
     assert state["groupBy"] == {
-        "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": "variant"}],
-    }  # fmt: skip
+        "aggregateFunction": "average",
+        "groupByKeys": [{"mode": "tag", "groupByData": "variant"}],
+    }
     assert state["groupsExpanded"] == {"tag.variant.issa": False, "tag.variant.ssa": False}
     charts = {chart["metricKey"]: chart for chart in state["compareRunCharts"]}
     assert list(charts)[:2] == ["fitness_by_simulations", "fitness"]
-    for metric in ("fitness_by_simulations", "fitness", "search_objective", "objective", "epsilon_p", "epsilon_q"):
+    for metric in (
+        "fitness_by_simulations",
+        "fitness",
+        "search_objective",
+        "objective",
+        "epsilon_p",
+        "epsilon_q",
+    ):
         assert charts[metric]["scaleType"] == "log", metric
     columns = [name.strip("`") for name in state["selectedColumns"]]
     for name in ("objective", "epsilon_p", "epsilon_q", "search_objective"):
@@ -189,7 +224,9 @@ def test_the_view_groups_by_variant_and_draws_fitness_curves(filled):
 def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error(uri):
     """Averages over loads would mean nothing."""
     for run, feeder in zip(
-        samples({"issa": 1.0}, seeds=range(2)), ("North, T1, dip 1", "North, T2, dip 1"), strict=True
+        samples({"issa": 1.0}, seeds=range(2)),
+        ("North, T1, dip 1", "North, T2, dip 1"),
+        strict=True,
     ):
         log(uri, run, load=feeder)
     assert comparison_view(uri).endswith("&compareRunsMode=TABLE")
@@ -197,15 +234,24 @@ def test_the_view_of_a_station_is_a_table_of_its_loads_that_sorts_by_model_error
     assert state["groupBy"] is None
     assert state["orderByKey"] == "metrics.`model_error`"
     assert [column.split("`")[1] for column in state["selectedColumns"]][:5] == [
-        "model_error", "model_error_held_out", "model_error_over_linear_network", "epsilon_p", "epsilon_q",
-    ]  # fmt: skip
+        "model_error",
+        "model_error_held_out",
+        "model_error_over_linear_network",
+        "epsilon_p",
+        "epsilon_q",
+    ]
     assert "tags.`load`" in state["selectedColumns"]
 
 
 def test_two_settings_of_one_optimizer_are_two_groups_of_the_view(uri):
-    for run, variant in zip(samples({"issa": 1.0}, seeds=range(2)), ("issa", "issa population=30"), strict=True):
+    for run, variant in zip(
+        samples({"issa": 1.0}, seeds=range(2)), ("issa", "issa population=30"), strict=True
+    ):
         log(uri, run, variant=variant)
-    assert set(viewed(uri)["groupsExpanded"]) == {"tag.variant.issa", "tag.variant.issa population=30"}
+    assert set(viewed(uri)["groupsExpanded"]) == {
+        "tag.variant.issa",
+        "tag.variant.issa population=30",
+    }
 
 
 def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(uri):
@@ -214,11 +260,16 @@ def test_runs_logged_before_variants_had_a_tag_are_grouped_by_optimizer_too(uri)
     from mlflow import MlflowClient
 
     MlflowClient(uri).delete_tag(run_id, "variant")
-    assert [key["groupByData"] for key in viewed(uri)["groupBy"]["groupByKeys"]] == ["variant", "optimizer"]
+    assert [key["groupByData"] for key in viewed(uri)["groupBy"]["groupByKeys"]] == [
+        "variant",
+        "optimizer",
+    ]
 
 
 def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
-    """The parameters that the search ended at, and its seconds; without the files the curve stands in."""
+    """The parameters that the search ended at, and its seconds; without the files the curve stands
+    in.
+    """
     (run,) = samples({"issa": 1.0}, seeds=range(1))
     search = {"parameters": {"C": 0.7}, "per_event": {"T_m": [0.3, 0.4]}}
     (tmp_path / "result.json").write_text(json.dumps({"parameters": {"C": 0.9}, "search": search}))
@@ -226,12 +277,26 @@ def test_files_of_a_run_tell_what_its_metrics_do_not(tmp_path, uri):
         f"{k},{n:.0f},{0.02 * k:.4f},{f!r}"
         for k, (n, f) in enumerate(zip(run.simulations, run.history.tolist(), strict=True))
     ]
-    (tmp_path / "history.csv").write_text("\n".join(["iteration,simulations,seconds,objective", *rows]))
+    (tmp_path / "history.csv").write_text(
+        "\n".join(["iteration,simulations,seconds,objective", *rows])
+    )
     tags = {"task": "identify", "optimizer": "issa", "data": "tibet_50pct", "seed": "0"}
-    metrics = {"objective": 1.0, "search_objective": 2.0, "epsilon_p": 0.1, "epsilon_q": 0.1, "seconds": 9.0}
+    metrics = {
+        "objective": 1.0,
+        "search_objective": 2.0,
+        "epsilon_p": 0.1,
+        "epsilon_q": 0.1,
+        "seconds": 9.0,
+    }
     curves = {"fitness_by_simulations": tracking.at_common_steps(run.simulations, run.history)}
     made = tracking.TrackedRun(
-        EXPERIMENT, "r", {}, metrics, curves, tags, [tmp_path / "result.json", tmp_path / "history.csv"]
+        EXPERIMENT,
+        "r",
+        {},
+        metrics,
+        curves,
+        tags,
+        [tmp_path / "result.json", tmp_path / "history.csv"],
     )
     tracking.log(made, uri)
     (logged,) = find(uri, "tags.seed = '0'")
@@ -250,10 +315,13 @@ def test_a_page_logged_elsewhere_is_told_how_to_be_seen(tmp_path, empty_store):
     shutil.copy(empty_store, tmp_path / "x.db")
     runs = [
         replace(r, config=r.config | {"optimizer.population": n})
-        for n in (30, 50) for r in samples({"issa": 1.0}, seeds=range(6))
-    ]  # fmt: skip
+        for n in (30, 50)
+        for r in samples({"issa": 1.0}, seeds=range(6))
+    ]
     write_sweep(tmp_path / "swept", runs)
-    done = compare_command("task.sweep=swept", "hydra.run.dir=out", "tracking.uri=sqlite:///x.db", cwd=tmp_path)
+    done = compare_command(
+        "task.sweep=swept", "hydra.run.dir=out", "tracking.uri=sqlite:///x.db", cwd=tmp_path
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
     (run,) = find(tracking.address(f"sqlite:///{tmp_path}/x.db"), "tags.task = 'compare'")
@@ -273,13 +341,20 @@ def test_a_view_that_cannot_be_stored_opens_on_the_plain_page(monkeypatch, capsy
 
     monkeypatch.setattr(view, "comparison_view", refuse)
     assert ui._page("sqlite:///x.db") == ""
-    assert "because the comparison view could not be stored: the store is of another version" in capsys.readouterr().out
+    assert (
+        "because the comparison view could not be stored: the store is of another version"
+        in capsys.readouterr().out
+    )
 
 
 @pytest.mark.skipif(os.name == "nt", reason="ends the server by a signal")
 def test_the_page_opened_shows_the_comparison(filled, tmp_path):
     """In a real browser: what is promised of `tractexp ui`. The screenshot stays in outputs/."""
-    browser = shutil.which("chromium") or shutil.which("google-chrome") or shutil.which("chromium-browser")
+    browser = (
+        shutil.which("chromium")
+        or shutil.which("google-chrome")
+        or shutil.which("chromium-browser")
+    )
     if browser is None:
         pytest.skip("no Chromium on this machine")
     folder, _, _, _ = filled
@@ -290,10 +365,19 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
     try:
         page = address(server, tmp_path / "log")
         arguments = [
-            browser, "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
-            "--disable-background-networking", "--disable-component-update", "--disable-sync",
-            f"--user-data-dir={tmp_path / 'profile'}", "--virtual-time-budget=300000", "--window-size=1900,1100",
-        ]  # fmt: skip
+            browser,
+            "--headless=new",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            f"--user-data-dir={tmp_path / 'profile'}",
+            "--virtual-time-budget=300000",
+            "--window-size=1900,1100",
+        ]
         SCREENSHOT.parent.mkdir(exist_ok=True)
         command = [*arguments, "--dump-dom", f"--screenshot={SCREENSHOT}", page]
         seen = subprocess.run(command, capture_output=True, text=True, timeout=240, check=True)
@@ -301,7 +385,13 @@ def test_the_page_opened_shows_the_comparison(filled, tmp_path):
         server.send_signal(signal.SIGTERM)
         server.wait(30)
     words = re.sub(r"<[^>]*>", " ", seen.stdout)
-    for part in ("Group: issa", "Group: ssa", "Group by: variant", "fitness_by_simulations", "16 matching runs"):
+    for part in (
+        "Group: issa",
+        "Group: ssa",
+        "Group by: variant",
+        "fitness_by_simulations",
+        "16 matching runs",
+    ):
         assert part in re.sub(r"\s+", " ", words), part
     assert "issa (fitness)" in words  # a curve by optimizer, in the legend
     assert SCREENSHOT.stat().st_size > 50_000

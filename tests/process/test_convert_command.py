@@ -8,7 +8,13 @@ from tractexp.filetypes.tidy import write_record
 
 def test_on_the_command_line(tmp_path):
     write_record(a_record(), tmp_path / "dip.csv")
-    asked = ("task=convert", "task.to=parquet", "data=csv", "data.path=dip.csv", "hydra.run.dir=out")
+    asked = (
+        "task=convert",
+        "task.to=parquet",
+        "data=csv",
+        "data.path=dip.csv",
+        "hydra.run.dir=out",
+    )
     done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "there_dip2.parquet: 200 samples of t, U, P, Q, f, U2" in done.stdout

@@ -1,4 +1,6 @@
-"""The wheel and the sdist: two builds are the same to the byte, and they hold the package and nothing else."""
+"""The wheel and the sdist: two builds are the same to the byte, and they hold the package and
+nothing else.
+"""
 
 import os
 import shutil
@@ -37,7 +39,9 @@ def built(folder: Path, umask: int, *kinds: str) -> dict[str, bytes]:
     """{suffix: content} of what is built there."""
     environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
     command = [sys.executable, "-m", "build", "--no-isolation", "--outdir", "made", *kinds, "."]
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, umask=umask, env=environment)
+    done = subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, umask=umask, env=environment
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return {path.suffix: path.read_bytes() for path in (folder / "made").iterdir()}
 
@@ -65,7 +69,12 @@ def test_the_wheel_holds_the_package_and_nothing_else(first):
     assert tops == {"tractexp", "tractexp_plugins"}
     inside = [name for name in names if not name.parts[0].endswith(".dist-info")]
     assert {name.suffix for name in inside} == KINDS
-    sources = [p for name in FOLDERS for p in (ROOT / name).rglob("*") if p.is_file() and "__pycache__" not in p.parts]
+    sources = [
+        p
+        for name in FOLDERS
+        for p in (ROOT / name).rglob("*")
+        if p.is_file() and "__pycache__" not in p.parts
+    ]
     assert Counter(name.name for name in inside) == Counter(path.name for path in sources)
 
 
@@ -78,4 +87,6 @@ def test_the_sdist_holds_what_the_wheel_is_built_of_and_nobody(first):
     parts = [Path(m.name).parts for m in members if m.isfile()]
     top = {path[1] for path in parts}
     assert top == {*TOP, *FOLDERS, "PKG-INFO", "setup.cfg", "tractexp.egg-info"}
-    assert not any("__pycache__" in path or path[-1].endswith((".pyc", ".so", ".log")) for path in parts)
+    assert not any(
+        "__pycache__" in path or path[-1].endswith((".pyc", ".so", ".log")) for path in parts
+    )

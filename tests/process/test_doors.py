@@ -1,6 +1,8 @@
-"""Every file that somebody else may have written, in every shape that none should have, at the door that reads it.
+"""Every file that somebody else may have written, in every shape that none should have, at the door
+that reads it.
 
-It is read, left out, or refused in one sentence: no other exception, no wait, no memory beyond what is there.
+It is read, left out, or refused in one sentence: no other exception, no wait, no memory beyond what
+is there.
 """
 
 import contextlib
@@ -26,7 +28,8 @@ if os.name == "nt":
 
 DATA = Path(tractexp.data.__file__).parent
 SECONDS = 30  # of one reading, on a machine that is busy with others
-MEMORY = 6 << 30  # bytes of addresses of this process while it reads: a sparse file of 3 GB is not read whole
+# bytes of addresses of this process while it reads: a sparse file of 3 GB is not read whole
+MEMORY = 6 << 30
 LAUGHS = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
     f"a{k + 1}: &a{k + 1} [{', '.join(10 * [f'*a{k}'])}]\n" for k in range(9)
 )
@@ -59,7 +62,11 @@ SHAPES: dict[str, Callable[[Path], object]] = {
     "pipe": lambda path: (path.unlink(), os.mkfifo(path)),
     "link to nowhere": lambda path: (path.unlink(), path.symlink_to("absent")),
     "link to a device": lambda path: (path.unlink(), path.symlink_to("/dev/zero")),
-    "link to a pipe": lambda path: (path.unlink(), os.mkfifo(f"{path}.pipe"), path.symlink_to(f"{path}.pipe")),
+    "link to a pipe": lambda path: (
+        path.unlink(),
+        os.mkfifo(f"{path}.pipe"),
+        path.symlink_to(f"{path}.pipe"),
+    ),
     "cycle": cycled,
     "socket": lambda path: (path.unlink(), socketed(path)),
     "folder": lambda path: (path.unlink(), path.mkdir()),
@@ -70,7 +77,9 @@ SHAPES: dict[str, Callable[[Path], object]] = {
     "brackets": lambda path: path.write_text("[" * 200_000),
     "a number": lambda path: path.write_text("5"),
     "a list": lambda path: path.write_text("[1, [2], {}]"),
-    "keys of others": lambda path: path.write_text('{"a": {"b": null}, "task": [], "hydra": 5, "run": {}}'),
+    "keys of others": lambda path: path.write_text(
+        '{"a": {"b": null}, "task": [], "hydra": 5, "run": {}}'
+    ),
     "zeros": lambda path: path.write_bytes(bytes(5000)),
     "no text": lambda path: path.write_bytes(bytes(range(128, 256)) * 50),
 }
@@ -82,18 +91,32 @@ SHAPES: dict[str, Callable[[Path], object]] = {
 def run_of(folder: Path) -> Path:
     """The folder of a run and of a sweep's job, with all that is read of either."""
     (folder / ".hydra").mkdir(parents=True)
-    runtime = {"cwd": str(folder), "config_sources": [], "choices": {"optimizer": "pso", "data": "tibet"}}
+    runtime = {
+        "cwd": str(folder),
+        "config_sources": [],
+        "choices": {"optimizer": "pso", "data": "tibet"},
+    }
     contents = {
-        "hydra.yaml": {"hydra": {"runtime": runtime}}, "overrides.yaml": ["seed=1"],
+        "hydra.yaml": {"hydra": {"runtime": runtime}},
+        "overrides.yaml": ["seed=1"],
         "config.yaml": {"task": {"name": "identify"}, "seed": 1, "optimizer": {"name": "pso"}},
-    }  # fmt: skip
+    }
     for name, content in contents.items():
         (folder / ".hydra" / name).write_text(yaml.safe_dump(content))
     ended = {"objective": 1.0, "epsilon_p": 1.0, "epsilon_q": 1.0, "parameters": {"C": 0.9}}
     (folder / "result.json").write_text(json.dumps(ended))
-    (folder / "history.csv").write_text("iteration,simulations,seconds,objective\n0,20,0.1,2\n1,40,0.2,1\n")
-    status = {"status": "finished", "message": "", "configuration": "a", "inputs": "b", "seconds": 1.0,
-              "choices": {"optimizer": "pso"}, "seed": 1}  # fmt: skip
+    (folder / "history.csv").write_text(
+        "iteration,simulations,seconds,objective\n0,20,0.1,2\n1,40,0.2,1\n"
+    )
+    status = {
+        "status": "finished",
+        "message": "",
+        "configuration": "a",
+        "inputs": "b",
+        "seconds": 1.0,
+        "choices": {"optimizer": "pso"},
+        "seed": 1,
+    }
     (folder / "status.json").write_text(json.dumps(status))
     (folder / "sweep.json").write_text(json.dumps({"run": "x"}))
     return folder
@@ -118,7 +141,11 @@ def kept(folder: Path) -> Path:
     from tractexp.tracking import TrackedRun
     from tractexp.tracking.runfile import save
 
-    save(run_of(folder), TrackedRun("e", "one", artifacts=[folder / "result.json"]), "sqlite:///absent.db")
+    save(
+        run_of(folder),
+        TrackedRun("e", "one", artifacts=[folder / "result.json"]),
+        "sqlite:///absent.db",
+    )
     return folder
 
 
@@ -141,7 +168,9 @@ def records(folder: Path) -> Path:
 
 def model_of(folder: Path) -> Path:
     folder.mkdir(parents=True)
-    (folder / "m.yaml").write_text("defaults: [{motor: electromechanical}, {static: exponential}, _self_]\n")
+    (folder / "m.yaml").write_text(
+        "defaults: [{motor: electromechanical}, {static: exponential}, _self_]\n"
+    )
     return folder
 
 
@@ -188,7 +217,9 @@ DOORS = [  # the file, the folder that holds it as it should be, and what reads 
 
 @contextlib.contextmanager
 def limited() -> Iterator[None]:
-    """Raise `TimeoutError` for what waits, and `MemoryError` for what takes more than there should be."""
+    """Raise `TimeoutError` for what waits, and `MemoryError` for what takes more than there should
+    be.
+    """
 
     def late(*_):
         raise TimeoutError(f"it takes more than {SECONDS} s")
@@ -219,7 +250,9 @@ def outcome(read: Callable[[Path], object], folder: Path) -> str:
     return ""
 
 
-@pytest.mark.parametrize(("name", "made", "read"), DOORS, ids=[f"{name} {read.__name__}" for name, _, read in DOORS])
+@pytest.mark.parametrize(
+    ("name", "made", "read"), DOORS, ids=[f"{name} {read.__name__}" for name, _, read in DOORS]
+)
 def test_every_shape_of_a_file_is_read_left_or_refused(name, made, read, tmp_path):
     assert outcome(read, made(tmp_path / "as it should be" / "0")) == ""
     found = {}
@@ -231,20 +264,51 @@ def test_every_shape_of_a_file_is_read_left_or_refused(name, made, read, tmp_pat
     assert {shape: why for shape, why in found.items() if why} == {}
 
 
-# Fuzzing that knows structure: a tree as it should be, of which a few nodes are exchanged, taken out or added
+# Fuzzing that knows structure: a tree as it should be, of which a few nodes are exchanged, taken
+# out or added
 
 POOL = (
-    None, True, 0, -1, 2**70, 1e308, "", "x", "${oc.env:HOME}", "../..", "\x1b[31mred", "a\nnext: b", [], {}, [[]],
-    {"a": None}, {"_target_": "os.system"}, "x" * 10_000, [*range(1000)], "9" * 400, "sqlite:////x.db", "NaN",
-)  # fmt: skip
-TREES = [door for door in DOORS if door[0].endswith((".json", ".yaml")) and not door[0].startswith("tibet")]
+    None,
+    True,
+    0,
+    -1,
+    2**70,
+    1e308,
+    "",
+    "x",
+    "${oc.env:HOME}",
+    "../..",
+    "\x1b[31mred",
+    "a\nnext: b",
+    [],
+    {},
+    [[]],
+    {"a": None},
+    {"_target_": "os.system"},
+    "x" * 10_000,
+    [*range(1000)],
+    "9" * 400,
+    "sqlite:////x.db",
+    "NaN",
+)
+TREES = [
+    door
+    for door in DOORS
+    if door[0].endswith((".json", ".yaml")) and not door[0].startswith("tibet")
+]
 QUICK_CASES = 300
 
 
 def places(node, path=()) -> Iterator[tuple]:
     """The paths of all nodes of a tree."""
     yield path
-    inner = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    inner = (
+        node.items()
+        if isinstance(node, dict)
+        else enumerate(node)
+        if isinstance(node, list)
+        else ()
+    )
     for key, value in inner:
         yield from places(value, (*path, key))
 

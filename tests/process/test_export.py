@@ -1,4 +1,6 @@
-"""Exports: the T-circuit gives back what was identified, each file is read back, ANDES agrees, refusals are clear."""
+"""Exports: the T-circuit gives back what was identified, each file is read back, ANDES agrees,
+refusals are clear.
+"""
 
 import dataclasses
 import itertools
@@ -24,9 +26,23 @@ from tractexp.plugin import build, discover
 
 OMEGA = 2 * np.pi * 50
 VALUES = {
-    "T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "R_s": 0.02, "T_second": 0.01,
-    "X_second": 0.18, "p_v": 1.4, "q_v": 3.0, "a_Z": 0.4, "a_I": 0.3, "b_Z": 0.7, "b_I": 0.2, "p_f": 1.3, "q_f": -1.1,
-}  # fmt: skip
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "R_s": 0.02,
+    "T_second": 0.01,
+    "X_second": 0.18,
+    "p_v": 1.4,
+    "q_v": 3.0,
+    "a_Z": 0.4,
+    "a_I": 0.3,
+    "b_Z": 0.7,
+    "b_I": 0.2,
+    "p_f": 1.3,
+    "q_f": -1.1,
+}
 BEFORE = {"U0": 0.98, "P0": 1.0, "Q0": 0.6, "frequency": 50.0}
 
 
@@ -88,23 +104,31 @@ def test_the_circuit_draws_what_the_model_draws_before_the_event():
 def test_the_andes_tables_hold_the_load(motor, static):
     tables = json.loads(write("andes", identified(motor, static, bus=7, power=50.0)))
     assert tables["Bus"][0]["idx"] == 7
-    assert {"electromechanical": "Motor3" in tables, "double_cage": "Motor5" in tables}.get(motor, True)
+    assert {"electromechanical": "Motor3" in tables, "double_cage": "Motor5" in tables}.get(
+        motor, True
+    )
     law = tables["FLoad" if static == "exponential" else "ZIP"][0]
     if static != "exponential":
         assert law["kpz"] + law["kpi"] + law["kpp"] == pytest.approx(100)
         assert law["kqz"] + law["kqi"] + law["kqp"] == pytest.approx(100)
     drawn = VALUES["T_m"] if motor != "none" else 0.0
-    assert tables["PQ"][0]["p0"] == pytest.approx((1.0 - drawn) / 2, rel=1e-9)  # 50 MVA on ANDES's 100
+    # 50 MVA on ANDES's 100
+    assert tables["PQ"][0]["p0"] == pytest.approx((1.0 - drawn) / 2, rel=1e-9)
     if motor == "electromechanical":
         assert tables["Motor3"][0]["Hm"] == pytest.approx(0.006 * OMEGA / 2)
-        assert tables["Motor3"][0]["c1"] == pytest.approx(VALUES["T_m"] / 2)  # ANDES does not convert it
+        # ANDES does not convert it
+        assert tables["Motor3"][0]["c1"] == pytest.approx(VALUES["T_m"] / 2)
 
 
 def dyr(text):
-    """{model: (bus, load, constants)} of a .dyr file, read by its own rules: free format, records end with a slash."""
+    """{model: (bus, load, constants)} of a .dyr file, read by its own rules: free format, records
+    end with a slash.
+    """
     records = {}
     for record in text.split("/")[:-1]:
-        bus, model, load, *constants = [field.strip() for field in record.replace("\n", " ").split(",")]
+        bus, model, load, *constants = [
+            field.strip() for field in record.replace("\n", " ").split(",")
+        ]
         records[model.strip("'")] = int(bus), load.strip("'"), [float(c) for c in constants]
     return records
 
@@ -124,7 +148,9 @@ def test_the_dyr_motor_gives_back_what_was_identified(motor):
 
 @pytest.mark.parametrize("static", ["exponential", "zip", "constant_impedance", "constant_power"])
 def test_the_dyr_static_load_is_its_law(static):
-    """IEELBL normalized by the power before, P = P_0 sum(a V^n)/sum(a V_0^n), against our own simulation."""
+    """IEELBL normalized by the power before, P = P_0 sum(a V^n)/sum(a V_0^n), against our own
+    simulation.
+    """
     text = write("psse_dyr", identified("none", static))
     _, _, c = dyr(text)["IEELBL"]
     U = np.array([0.98, 0.8, 0.5, 1.05])
@@ -132,18 +158,26 @@ def test_the_dyr_static_load_is_its_law(static):
     of = identified("none", static)
     response = of.model.simulate(Drive.of([event]), [[of.values[name] for name in of.model.names]])
     for power, start, exponents, before in ((response.P, 0, 8, 1.0), (response.Q, 3, 11, 0.6)):
-        law = lambda V, start=start, exponents=exponents: sum(c[start + k] * V ** c[exponents + k] for k in range(3))  # noqa: E731
+
+        def law(V, start=start, exponents=exponents):
+            return sum(c[start + k] * V ** c[exponents + k] for k in range(3))
+
         assert power[0] == pytest.approx(before * law(U) / law(0.98), rel=1e-6)
     assert c[6:8] == [0, 0]
 
 
 def modelica(text):
-    """Parameters, start values and equations of our flat Modelica, read as text; expressions as Python functions."""
+    """Parameters, start values and equations of our flat Modelica, read as text; expressions as
+    Python functions.
+    """
     numbers = dict(re.findall(r"parameter Real (\w+) = ([-\d.e+]+)", text))
     starts = dict(re.findall(r"^  Real (\w+)\(start = ([-\d.e+]+), fixed = true\);", text, re.M))
     equations = re.findall(r"^  (\S+) = (.*);$", text.split("\nequation\n")[1], re.M)
-    return ({k: float(v) for k, v in numbers.items()}, {k: float(v) for k, v in starts.items()},
-            {left: compile(right.replace("^", "**"), left, "eval") for left, right in equations})  # fmt: skip
+    return (
+        {k: float(v) for k, v in numbers.items()},
+        {k: float(v) for k, v in starts.items()},
+        {left: compile(right.replace("^", "**"), left, "eval") for left, right in equations},
+    )
 
 
 @pytest.mark.parametrize(
@@ -159,7 +193,9 @@ def modelica(text):
     ],
 )
 def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
-    """The file's own equations, integrated by SciPy, against the kernel: the round trip of the whole model."""
+    """The file's own equations, integrated by SciPy, against the kernel: the round trip of the
+    whole model.
+    """
     load = identified(motor, static, effects)
     text = write("modelica", load)
     assert text.startswith("model TractionLoad ")
@@ -173,7 +209,9 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
 
     def evaluate(left, at, x):
         inputs = {"U": float(smooth(at)), "omega_s": float(np.interp(at, t, speed))}
-        return eval(equations[left], {}, names | numbers | inputs | dict(zip(starts, x, strict=True)))
+        return eval(
+            equations[left], {}, names | numbers | inputs | dict(zip(starts, x, strict=True))
+        )
 
     slopes = [f"der({name})" for name in starts]
     x, rows = np.array(list(starts.values())), []
@@ -184,7 +222,9 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
             x = solve_ivp(f, (a, b), x, method="DOP853", rtol=1e-9, atol=1e-11).y[:, -1]
     P, Q = np.array(rows).T
     event = Excitation(2e-3, U, P, Q, 0.98, 1.0, 0.6, speed, 0.0, OMEGA)
-    response = load.model.simulate(Drive.of([event]), [[load.values[name] for name in load.model.names]], 16)
+    response = load.model.simulate(
+        Drive.of([event]), [[load.values[name] for name in load.model.names]], 16
+    )
     assert pytest.approx(P, abs=1e-6) == response.P[0]
     assert pytest.approx(Q, abs=1e-6) == response.Q[0]
 
@@ -202,8 +242,10 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
         (
             "powerfactory",
             ("double_cage", "zip"),
-            "cannot represent the motor 'double_cage': no open reader of DGS names the columns of a second cage; it"
-            " can represent electromechanical, none, stator_flux; task.format=andes, modelica or psse_dyr can represent"
+            "cannot represent the motor 'double_cage': no open reader of DGS names the columns of a"
+            " second cage; it"
+            " can represent electromechanical, none, stator_flux; task.format=andes, modelica or"
+            " psse_dyr can represent"
             " 'double_cage'",
         ),
         (
@@ -211,7 +253,11 @@ def test_the_modelica_text_simulates_as_our_kernel_does(motor, static, effects):
             ("electromechanical", "zip", ("time_skew",)),
             "cannot represent the effect 'time_skew'; it can represent stator_resistance",
         ),
-        ("psse_dyr", ("none", "exponential_frequency"), "cannot represent the static load 'exponential_frequency'"),
+        (
+            "psse_dyr",
+            ("none", "exponential_frequency"),
+            "cannot represent the static load 'exponential_frequency'",
+        ),
         (
             "andes",
             ("electromechanical", "zip", ("undervoltage_trip",)),
@@ -244,8 +290,13 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
     identified().result.write(tmp_path / "result.json")
     formats = (("andes", "json"), ("psse_dyr", "dyr"), ("modelica", "mo"), ("powerfactory", "dgs"))
     for name, suffix in formats:
-        done = run_command("task=export", "task.parameters=result.json", f"task.format={name}", f"hydra.run.dir={name}",
-                        cwd=tmp_path)  # fmt: skip
+        done = run_command(
+            "task=export",
+            "task.parameters=result.json",
+            f"task.format={name}",
+            f"hydra.run.dir={name}",
+            cwd=tmp_path,
+        )
         assert done.returncode == 0, done.stderr
         assert {p.name for p in (tmp_path / name).iterdir()} == {".hydra", f"load.{suffix}"}
     identified("mechanical").result.write(tmp_path / "result.json")
@@ -256,7 +307,13 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
         "task.power=0": "task.power=0",
     }
     for argument, sentence in refused.items():
-        done = run_command("task=export", "task.parameters=result.json", argument, "hydra.run.dir=none", cwd=tmp_path)
+        done = run_command(
+            "task=export",
+            "task.parameters=result.json",
+            argument,
+            "hydra.run.dir=none",
+            cwd=tmp_path,
+        )
         assert done.returncode == 2
         assert sentence in done.stderr
         assert done.stderr.count("\n") == 1
@@ -264,7 +321,9 @@ def test_the_command_writes_one_file_or_nothing(tmp_path):
 
 
 def dgs(text):
-    """{class: rows} of a DGS text, by its own rules: a head of columns and their kinds, then a row a line."""
+    """{class: rows} of a DGS text, by its own rules: a head of columns and their kinds, then a row
+    a line.
+    """
     tables, rows, columns = {}, [], []
     for line in text.splitlines():
         if line.startswith("$$"):
@@ -286,10 +345,17 @@ def test_the_powerfactory_file_holds_the_load(effects):
     assert tables["General"] == [{"ID": "1", "Descr": "Version", "Val": "5.0"}]
     numbers = [row["ID"] for rows in tables.values() for row in rows]
     assert len({*numbers}) == len(numbers)
-    pointed = {row[key] for rows in tables.values() for row in rows for key in ("fold_id", "typ_id", "obj_id")
-               if row.get(key)}  # fmt: skip
+    pointed = {
+        row[key]
+        for rows in tables.values()
+        for row in rows
+        for key in ("fold_id", "typ_id", "obj_id")
+        if row.get(key)
+    }
     assert pointed <= {*numbers}
-    (motor,), (of_type,), (static,), (law,) = (tables[name] for name in ("ElmAsm", "TypAsmo", "ElmLod", "TypLod"))
+    (motor,), (of_type,), (static,), (law,) = (
+        tables[name] for name in ("ElmAsm", "TypAsmo", "ElmLod", "TypLod")
+    )
     assert (of_type["pgn"], of_type["ugn"], of_type["frequ"]) == (50_000.0, 27.5, 50.0)
     X = of_type["xstr"] + of_type["xm"]
     behind = of_type["xm"] * of_type["xrtrA"] / (of_type["xm"] + of_type["xrtrA"])
@@ -300,14 +366,22 @@ def test_the_powerfactory_file_holds_the_load(effects):
     assert stored == pytest.approx(VALUES["M"] * OMEGA / 2, rel=1e-7)
     assert motor["pgini"] + static["plini"] == pytest.approx(50.0, rel=1e-7)
     assert motor["qgini"] + static["qlini"] == pytest.approx(30.0, rel=1e-7)
-    assert (law["aP"], law["kpu0"], law["aQ"], law["kqu0"]) == (1.0, VALUES["p_v"], 1.0, VALUES["q_v"])
+    assert (law["aP"], law["kpu0"], law["aQ"], law["kqu0"]) == (
+        1.0,
+        VALUES["p_v"],
+        1.0,
+        VALUES["q_v"],
+    )
     assert static["u0"] == BEFORE["U0"]
 
 
 def test_a_zip_load_is_the_polynomial_of_powerfactory():
     (law,) = dgs(write("powerfactory", identified("none", "zip")))["TypLod"]
     v = np.array([0.5, 0.8, 1.0])
-    for side, names in (("a", ("aP", "bP", "kpu0", "kpu1", "kpu")), ("b", ("aQ", "bQ", "kqu0", "kqu1", "kqu"))):
+    for side, names in (
+        ("a", ("aP", "bP", "kpu0", "kpu1", "kpu")),
+        ("b", ("aQ", "bQ", "kqu0", "kqu1", "kqu")),
+    ):
         a, b, e0, e1, e = (law[name] for name in names)
         Z, current = VALUES[f"{side}_Z"], VALUES[f"{side}_I"]
         assert a * v**e0 + b * v**e1 + (1 - a - b) * v**e == pytest.approx(
@@ -319,16 +393,23 @@ PLAYED = [
     (name, motor, static, effects)
     for name in ("andes", "psse_dyr", "powerfactory", "modelica")
     for motor, static, effects in (
-        ("electromechanical", "exponential", ()), ("electromechanical", "zip", ("stator_resistance",)),
-        ("double_cage", "constant_impedance", ()), ("none", "zip", ()),
+        ("electromechanical", "exponential", ()),
+        ("electromechanical", "zip", ("stator_resistance",)),
+        ("double_cage", "constant_impedance", ()),
+        ("none", "zip", ()),
     )
     if (name, motor) != ("powerfactory", "double_cage")
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("name", "motor", "static", "effects"), PLAYED)
-def test_an_export_played_back_by_its_own_numbers_follows_the_fit(name, motor, static, effects, monkeypatch):
-    form, load = build("format", {"name": name}), identified(motor, static, effects, power=47.0, ratio=0.7)
+def test_an_export_played_back_by_its_own_numbers_follows_the_fit(
+    name, motor, static, effects, monkeypatch
+):
+    form, load = (
+        build("format", {"name": name}),
+        identified(motor, static, effects, power=47.0, ratio=0.7),
+    )
     monkeypatch.setattr(type(form), "simulated", lambda *_: None)
     agreement, notes = play_back_export(form, form.text(load), load)
     assert notes == []
@@ -338,10 +419,16 @@ def test_an_export_played_back_by_its_own_numbers_follows_the_fit(name, motor, s
 
 @pytest.mark.parametrize(
     ("name", "right", "wrong"),
-    [("andes", '"Hm": ', '"Hm": 9'), ("psse_dyr", "'CIM5BL', 'M', 1, 0,", "'CIM5BL', 'M', 1, 0.05,"),
-     ("powerfactory", ";AS;55", ";AS;45"), ("modelica", "Real T_prime = 0.1", "Real T_prime = 0.3")],
-)  # fmt: skip
-def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(name, right, wrong, monkeypatch):
+    [
+        ("andes", '"Hm": ', '"Hm": 9'),
+        ("psse_dyr", "'CIM5BL', 'M', 1, 0,", "'CIM5BL', 'M', 1, 0.05,"),
+        ("powerfactory", ";AS;55", ";AS;45"),
+        ("modelica", "Real T_prime = 0.1", "Real T_prime = 0.3"),
+    ],
+)
+def test_a_file_that_holds_another_load_is_seen_when_it_is_played_back(
+    name, right, wrong, monkeypatch
+):
     form, load = build("format", {"name": name}), identified()
     monkeypatch.setattr(type(form), "simulated", lambda *_: None)
     text = form.text(load)
@@ -359,19 +446,36 @@ def test_what_a_format_leaves_out_is_in_the_agreement(monkeypatch):
 def test_an_export_says_its_load_base_powers_and_agreement(tmp_path):
     result = dataclasses.replace(
         identified().result,
-        records=[{"name": "a", "role": "train", "source": {"file": "a.cfg", "station": "North", "load": "T2"},
-                  "base": {"voltage_kV": 27.5, "power_MVA": 40.0}}],
+        records=[
+            {
+                "name": "a",
+                "role": "train",
+                "source": {"file": "a.cfg", "station": "North", "load": "T2"},
+                "base": {"voltage_kV": 27.5, "power_MVA": 40.0},
+            }
+        ],
         own_base={"power": 40.0, "file_power": 40.0, "in_mva": True, "origin": "given"},
-    )  # fmt: skip
+    )
     done = tractexp.export(Identification(result), "powerfactory")
     said = "\n".join(done.notes)
-    for part in ("station North; load T2", "per unit of 40 MVA and 27.5 kV", "at 26.95 kV: load 40 MW and 24 Mvar",
-                 "motor 22 MW", "played back by our own simulator", "not tried in PowerFactory"):  # fmt: skip
+    for part in (
+        "station North; load T2",
+        "per unit of 40 MVA and 27.5 kV",
+        "at 26.95 kV: load 40 MW and 24 Mvar",
+        "motor 22 MW",
+        "played back by our own simulator",
+        "not tried in PowerFactory",
+    ):
         assert part in said, part
     assert done.agreement < 1e-6
-    assert (dgs(done.text)["TypAsmo"][0]["pgn"], dgs(done.text)["ElmTerm"][0]["uknom"]) == (40_000.0, 27.5)
+    assert (dgs(done.text)["TypAsmo"][0]["pgn"], dgs(done.text)["ElmTerm"][0]["uknom"]) == (
+        40_000.0,
+        27.5,
+    )
     assert Exported.load(done.save(tmp_path / "export.json")).agreement == done.agreement
-    assert "played back" not in "".join(tractexp.export(Identification(result), "modelica", playback=False).notes)
+    assert "played back" not in "".join(
+        tractexp.export(Identification(result), "modelica", playback=False).notes
+    )
 
 
 def test_a_file_of_a_load_without_a_steady_state_is_no_refusal_but_said(monkeypatch):
@@ -397,7 +501,10 @@ def test_where_the_simulator_fails_ours_plays_the_file_back_and_it_is_said(monke
 @pytest.fixture
 def has_andes():
     if andes_check.interpreter() is None:
-        pytest.skip("ANDES is not installed; install the extra 'crosscheck' or name a Python in TRACTEXP_ANDES_PYTHON")
+        pytest.skip(
+            "ANDES is not installed; install the extra 'crosscheck' or name a Python in"
+            " TRACTEXP_ANDES_PYTHON"
+        )
 
 
 @pytest.mark.usefixtures("has_andes")
@@ -409,7 +516,9 @@ def test_our_motors_draw_what_andes_draws_at_its_terminal_voltage(kind):
 
 
 @pytest.mark.usefixtures("has_andes")
-@pytest.mark.parametrize(("motor", "static"), [("electromechanical", "exponential"), ("double_cage", "zip")])
+@pytest.mark.parametrize(
+    ("motor", "static"), [("electromechanical", "exponential"), ("double_cage", "zip")]
+)
 def test_an_exported_load_responds_in_andes_as_it_does_here(motor, static):
     found = andes_check.round_trip(motor, static, 1e-3)
     assert found["swing_P"] > 0.2
@@ -432,7 +541,9 @@ def test_what_a_model_is_not_good_for_is_said_when_it_is_exported(tmp_path):
     sentence = "this model does not describe this load: P of dip is off by 9.0%"
     good = identified().result
     for grade, told in (("adequate", False), ("wrong_model", True)):
-        graded = dataclasses.replace(good, adequacy={"grade": grade, "sentence": sentence, "p": None})
+        graded = dataclasses.replace(
+            good, adequacy={"grade": grade, "sentence": sentence, "p": None}
+        )
         graded.write(tmp_path / "result.json")
         command = ("task=export", "task.parameters=result.json", f"hydra.run.dir={grade}")
         done = run_command(*command, cwd=tmp_path)

@@ -1,4 +1,6 @@
-"""The figures of a run: what they show, what they leave out, and that they can be trusted to be the same again."""
+"""The figures of a run: what they show, what they leave out, and that they can be trusted to be the
+same again.
+"""
 
 import re
 import subprocess
@@ -15,7 +17,9 @@ from tractexp.report import figures
 
 
 def event(samples: int = 1000) -> tuple[np.ndarray, np.ndarray, figures.Power, figures.Power]:
-    """A dip to half the voltage, and a load that answers with squares and cubes of it, seen with noise."""
+    """A dip to half the voltage, and a load that answers with squares and cubes of it, seen with
+    noise.
+    """
     t = np.linspace(0.0, 1.0, samples)
     U = np.where((t > 0.2) & (t < 0.4), 0.5, 1.0)
     noise = 0.004 * np.random.default_rng(0).standard_normal((2, samples))
@@ -29,11 +33,16 @@ def draw_fit(path: Path, samples: int = 1000, **more) -> Path:
 
 
 def texts(path: Path) -> list[str]:
-    return ["".join(node.itertext()) for node in ElementTree.parse(path).iter("{http://www.w3.org/2000/svg}text")]
+    return [
+        "".join(node.itertext())
+        for node in ElementTree.parse(path).iter("{http://www.w3.org/2000/svg}text")
+    ]
 
 
 def test_fit_names_its_axes_units_and_errors(tmp_path):
-    found = texts(draw_fit(tmp_path / "fit.svg", notes=["Synthetic stand-in for an unpublished record."]))
+    found = texts(
+        draw_fit(tmp_path / "fit.svg", notes=["Synthetic stand-in for an unpublished record."])
+    )
     for expected in (
         "tibet_50pct, issa",
         "Synthetic stand-in for an unpublished record.",

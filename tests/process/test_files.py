@@ -1,4 +1,6 @@
-"""The one door through which files are written: whole or not at all, results before what is drawn from them."""
+"""The one door through which files are written: whole or not at all, results before what is drawn
+from them.
+"""
 
 import ast
 import json
@@ -18,9 +20,21 @@ from tractexp.errors import UserError
 ROOT = Path(__file__).parents[2]
 DOOR = ROOT / "tractexp" / "files.py"
 WRITERS = {  # calls that make or change a file, whatever they are called on
-    "write_text", "write_bytes", "mkstemp", "NamedTemporaryFile", "fdopen", "copyfile", "copy2", "savez",
-    "savez_compressed", "tofile", "symlink_to", "hardlink_to", "touch", "copytree",
-}  # fmt: skip
+    "write_text",
+    "write_bytes",
+    "mkstemp",
+    "NamedTemporaryFile",
+    "fdopen",
+    "copyfile",
+    "copy2",
+    "savez",
+    "savez_compressed",
+    "tofile",
+    "symlink_to",
+    "hardlink_to",
+    "touch",
+    "copytree",
+}
 WRITING = {"replace", "rename", "link", "symlink", "truncate"}  # of `os`
 IN_MEMORY = {"savez_compressed"}  # into a buffer, which is then written
 MODES = set("wax+")
@@ -32,11 +46,18 @@ def written(path: Path) -> set[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.Call):
             continue
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        name = (
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        )
         owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
-        given = [a.value for a in (*node.args, *(k.value for k in node.keywords if k.arg == "mode"))
-                 if isinstance(a, ast.Constant) and isinstance(a.value, str)]  # fmt: skip
-        opens = name == "open" and any(set(mode) <= set("rwaxbt+") and set(mode) & MODES for mode in given)
+        given = [
+            a.value
+            for a in (*node.args, *(k.value for k in node.keywords if k.arg == "mode"))
+            if isinstance(a, ast.Constant) and isinstance(a.value, str)
+        ]
+        opens = name == "open" and any(
+            set(mode) <= set("rwaxbt+") and set(mode) & MODES for mode in given
+        )
         into = ast.unparse(node.args[0]) if node.args else ""
         buffer = name in IN_MEMORY and into in ("packed", "made", "written", "drawn", "text")
         if opens or (name in WRITERS and not buffer) or (owner == "os" and name in WRITING):
@@ -48,7 +69,10 @@ def test_nothing_but_the_one_door_opens_a_file_to_write():
     """But the program that ANDES's own process runs, in a folder that goes with it."""
     others = {DOOR, ROOT / "plugins" / "formats" / "_andes_run.py"}
     sources = [
-        p for folder in ("tractexp", "plugins") for p in sorted((ROOT / folder).rglob("*.py")) if p not in others
+        p
+        for folder in ("tractexp", "plugins")
+        for p in sorted((ROOT / folder).rglob("*.py"))
+        if p not in others
     ]
     assert len(sources) > 200
     assert set().union(*map(written, sources)) == set()
@@ -57,7 +81,14 @@ def test_nothing_but_the_one_door_opens_a_file_to_write():
 
 @pytest.mark.parametrize(
     "line",
-    ["open(p, 'w')", "p.open('ab+')", "p.write_text(t)", "os.replace(a, b)", "np.savez(p, a)", "shutil.copy2(a, b)"],
+    [
+        "open(p, 'w')",
+        "p.open('ab+')",
+        "p.write_text(t)",
+        "os.replace(a, b)",
+        "np.savez(p, a)",
+        "shutil.copy2(a, b)",
+    ],
 )
 def test_the_door_is_missed_by_none_of_these(line, tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)
@@ -74,15 +105,19 @@ def heard(event, told):
     writes = event == "open" and isinstance(told[2], int) and told[2] & (os.O_WRONLY | os.O_RDWR)
     if writes and sys.argv[1] in str(told[0]):
         frames = [f.filename for f in traceback.extract_stack()]
-        opened.add((os.path.basename(str(told[0])), any(name.endswith("tractexp/files.py") for name in frames)))
+        ours = any(name.endswith("tractexp/files.py") for name in frames)
+        opened.add((os.path.basename(str(told[0])), ours))
 import tractexp
-motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55}
+motor |= {"p_v": 1.4, "q_v": 3.0}
 made = tractexp.simulate(values=motor, depth=0.3, rate=100, length=1)
 sys.addaudithook(heard)
 made.write(sys.argv[1])
 print(sorted(told for told in opened if not told[1]), len(opened))
 """
-    done = subprocess.run([sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(tmp_path)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     others, count = done.stdout.rsplit(maxsplit=1)
     assert others == "[]"
@@ -115,7 +150,13 @@ files.write(sys.argv[1], 'new')"""
     (half,) = [p for p in tmp_path.iterdir() if p != path]
     assert files.leftovers(tmp_path) == []  # it may be one that is being written
     os.utime(half, (0, 0))
-    for name in ("movie.mkv.part", ".part", ".a.txt.part", "a.tractexp.part", ".a.txt.12345678.part"):
+    for name in (
+        "movie.mkv.part",
+        ".part",
+        ".a.txt.part",
+        "a.tractexp.part",
+        ".a.txt.12345678.part",
+    ):
         os.utime(files.write(tmp_path / name, "somebody's"), (0, 0))
     (tmp_path / ".a.txt.12345678.tractexp.part").symlink_to(path)
     assert files.leftovers(tmp_path) == [half]
@@ -148,10 +189,15 @@ def test_a_lock_is_waited_for_no_longer_than_told(tmp_path):
 import sys, time; from pathlib import Path; from tractexp import files
 with files.held(Path(sys.argv[1]), 1):
     print("held", flush=True); time.sleep(60)"""
-    holder = subprocess.Popen([sys.executable, "-c", script, str(tmp_path / "lock")], stdout=-1, text=True)
+    holder = subprocess.Popen(
+        [sys.executable, "-c", script, str(tmp_path / "lock")], stdout=-1, text=True
+    )
     try:
         assert holder.stdout.readline() == "held\n"
-        with pytest.raises(TimeoutError, match=r"another process has held .*lock"), files.lock_file(tmp_path / "lock", 0.2):
+        with (
+            pytest.raises(TimeoutError, match=r"another process has held .*lock"),
+            files.lock_file(tmp_path / "lock", 0.2),
+        ):
             pass
     finally:
         holder.kill()
@@ -163,11 +209,21 @@ with files.held(Path(sys.argv[1]), 1):
 
 @pytest.fixture(scope="module")
 def simulated():
-    motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+    motor = {
+        "T_prime": 0.12,
+        "X_prime": 0.25,
+        "C": 0.9,
+        "M": 0.006,
+        "T_m": 0.55,
+        "p_v": 1.4,
+        "q_v": 3.0,
+    }
     return tractexp.simulate(values=motor, depth=0.3, rate=100, length=1)
 
 
-def test_a_figure_that_fails_is_a_sentence_and_the_results_stand(simulated, tmp_path, monkeypatch, capsys):
+def test_a_figure_that_fails_is_a_sentence_and_the_results_stand(
+    simulated, tmp_path, monkeypatch, capsys
+):
     from tractexp.report import figures
 
     def fails(*_, **__):
@@ -175,8 +231,9 @@ def test_a_figure_that_fails_is_a_sentence_and_the_results_stand(simulated, tmp_
 
     monkeypatch.setattr(figures, "response", fails)
     assert [path.name for path in simulated.write(tmp_path)] == ["response.csv"]
-    assert "response.svg could not be made, while the results are whole (RuntimeError: the third pen is dry)" in (
-        " ".join(capsys.readouterr().out.split())
+    assert (
+        "response.svg could not be made, while the results are whole (RuntimeError: the third pen"
+        " is dry)" in (" ".join(capsys.readouterr().out.split()))
     )
 
 
@@ -184,7 +241,9 @@ def test_a_name_that_would_be_a_formula_is_written_as_it_is(simulated, tmp_path)
     from dataclasses import replace
 
     (one,) = simulated.responses
-    drawn = replace(one, title=r"$\frac{$", notes=(r"$\sqrt{$",)).draw(tmp_path / "a.svg").read_text()
+    drawn = (
+        replace(one, title=r"$\frac{$", notes=(r"$\sqrt{$",)).draw(tmp_path / "a.svg").read_text()
+    )
     assert r"$\frac{$" in drawn
     assert r"$\sqrt{$" in drawn
 
@@ -193,7 +252,12 @@ def test_a_disk_that_is_full_for_pages_keeps_the_finished_search(tmp_path):
     """A page is larger than a result: files may have 300 kB here, as where so much is left."""
     (tmp_path / "dip.csv").write_text(dip())
     command = [sys.executable, "-m", "tractexp", "data=csv", "data.train=[dip.csv]"]
-    command += ["optimizer=multistart_least_squares", "budget=300", "hydra.run.dir=run", "tracking.enabled=false"]
+    command += [
+        "optimizer=multistart_least_squares",
+        "budget=300",
+        "hydra.run.dir=run",
+        "tracking.enabled=false",
+    ]
 
     def narrow():
         import signal
@@ -206,11 +270,23 @@ def test_a_disk_that_is_full_for_pages_keeps_the_finished_search(tmp_path):
     assert "note: report.html could not be made, while the results are whole" in done.stdout
     assert "File too large" in done.stdout
     assert json.loads((tmp_path / "run" / "result.json").read_text())["simulations"] >= 300
-    assert {p.name for p in (tmp_path / "run").iterdir()} == {".hydra", "result.json", "history.csv"}
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {
+        ".hydra",
+        "result.json",
+        "history.csv",
+    }
 
 
 def dip() -> str:
-    motor = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+    motor = {
+        "T_prime": 0.12,
+        "X_prime": 0.25,
+        "C": 0.9,
+        "M": 0.006,
+        "T_m": 0.55,
+        "p_v": 1.4,
+        "q_v": 3.0,
+    }
     made = tractexp.simulate(values=motor, depth=0.4, rate=200, length=2).responses[0]
     return made.to_frame().to_csv(index=False)
 
@@ -219,16 +295,38 @@ def dip() -> str:
 
 
 READERS = {  # calls that read a file, or make something of a text that a file held
-    "read_text", "read_bytes", "open", "loadtxt", "genfromtxt", "fromfile", "memmap", "fdopen",
-}  # fmt: skip
-PARSERS = {"yaml": {"load", "safe_load", "load_all", "full_load", "unsafe_load"}, "json": {"load", "loads"},
-           "np": {"load"}, "pickle": {"load", "loads"}, "OmegaConf": {"load"}}  # fmt: skip
+    "read_text",
+    "read_bytes",
+    "open",
+    "loadtxt",
+    "genfromtxt",
+    "fromfile",
+    "memmap",
+    "fdopen",
+}
+PARSERS = {
+    "yaml": {"load", "safe_load", "load_all", "full_load", "unsafe_load"},
+    "json": {"load", "loads"},
+    "np": {"load"},
+    "pickle": {"load", "loads"},
+    "OmegaConf": {"load"},
+}
 READ = {  # {module: {call: why it may}}; all else that is read goes through `tractexp/files.py`
-    "tractexp/choices.py": {"read_text": "installed files", "yaml.safe_load": "installed files", "read_bytes": "code"},
+    "tractexp/choices.py": {
+        "read_text": "installed files",
+        "yaml.safe_load": "installed files",
+        "read_bytes": "code",
+    },
     "tractexp/cli/look.py": {"yaml.safe_load": "a setting as it was typed"},
     "tractexp/cli/new/__init__.py": {"read_text": "an installed file"},
-    "tractexp/composition.py": {"read_text": "installed files", "yaml.safe_load": "installed files"},
-    "tractexp/blocks/plotly.py": {"read_text": "an installed file", "read_bytes": "installed files"},
+    "tractexp/composition.py": {
+        "read_text": "installed files",
+        "yaml.safe_load": "installed files",
+    },
+    "tractexp/blocks/plotly.py": {
+        "read_text": "an installed file",
+        "read_bytes": "installed files",
+    },
     "tractexp/texts.py": {"read_bytes": "code"},
     "tractexp/provenance.py": {"read_bytes": "code"},
     "tractexp/model_file.py": {"yaml.load": "a text that `files` has read"},
@@ -237,16 +335,28 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
     "tractexp/store.py": {"np.load": "the store; nothing is unpickled"},
     "tractexp/api/survey.py": {"json.loads": "entries with their sums"},
     "tractexp/studies/paper/search_store.py": {"json.loads": "the store"},
-    "tractexp/studies/comparison/load.py": {"loadtxt": "a text that `files` has read", "json.loads": "a parameter"},
-    "tractexp/filetypes/comtrade.py": {"memmap": "numbers of a file that `files` has found to be ordinary"},
+    "tractexp/studies/comparison/load.py": {
+        "loadtxt": "a text that `files` has read",
+        "json.loads": "a parameter",
+    },
+    "tractexp/filetypes/comtrade.py": {
+        "memmap": "numbers of a file that `files` has found to be ordinary"
+    },
     "tractexp/filetypes/comtrade_samples.py": {"memmap": "the same", "fromfile": "the same"},
     "tractexp/filetypes/table_text.py": {"loadtxt": "a text that `files` has read"},
     "tractexp/filetypes/workbook.py": {"pickle.load": "the process that it started"},
     "tractexp/tracking/owner.py": {"read_text": "the system's own files"},
-    "tractexp/tracking/process.py": {"pickle.load": "the process that started it", "pickle.loads": "that it started"},
+    "tractexp/tracking/process.py": {
+        "pickle.load": "the process that started it",
+        "pickle.loads": "that it started",
+    },
     "plugins/formats/_andes_run.py": {"json.load": "the process that started it"},
-    "plugins/formats/andes.py": {"json.loads": "its own text", "read_text": "its own code", "np.load": "its own file"},
-}  # fmt: skip
+    "plugins/formats/andes.py": {
+        "json.loads": "its own text",
+        "read_text": "its own code",
+        "np.load": "its own file",
+    },
+}
 
 
 def read_by(path: Path) -> set[str]:
@@ -255,19 +365,27 @@ def read_by(path: Path) -> set[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if not isinstance(node, ast.Call):
             continue
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        name = (
+            node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        )
         owner = ast.unparse(node.func.value) if isinstance(node.func, ast.Attribute) else ""
         if name in PARSERS.get(owner, ()):
             found.add(f"{owner}.{name}")
         elif (
-            name in READERS and owner not in ("files", "webbrowser", "process", "self") and not owner.startswith("self")
+            name in READERS
+            and owner not in ("files", "webbrowser", "process", "self")
+            and not owner.startswith("self")
         ):
             found.add(name)
     return found
 
 
 def test_one_door_reads_what_others_may_have_written():
-    """`tractexp/files.py`: it waits for no pipe, ends at a size, and counts what aliases come to."""
-    sources = {p for place in ("tractexp", "plugins") for p in (ROOT / place).rglob("*.py")} - {DOOR}
+    """`tractexp/files.py`: it waits for no pipe, ends at a size, and counts what
+    aliases come to.
+    """
+    sources = {p for place in ("tractexp", "plugins") for p in (ROOT / place).rglob("*.py")} - {
+        DOOR
+    }
     found = {str(path.relative_to(ROOT)): calls for path in sources if (calls := read_by(path))}
     assert found == {name: set(calls) for name, calls in READ.items()}

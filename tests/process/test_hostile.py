@@ -1,6 +1,8 @@
-"""Inputs that nobody should give, over every command that takes a file or a folder: it works, or one sentence says why.
+"""Inputs that nobody should give, over every command that takes a file or a folder: it works, or
+one sentence says why.
 
-`hostile.INPUTS` is the list. Nothing raises, warns, hangs, prints an escape of others, or leaves half a file.
+`hostile.INPUTS` is the list. Nothing raises, warns, hangs, prints an escape of others, or leaves
+half a file.
 """
 
 import contextlib
@@ -21,22 +23,44 @@ SECONDS = 20  # of one command, at most
 PLAIN = ("tracking.enabled=false", "hydra.run.dir=run")
 QUICK = ("optimizer=random_search", "budget=10", *PLAIN)
 TABLES = (".csv", ".xlsx", ".xls", ".ods", ".parquet")
-COMMANDS = {  # {name: how the names of the files begin or end that it is for, the arguments for one}
-    "look": ((*TABLES, ".cfg", ".cff", ".dat", ".cev", ".json"), lambda name: ("look", f"./{name}")),
+# {name: how the names of the files begin or end that it is for, the arguments for one}
+COMMANDS = {
+    "look": (
+        (*TABLES, ".cfg", ".cff", ".dat", ".cev", ".json"),
+        lambda name: ("look", f"./{name}"),
+    ),
     "identify": (TABLES, lambda name: ("data=csv", f"data.train=[{name}]", *QUICK)),
     "path": ((".parquet", ".xlsx"), lambda name: ("data=csv", f"data.path={name}", *QUICK)),
-    "waveforms": (("waves_", ".parquet", ".xlsx"), lambda name: ("data=waveforms", f"data.path={name}", *QUICK)),
-    "comtrade": ((".cfg", ".cff", ".dat"), lambda name: ("data=comtrade", f"data.path={name}", *QUICK)),
+    "waveforms": (
+        ("waves_", ".parquet", ".xlsx"),
+        lambda name: ("data=waveforms", f"data.path={name}", *QUICK),
+    ),
+    "comtrade": (
+        (".cfg", ".cff", ".dat"),
+        lambda name: ("data=comtrade", f"data.path={name}", *QUICK),
+    ),
     "sel": ((".cev", "r.cfg"), lambda name: ("data=sel", f"data.path={name}", *QUICK)),
-    "archive": (("r.csv", ".xlsx"), lambda name: ("data=archive", "data.path=.", f"data.train=[{name}]", *QUICK)),
-    "convert": (("waves_", ".cfg", ".xlsx"), lambda name: ("task=convert", f"data.path={name}", *PLAIN)),
+    "archive": (
+        ("r.csv", ".xlsx"),
+        lambda name: ("data=archive", "data.path=.", f"data.train=[{name}]", *QUICK),
+    ),
+    "convert": (
+        ("waves_", ".cfg", ".xlsx"),
+        lambda name: ("task=convert", f"data.path={name}", *PLAIN),
+    ),
     "simulate": ((".json",), lambda name: ("task=simulate", f"task.parameters={name}", *PLAIN)),
     "export": ((".json",), lambda name: ("task=export", f"task.parameters={name}", *PLAIN)),
     "rivals": ((".json",), lambda name: ("task=plan", f"task.rivals={name}", *PLAIN)),
     "values": ((".json",), lambda name: ("task=plan", f"task.values={name}", *PLAIN)),
 }
 FOLDERS = {
-    "survey": ("task=survey", "data.path=.", "task.cores=1", "tracking.enabled=false", "hydra.run.dir=../run"),
+    "survey": (
+        "task=survey",
+        "data.path=.",
+        "task.cores=1",
+        "tracking.enabled=false",
+        "hydra.run.dir=../run",
+    ),
     "sync": ("sync", "."),
     "doctor": ("doctor", "."),
 }
@@ -66,7 +90,8 @@ def limited():
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            warnings.filterwarnings("ignore", ".* is outside its bounds", UserWarning)  # which is what is to be said
+            # which is what is to be said
+            warnings.filterwarnings("ignore", ".* is outside its bounds", UserWarning)
             yield
     finally:
         signal.alarm(0)
@@ -81,7 +106,11 @@ def wrong(done) -> str:
     if done.returncode == 0:
         return "" if "Traceback" not in said else said
     one = re.fullmatch(r"tractexp: [^\n]+\n", done.stderr)
-    return "" if done.returncode == 2 and one and "its own mistake" not in said else said or str(done.returncode)
+    return (
+        ""
+        if done.returncode == 2 and one and "its own mistake" not in said
+        else said or str(done.returncode)
+    )
 
 
 def outcome(*arguments, cwd) -> str:
@@ -99,7 +128,11 @@ def outcome(*arguments, cwd) -> str:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_it_works_or_one_sentence_says_why(command, inputs):
     endings, arguments = COMMANDS[command]
-    chosen = {name: path for name, path in inputs.items() if name.endswith(endings) or name.startswith(endings)}
+    chosen = {
+        name: path
+        for name, path in inputs.items()
+        if name.endswith(endings) or name.startswith(endings)
+    }
     assert chosen
     found = {name: outcome(*arguments(name), cwd=path.parent) for name, path in chosen.items()}
     assert {name: why for name, why in found.items() if why} == {}

@@ -1,4 +1,6 @@
-"""What users of Hydra bring along: callbacks, loggers, folders of configurations, plus signs, other sweepers."""
+"""What users of Hydra bring along: callbacks, loggers, folders of configurations, plus signs, other
+sweepers.
+"""
 
 import importlib.util
 import json
@@ -37,12 +39,28 @@ def test_callbacks_and_loggers_of_the_users_are_at_work_in_each_job(tmp_path, mo
     (tmp_path / "told_by_tests.py").write_text(CALLBACK)
     monkeypatch.syspath_prepend(tmp_path)
     told = f"+hydra.callbacks.told={{_target_: told_by_tests.Told, path: {tmp_path / 'told.txt'}}}"
-    asked = ("-m", *QUICK, ONE, HERE, told, "hydra/job_logging=default", "hydra.job.name=fit", "seed=3,4")
+    asked = (
+        "-m",
+        *QUICK,
+        ONE,
+        HERE,
+        told,
+        "hydra/job_logging=default",
+        "hydra.job.name=fit",
+        "seed=3,4",
+    )
     done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     found = ends(tmp_path / "sweep")
-    ended = [f"ended {k} COMPLETED {found[str(k)]['metrics']['search_objective']}" for k in range(2)]
-    assert (tmp_path / "told.txt").read_text().splitlines() == ["begun 0 3", ended[0], "begun 1 4", ended[1]]
+    ended = [
+        f"ended {k} COMPLETED {found[str(k)]['metrics']['search_objective']}" for k in range(2)
+    ]
+    assert (tmp_path / "told.txt").read_text().splitlines() == [
+        "begun 0 3",
+        ended[0],
+        "begun 1 4",
+        ended[1],
+    ]
     for number in "01":
         assert "[mine][INFO] - begun" in (tmp_path / "sweep" / number / "fit.log").read_text()
 
@@ -58,7 +76,10 @@ def test_a_sweep_of_one_job_ends_with_its_page(tmp_path):
 def test_folders_of_jobs_are_named_as_asked_and_found_again(tmp_path):
     named = ("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=${optimizer.name}/seed_${seed}")
     assert run_command(*named, "seed=3,4", cwd=tmp_path).returncode == 0
-    assert {p.parent.name for p in (tmp_path / "sweep" / "pso").glob("*/status.json")} == {"seed_3", "seed_4"}
+    assert {p.parent.name for p in (tmp_path / "sweep" / "pso").glob("*/status.json")} == {
+        "seed_3",
+        "seed_4",
+    }
     again = run_command(*named, "seed=3,4,5", cwd=tmp_path)
     assert "2 of them are finished and kept" in again.stdout
     one = run_command("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=all", "seed=6,7", cwd=tmp_path)
@@ -68,7 +89,15 @@ def test_folders_of_jobs_are_named_as_asked_and_found_again(tmp_path):
 
 def test_a_job_may_be_seeded_by_its_number_and_returns_what_is_named(tmp_path):
     """As Hydra's other sweepers run jobs: here its basic one, which is in every installation."""
-    asked = ("-m", *QUICK, HERE, ONE, "hydra/sweeper=basic", "seed=${hydra:job.num}", "model.fixed.q_v=3,4")
+    asked = (
+        "-m",
+        *QUICK,
+        HERE,
+        ONE,
+        "hydra/sweeper=basic",
+        "seed=${hydra:job.num}",
+        "model.fixed.q_v=3,4",
+    )
     done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     found = ends(tmp_path / "sweep")
@@ -77,16 +106,29 @@ def test_a_job_may_be_seeded_by_its_number_and_returns_what_is_named(tmp_path):
     assert {end["message"].partition(",")[0] for end in ends(tmp_path / "other").values()} == {
         "sweep.returns names objectiv"
     }
-    assert refused.stderr.startswith("tractexp: job 0: sweep.returns names objectiv, which this task does not measure")
+    assert refused.stderr.startswith(
+        "tractexp: job 0: sweep.returns names objectiv, which this task does not measure"
+    )
 
 
-@pytest.mark.skipif(importlib.util.find_spec("optuna") is None, reason="no Optuna: pip install 'tractexp[optuna]'")
+@pytest.mark.skipif(
+    importlib.util.find_spec("optuna") is None, reason="no Optuna: pip install 'tractexp[optuna]'"
+)
 def test_optuna_is_given_where_the_searches_ended(tmp_path):
     import optuna
 
     store = f"sqlite:///{tmp_path / 'study.db'}"
-    study = (f"hydra.sweeper.storage={store}", "hydra.sweeper.study_name=issa", "hydra.sweeper.n_trials=4")
-    space = ("optimizer=issa", "optimizer.producers=interval(0.1,0.5)", "budget=300", "tracking.enabled=false")
+    study = (
+        f"hydra.sweeper.storage={store}",
+        "hydra.sweeper.study_name=issa",
+        "hydra.sweeper.n_trials=4",
+    )
+    space = (
+        "optimizer=issa",
+        "optimizer.producers=interval(0.1,0.5)",
+        "budget=300",
+        "tracking.enabled=false",
+    )
     done = run_command("-m", "hydra/sweeper=optuna", *study, *space, ONE, HERE, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     values = [trial.value for trial in optuna.load_study(study_name="issa", storage=store).trials]
@@ -99,7 +141,8 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
     for name, text in {
         "optimizer/mine.yaml": "# A swarm of ten.\ndefaults: [pso]\npopulation: 10\n",
         "data/tibet_50pct.yaml": "# Ours.\ndefaults: [csv]\ntrain: [mine.csv]\n",
-        "experiment/quick.yaml": "# @package _global_\ndefaults:\n  - override /optimizer: mine\nbudget: 300\n",
+        "experiment/quick.yaml": "# @package _global_\ndefaults:\n  - override /optimizer:"
+        " mine\nbudget: 300\n",
         "data/dips.yaml": "# Two dips.\ndefaults: [csv]\ntrain: [a.csv, b.csv]\n",
     }.items():
         path = tmp_path / "mine" / name
@@ -111,9 +154,14 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
     shown = run_command(*own, "+experiment=quick", "data=dips", "--cfg", "job", cwd=tmp_path).stdout
     for line in ("population: 10", "budget: 300", "- b.csv"):
         assert line in shown
-    assert "- mine.csv" in run_command(*own, "--cfg", "job", cwd=tmp_path).stdout, "the one by default is replaced"
+    assert "- mine.csv" in run_command(*own, "--cfg", "job", cwd=tmp_path).stdout, (
+        "the one by default is replaced"
+    )
     nowhere = run_command("list", "-cd", "nowhere", cwd=tmp_path)
-    assert nowhere.stderr == "tractexp: tractexp list: there is no folder nowhere; -cd names one of configurations\n"
+    assert (
+        nowhere.stderr
+        == "tractexp: tractexp list: there is no folder nowhere; -cd names one of configurations\n"
+    )
 
 
 @pytest.mark.parametrize(
@@ -122,8 +170,14 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
         (["-cn", "foo"], "-cn foo: there is no such configuration; give the folder of yours, too"),
         (["-cd", "nowhere"], "nowhere: there is no such folder"),
         (["~nothing"], "~nothing: there is no such setting to take out"),
-        (["optimizer@foo=pso"], "optimizer@foo: no choice of optimizer stands at 'foo'; write optimizer=NAME"),
-        (["+experiment=nothing"], "experiment=nothing: there is no such choice. Available: ablation"),
+        (
+            ["optimizer@foo=pso"],
+            "optimizer@foo: no choice of optimizer stands at 'foo'; write optimizer=NAME",
+        ),
+        (
+            ["+experiment=nothing"],
+            "experiment=nothing: there is no such choice. Available: ablation",
+        ),
     ],
 )
 def test_what_hydra_would_say_in_its_own_words_is_a_sentence(arguments, sentence, tmp_path):

@@ -1,4 +1,6 @@
-"""A look at files without naming channels: what is proposed, what happened, and commands that run as they stand."""
+"""A look at files without naming channels: what is proposed, what happened, and commands that run
+as they stand.
+"""
 
 import json
 import re
@@ -34,7 +36,9 @@ def saved(path, values=None, **more):
 
 @pytest.fixture(scope="module")
 def station(tmp_path_factory):
-    """Two loads on one bus and a dip of 40 %; the second load is the first one's half, its current reversed."""
+    """Two loads on one bus and a dip of 40 %; the second load is the first one's half, its current
+    reversed.
+    """
     first = constant()
     values = np.concatenate([first, -first[3:] / 2])
     names = ("UA", "UB", "UC", "Q1 IA", "Q1 IB", "Q1 IC", "Q2 IA", "Q2 IB", "Q2 IC")
@@ -52,10 +56,14 @@ def test_file_channels_loads_and_events_are_told_as_tables_and_frames(looked):
     assert file["start"] == "2026-03-01T10:00:00"
     assert file["measured_frequency"] == pytest.approx(50, abs=1e-3)
     assert [c["name"] for c in looked.channels][:4] == ["UA", "UB", "UC", "Q1 IA"]
-    assert looked.channels.to_frame()["magnitude"][0] == pytest.approx(BASE[0] / np.sqrt(3), rel=1e-3)
+    assert looked.channels.to_frame()["magnitude"][0] == pytest.approx(
+        BASE[0] / np.sqrt(3), rel=1e-3
+    )
     assert len(looked.feeders) == 2
     first = looked.feeders.rows[0]
-    assert (first["U"], first["P"], first["Q"]) == pytest.approx((BASE[0], 0.8 * BASE[1], 0.3 * BASE[1]), rel=1e-3)
+    assert (first["U"], first["P"], first["Q"]) == pytest.approx(
+        (BASE[0], 0.8 * BASE[1], 0.3 * BASE[1]), rel=1e-3
+    )
     assert first["sum_V"] < 1e-3
     event = looked.events.rows[0]
     assert (event["kind"], event["dip"], event["worth"]) == ("dip", 1, True)
@@ -91,8 +99,13 @@ def test_eighty_channels_are_one_screen(tmp_path):
     first = constant()
     loads = [first[3:] * 0.97**k * (1e-6 if k > 23 else 1.0) for k in range(26)]
     names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in range(26) for p in "ABC")]
-    made = tractexp.look(saved(tmp_path / "many.cfg", np.concatenate([first, *loads])[[0, 1, 2, *range(6, 84)]],
-                               names=names))  # fmt: skip
+    made = tractexp.look(
+        saved(
+            tmp_path / "many.cfg",
+            np.concatenate([first, *loads])[[0, 1, 2, *range(6, 84)]],
+            names=names,
+        )
+    )
     lines = str(made).splitlines()
     assert sum(line.strip().startswith("Q") for line in lines) == 24
     assert len(lines) <= 36
@@ -108,12 +121,17 @@ def test_a_note_of_the_reader_is_on_the_screen_and_of_many_three(tmp_path):
     assert f"  note: {note}" in str(made)
     many = {**made.content["files"][0], "notes": [f"line {k} was mended" for k in range(9)]}
     lines = str(summary({"files": [many]})).splitlines()
-    assert [line for line in lines if line.startswith("  note")][2:] == ["  note: line 2 was mended", "  note: 6 more"]
+    assert [line for line in lines if line.startswith("  note")][2:] == [
+        "  note: line 2 was mended",
+        "  note: 6 more",
+    ]
 
 
 def test_records_that_one_command_fits_are_named_by_what_it_fits():
     first = str(tractexp.look("tibet")).splitlines()[0]
-    assert first.startswith("dip at 0.304 s (50.1%, 340 ms) of tibet_50pct is worth fitting; to fit it: tractexp")
+    assert first.startswith(
+        "dip at 0.304 s (50.1%, 340 ms) of tibet_50pct is worth fitting; to fit it: tractexp"
+    )
 
 
 @pytest.mark.parametrize("name", ["dfr220kv-shandong/xtz.cfg", "async110kv-wisp/async110.cfg"])
@@ -123,7 +141,9 @@ def test_a_recorder_of_a_station_is_one_screen(name, tmp_path):
         pytest.skip(f"{path} is not there")
     done = run_command("look", str(path), "--folder", "x", cwd=tmp_path)
     assert len(done.stdout.splitlines()) <= 24
-    assert ("is worth fitting; to fit it: tractexp" in done.stdout.splitlines()[0]) == ("xtz" in name)
+    assert ("is worth fitting; to fit it: tractexp" in done.stdout.splitlines()[0]) == (
+        "xtz" in name
+    )
 
 
 def test_a_load_may_be_named_and_is_then_the_only_one(station):
@@ -132,7 +152,9 @@ def test_a_load_may_be_named_and_is_then_the_only_one(station):
 
 
 def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, station, tmp_path):
-    """In a shell's words, from another folder, name of the file with a space, brackets and Chinese letters."""
+    """In a shell's words, from another folder, name of the file with a space, brackets and Chinese
+    letters.
+    """
     for feeder in looked.feeders:
         if feeder["P"] < 0:  # a source, or a load counted backwards: not told which, so not fitted
             assert not feeder["command"]
@@ -141,9 +163,13 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
         words = shlex.split(feeder["command"])
         assert words[0] == "tractexp"
         done = run_command(
-            *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run",
+            *words[1:],
+            "optimizer=random_search",
+            "budget=50",
+            "tracking.enabled=false",
+            "hydra.run.dir=run",
             cwd=tmp_path,
-        )  # fmt: skip
+        )
         assert done.returncode == 0, done.stderr
         (event,) = json.loads((tmp_path / "run" / "result.json").read_text())["events"]
         assert event["name"] == f"{station.stem}_dip1"
@@ -153,7 +179,8 @@ def test_every_command_runs_as_it_stands_and_reads_what_was_shown(looked, statio
 def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):
     t = np.arange(round(2.5 * RATE)) / RATE
     U = np.ones_like(t)
-    for start, end, size in ((0.5, 0.6, 0.7), (1.0, 1.15, 1.2), (1.6, 1.8, 0.6)):  # a dip, a swell, a dip
+    # a dip, a swell, a dip
+    for start, end, size in ((0.5, 0.6, 0.7), (1.0, 1.15, 1.2), (1.6, 1.8, 0.6)):
         U[(t >= start) & (t < end)] = size
     path = saved(tmp_path / "three.cfg", waves(t, U, 0.8 * U**2, 0.3 * U**2))
     made = tractexp.look(path)
@@ -166,14 +193,21 @@ def test_dips_are_numbered_as_the_reader_numbers_them(tmp_path):
 
 
 def test_a_short_dip_is_to_be_fitted_in_waves_and_that_command_runs_too(tmp_path):
-    """A dip of three cycles is smeared by phasors; one of ten is not, nor one that begins with the record."""
+    """A dip of three cycles is smeared by phasors; one of ten is not, nor one that begins with the
+    record.
+    """
     short = saved(tmp_path / "short.cfg", constant(start=0.5, end=0.56))
     (command,) = tractexp.look(short).commands
     assert command.endswith(" domain=waves")
     done = run_command(
-        *shlex.split(command)[1:], "model/motor=none", "model/static=branch", "optimizer=random_search", "budget=50",
-        "tracking.enabled=false", cwd=tmp_path,
-    )  # fmt: skip
+        *shlex.split(command)[1:],
+        "model/motor=none",
+        "model/static=branch",
+        "optimizer=random_search",
+        "budget=50",
+        "tracking.enabled=false",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     assert "domain=waves" not in tractexp.look(saved(tmp_path / "long.cfg")).commands[0]
     early = saved(tmp_path / "early.cfg", constant(start=0.05, end=0.11))
@@ -200,7 +234,9 @@ def test_a_table_of_powers_is_looked_at_and_its_command_fits_it(resistive_dips, 
     (event,) = made.events
     assert (event["kind"], event["worth"]) == ("dip", True)
     assert event["depth"] == pytest.approx(0.3, abs=0.01)
-    assert made.commands == [f"tractexp data=csv data.path={resistive_dips[0]} 'data.train=[1]' 'data.validate=[]'"]
+    assert made.commands == [
+        f"tractexp data=csv data.path={resistive_dips[0]} 'data.train=[1]' 'data.validate=[]'"
+    ]
     assert list(made.phasors().columns)[:4] == ["t", "U", "P", "Q"]
     with pytest.raises(UserError, match="without waveforms"):
         made.waveforms()
@@ -216,14 +252,23 @@ def test_a_long_table_is_one_load_whose_dips_are_numbered(resistive_dips, tmp_pa
     made = tractexp.look(tmp_path / "long.csv")
     assert len(made.feeders) == 1
     assert [e["dip"] for e in made.events if e["worth"]] == [1, 2, 3]
-    np.testing.assert_allclose([e["depth"] for e in made.events if e["worth"]], [0.3, 0.5, 0.4], atol=0.01)
+    np.testing.assert_allclose(
+        [e["depth"] for e in made.events if e["worth"]], [0.3, 0.5, 0.4], atol=0.01
+    )
     words = shlex.split(made.commands[0])
     assert words[-2:] == ["data.train=[1]", "data.validate=[2,3]"]
     done = run_command(
-        *words[1:], "optimizer=random_search", "budget=50", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+        *words[1:],
+        "optimizer=random_search",
+        "budget=50",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
-    roles = [e["role"] for e in json.loads((tmp_path / "run" / "result.json").read_text())["events"]]
+    roles = [
+        e["role"] for e in json.loads((tmp_path / "run" / "result.json").read_text())["events"]
+    ]
     assert roles == ["train", "validate", "validate"]
 
 
@@ -271,7 +316,11 @@ def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tm
     values = constant()
     trip = (np.arange(values.shape[1]) >= 0.55 * RATE).astype(np.uint8)
     status = [StatusChannel("Q1 <trip>", trip), StatusChannel("idle", 0 * trip)]
-    page = tractexp.look(saved(tmp_path / "trip.cfg", values, trigger=0.49, status=status)).report().html
+    page = (
+        tractexp.look(saved(tmp_path / "trip.cfg", values, trigger=0.49, status=status))
+        .report()
+        .html
+    )
     whole = charts(page)[0]
     (mark,) = [shape for shape in whole["layout"]["shapes"] if shape["type"] == "line"]
     assert mark["x0"] == pytest.approx(0.49, abs=1e-6)
@@ -280,7 +329,11 @@ def test_the_page_marks_the_trigger_and_draws_the_status_channels_that_change(tm
     assert course["at"] == pytest.approx([0, 0.55, 1], abs=1e-3)
     assert course["states"] == [0, 1, 1]
     assert "idle" not in json.dumps(whole["data"])
-    waves = [trace for trace in whole["data"] if trace.get("samples") and trace["panel"] in ("u [kV]", "i [kA]")]
+    waves = [
+        trace
+        for trace in whole["data"]
+        if trace.get("samples") and trace["panel"] in ("u [kV]", "i [kA]")
+    ]
     assert [trace["name"] for trace in whole["data"] if trace.get("phasor")] == [*"abcabc"]
     assert [trace["line"]["color"] for trace in waves] == [*style.PHASES, *style.PHASES]
     assert [trace["label"] for trace in waves][::3] == ["a (UA)", "a (IA)"]
@@ -294,13 +347,18 @@ def test_channels_of_no_load_have_a_chart_of_their_own(tmp_path):
     page = tractexp.look(saved(tmp_path / "rest.cfg", values, names=names)).report().html
     last = charts(page)[-1]
     assert "The 2 channels of no load" in page
-    assert [(trace["label"], trace["panel"]) for trace in last["data"]] == [("3U0", "u [kV]"), ("3I0", "i [kA]")]
+    assert [(trace["label"], trace["panel"]) for trace in last["data"]] == [
+        ("3U0", "u [kV]"),
+        ("3I0", "i [kA]"),
+    ]
 
 
 def test_a_page_without_status_channels_or_trigger_says_nothing_of_them(looked):
     page = looked.report().html
     whole = charts(page)[0]
-    assert "status" not in {axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")}
+    assert "status" not in {
+        axis["title"]["text"] for key, axis in whole["layout"].items() if key.startswith("yaxis")
+    }
     assert "Status channels" not in page
 
 
@@ -309,7 +367,11 @@ def test_nothing_of_the_page_is_cut_off_on_a_screen_of_1280_pixels(tmp_path):
     """Channels and status channels with names of one long word."""
     first = constant()
     trip = (np.arange(first.shape[1]) >= 0.55 * RATE).astype(np.uint8)
-    names = [f"{quantity}{phase}_110kV_bus_section_2_bay_62" for quantity in ("U", "I") for phase in "ABC"]
+    names = [
+        f"{quantity}{phase}_110kV_bus_section_2_bay_62"
+        for quantity in ("U", "I")
+        for phase in "ABC"
+    ]
     status = [StatusChannel("protection_2_bay_62_single_pole_trip_phase_A", trip)]
     page = tractexp.look(saved(tmp_path / "long.cfg", first, names=names, status=status)).report()
     script = """setTimeout(() => {
@@ -324,7 +386,9 @@ def test_nothing_of_the_page_is_cut_off_on_a_screen_of_1280_pixels(tmp_path):
       });
       document.getElementById("told").textContent = JSON.stringify(cut);
     }, 1000);"""
-    dom, complaints = drawn(Worked(page, script), tmp_path, "--window-size=1280,900", "--virtual-time-budget=4000")
+    dom, complaints = drawn(
+        Worked(page, script), tmp_path, "--window-size=1280,900", "--virtual-time-budget=4000"
+    )
     assert complaints == []
     assert json.loads(re.findall(r"<p id=.told.>(.*?)</p>", dom)[0]) == []
 
@@ -335,7 +399,13 @@ def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
     U = np.where((t > 4) & (t < 4.2), 0.6, 1.0)
     first = waves(t, U, 0.8 * U**2, 0.3 * U**2)
     values = np.concatenate([first, *(first[3:] * k for k in (0.9, 0.8, 0.7)), first[:5] * 0.01])
-    names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in range(4) for p in "ABC"), *(f"X{k}" for k in range(5))]
+    names = [
+        "UA",
+        "UB",
+        "UC",
+        *(f"Q{k} I{p}" for k in range(4) for p in "ABC"),
+        *(f"X{k}" for k in range(5)),
+    ]
     made = tractexp.look(saved(tmp_path / "long.cfg", values, names=names, rate=rate))
     assert len(made.feeders) == 4
     assert made.write(tmp_path / "page")[-1].stat().st_size < 7e6
@@ -344,15 +414,38 @@ def test_a_page_of_ten_seconds_of_twenty_channels_is_small(tmp_path):
 def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     done = run_command("look", str(station), cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for part in ("North", "3200 Hz", "UA", "Q2", "dip", "fit it?", "yes: ", "to fit it:", "data=comtrade", "look.html"):
+    for part in (
+        "North",
+        "3200 Hz",
+        "UA",
+        "Q2",
+        "dip",
+        "fit it?",
+        "yes: ",
+        "to fit it:",
+        "data=comtrade",
+        "look.html",
+    ):
         assert part in done.stdout, part
     every = run_command("look", str(station), "--all", "--folder", "all", cwd=tmp_path).stdout
-    for part in ("primary RMS", "fit for what", "Q1 IA", "their names differ in the phase alone", "jump [°]"):
+    for part in (
+        "primary RMS",
+        "fit for what",
+        "Q1 IA",
+        "their names differ in the phase alone",
+        "jump [°]",
+    ):
         assert (part in every, part in done.stdout) == (True, False), part
     (page,) = (tmp_path / "outputs" / "looks").rglob("look.html")
     assert str(page.relative_to(tmp_path)) in done.stdout
     named = run_command(
-        "look", str(station), "voltages=[0,1,2]", "data.currents=[3,4,5]", "--folder", "x", cwd=tmp_path
+        "look",
+        str(station),
+        "voltages=[0,1,2]",
+        "data.currents=[3,4,5]",
+        "--folder",
+        "x",
+        cwd=tmp_path,
     )
     assert named.stdout.count("to fit it:") == 1
     refused = run_command("look", "absent.cfg", cwd=tmp_path)
@@ -361,7 +454,9 @@ def test_the_command_line_prints_all_of_it_and_says_where(station, tmp_path):
     assert "absent.cfg" in refused.stderr
 
 
-def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(station, capsys, monkeypatch):
+def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(
+    station, capsys, monkeypatch
+):
     told = []
     tractexp.look(station, progress=told.append)
     assert told == [f"reading {station}", "measuring the quality of the channels"]
@@ -374,7 +469,9 @@ def test_stages_are_told_to_who_listens_and_to_a_log_after_two_seconds(station, 
     assert printed.out == ""  # whose first line is the answer
 
 
-@pytest.mark.parametrize("name", ["a b.csv", "站.csv", "x,y.csv", "it's.csv", "[1].csv", "5", "1e5", "d/e4_60.cfg#1.1"])
+@pytest.mark.parametrize(
+    "name", ["a b.csv", "站.csv", "x,y.csv", "it's.csv", "[1].csv", "5", "1e5", "d/e4_60.cfg#1.1"]
+)
 def test_a_name_in_a_command_is_read_back(name):
     from hydra.core.override_parser.overrides_parser import OverridesParser
 
@@ -383,7 +480,9 @@ def test_a_name_in_a_command_is_read_back(name):
 
 
 def test_the_rms_of_half_cycles_is_that_of_the_standard():
-    """IEC 61000-4-30: over one cycle, anew each half cycle; exact for a whole cycle of any phase and rate."""
+    """IEC 61000-4-30: over one cycle, anew each half cycle; exact for a whole cycle of any phase
+    and rate.
+    """
     t = np.arange(1000) / 1600
     wave = np.sqrt(2) * np.cos(2 * np.pi * 50 * t + 0.3)[None]
     times, rms = half_cycle_rms(wave, 1600, 50)
@@ -394,7 +493,9 @@ def test_the_rms_of_half_cycles_is_that_of_the_standard():
 
 def test_a_spectrum_is_right_at_a_harmonic():
     t = np.arange(800) / 4000
-    f, rms = spectrum(np.sqrt(2) * (10 * np.cos(2 * np.pi * 50 * t) + 0.3 * np.sin(2 * np.pi * 250 * t)) + 5, 4000)
+    f, rms = spectrum(
+        np.sqrt(2) * (10 * np.cos(2 * np.pi * 50 * t) + 0.3 * np.sin(2 * np.pi * 250 * t)) + 5, 4000
+    )
     assert rms[f == 50] == pytest.approx(10, rel=1e-6)
     assert rms[f == 250] == pytest.approx(0.3, rel=1e-6)
 

@@ -26,7 +26,9 @@ POWER = pytest.approx(40.0, rel=5e-3)  # MW, of 0.8 per unit of 50 MVA
 
 
 def test_the_headline_is_the_power_before_the_load_trips(tmp_path):
-    shown = tractexp.look(saved(tmp_path / "trip.cfg", course(constant(0.0, length=5.0), (0.8, 1e-4))))
+    shown = tractexp.look(
+        saved(tmp_path / "trip.cfg", course(constant(0.0, length=5.0), (0.8, 1e-4)))
+    )
     [load], [event] = shown.feeders, shown.events
     assert load["P"] == POWER
     assert load["loaded"]
@@ -35,7 +37,10 @@ def test_the_headline_is_the_power_before_the_load_trips(tmp_path):
 
 
 def test_the_headline_is_the_power_before_the_dip_not_at_the_beginning(tmp_path):
-    path = saved(tmp_path / "shed.cfg", course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)))
+    path = saved(
+        tmp_path / "shed.cfg",
+        course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)),
+    )
     shown, [event] = tractexp.look(path), tractexp.read(path)
     [load] = shown.feeders
     assert load["P"] == POWER
@@ -45,27 +50,37 @@ def test_the_headline_is_the_power_before_the_dip_not_at_the_beginning(tmp_path)
 
 
 def test_the_samples_that_are_fitted_begin_after_the_step_too(tmp_path):
-    path = saved(tmp_path / "shed.cfg", course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)))
+    path = saved(
+        tmp_path / "shed.cfg",
+        course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (0.8, 1.0)),
+    )
     event = in_waves(tractexp.read(path)[0])
     assert 0.8 < event.record.t[event.first] < 0.83
     assert event.P0 * event.record.base.power == POWER
 
 
 def test_the_headline_is_that_before_a_dip_that_is_not_worth_fitting_too(tmp_path):
-    path = saved(tmp_path / "near.cfg", course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (1.13, 1.0)))
+    path = saved(
+        tmp_path / "near.cfg",
+        course(constant(start=1.2, end=1.4, length=3.0), (0.0, 3.0), (1.13, 1.0)),
+    )
     shown = tractexp.look(path)
     assert shown.feeders.rows[0]["P"] == POWER
     assert "no steady state of 100 ms comes before it" in shown.events.rows[1]["why"]
 
 
 def test_a_dip_that_leaves_nothing_of_the_load_is_not_worth_fitting(tmp_path):
-    [event] = tractexp.look(saved(tmp_path / "all.cfg", course(constant(length=2.0), (0.6, 0.0)))).events
+    [event] = tractexp.look(
+        saved(tmp_path / "all.cfg", course(constant(length=2.0), (0.6, 0.0)))
+    ).events
     assert not event["worth"]
     assert "the load is switched off in it" in event["why"]
 
 
 def test_a_load_that_is_lost_in_the_dip_is_worth_it_only_with_that_word(tmp_path):
-    [event] = tractexp.look(saved(tmp_path / "lost.cfg", course(constant(length=2.0), (0.6, 6 / 32)))).events
+    [event] = tractexp.look(
+        saved(tmp_path / "lost.cfg", course(constant(length=2.0), (0.6, 6 / 32)))
+    ).events
     assert "the load loses 81 % of its power in the dip (P 40" in event["why"]
 
 
@@ -86,7 +101,9 @@ def test_an_unloaded_feeder_beside_a_dip_says_that_it_has_no_load(tmp_path):
     shown = tractexp.look(saved(tmp_path / "two.cfg", np.concatenate([values, noise]), names=names))
     assert [load["loaded"] for load in shown.feeders] == [True, False]
     for page in (str(shown), shown.report().html):
-        assert "o load here: what happens to the voltage is listed with the loads of its bus" in page
+        assert (
+            "o load here: what happens to the voltage is listed with the loads of its bus" in page
+        )
         assert "nothing happened" not in page.lower()
 
 
@@ -107,17 +124,23 @@ def test_a_load_of_steady_power_has_no_event_of_its_own(tmp_path):
 
 
 def test_all_loads_of_a_bus_have_its_voltage_and_its_events(tmp_path):
-    """A dip of most of the record; the second load doubles before it, the third feeder has no load."""
+    """A dip of most of the record; the second load doubles before it, the third feeder
+    has no load.
+    """
     values = constant(start=0.6, end=1.7, length=2.0)
     double = course(values, (0.3, 2.0))[3:]
     noise = 1e-6 * np.random.default_rng(0).standard_normal((3, values.shape[1]))
     names = ["UA", "UB", "UC", *(f"Q{k} I{p}" for k in (1, 2, 3) for p in "ABC")]
-    shown = tractexp.look(saved(tmp_path / "bus.cfg", np.concatenate([values, double, noise]), names=names))
+    shown = tractexp.look(
+        saved(tmp_path / "bus.cfg", np.concatenate([values, double, noise]), names=names)
+    )
     first, second, third = shown.feeders
     assert first["U"] == second["U"] == third["U"] == pytest.approx(110.0, rel=1e-3)
     dips = [e for e in shown.events if e["kind"] == "dip"]
     assert len(dips) == 2
-    assert len({(e["start"], e["end"], e["depth"], e["jump"], e["U2"], e["dip"]) for e in dips}) == 1
+    assert (
+        len({(e["start"], e["end"], e["depth"], e["jump"], e["U2"], e["dip"]) for e in dips}) == 1
+    )
     (bus,) = (line for line in str(shown).splitlines() if "bus 1" in line)
     assert "110 kV; dip 1 at 0.5" in bus
     assert "load step" not in bus
@@ -126,7 +149,9 @@ def test_all_loads_of_a_bus_have_its_voltage_and_its_events(tmp_path):
 
 
 def test_a_table_that_is_fitted_is_worth_fitting_though_a_longer_ramp_follows_its_dip(tmp_path):
-    """A dip of 45 % and a slow swing after it: what `read` makes an event of, no look calls 'no dip'."""
+    """A dip of 45 % and a slow swing after it: what `read` makes an event of, no look calls 'no
+    dip'.
+    """
     t = np.arange(-240, 720) / 240.0
     U = np.where((t >= 0) & (t < 1.29), 0.55, 1.0)
     U = np.where(t >= 1.29, 0.99 + 0.1 * np.clip(t - 1.4, 0.0, 1.5), U)

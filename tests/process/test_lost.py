@@ -1,4 +1,6 @@
-"""Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another version."""
+"""Nothing is lost: by a kill, by a signal, by a store that is away, locked, cut short or of another
+version.
+"""
 
 import contextlib
 import importlib
@@ -27,7 +29,13 @@ from tractexp.tracking.store import open_store
 from tractexp.tracking.sync import BROUGHT, DELETED, NOT, THERE, sync
 
 VALUES = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v: 2.5"
-SIMULATE = ("task=simulate", f"task.values={{{VALUES}}}", "task.depth=0.4", "task.rate=200", "hydra.run.dir=run")
+SIMULATE = (
+    "task=simulate",
+    f"task.values={{{VALUES}}}",
+    "task.depth=0.4",
+    "task.rate=200",
+    "hydra.run.dir=run",
+)
 
 
 def tractexp(*arguments, cwd, **more):
@@ -37,7 +45,9 @@ def tractexp(*arguments, cwd, **more):
 
 def run(name="one", **more) -> TrackedRun:
     curve = (np.arange(1, 4), np.array([3.0, 2.0, 1.0]))
-    return TrackedRun("e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more)
+    return TrackedRun(
+        "e", name, parameters={"a": 1}, metrics={"x": 1.5}, curves={"fitness": curve}, **more
+    )
 
 
 def runs(uri: str, **more):
@@ -74,16 +84,24 @@ def test_a_run_whose_writer_lives_or_cannot_be_seen_is_left(uri):
     far = tracking.start_parent(TrackedRun("e", "on another computer"), uri)
     client.set_tag(far, owner.TAG, "elsewhere/0123 boot pid:[1] 4711 99")
     assert owner.close_stale(client) == []
-    client.set_tag(parent, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")  # this number, an earlier process
+    # this number, an earlier process
+    client.set_tag(parent, owner.TAG, owner.signature().rpartition(" ")[0] + " 17")
     assert owner.close_stale(client) == [parent]
     assert {r.info.run_id: r.info.status for r in runs(uri)} == {parent: "KILLED", far: "RUNNING"}
 
 
 @pytest.mark.parametrize(
     ("told", "gone"),
-    [("", None), ("a b c", None), ("elsewhere/1 boot ns 1 1", None), ("HERE other ns 1 1", True),
-     ("HERE BOOT other 1 1", None), ("HERE BOOT NS 99999999 1", True), ("HERE BOOT NS x 1", None)],
-)  # fmt: skip
+    [
+        ("", None),
+        ("a b c", None),
+        ("elsewhere/1 boot ns 1 1", None),
+        ("HERE other ns 1 1", True),
+        ("HERE BOOT other 1 1", None),
+        ("HERE BOOT NS 99999999 1", True),
+        ("HERE BOOT NS x 1", None),
+    ],
+)
 def test_whether_a_process_has_ended_is_told_only_where_it_is_known(told, gone):
     for word, known in zip(("HERE", "BOOT", "NS"), owner._machine(), strict=True):
         told = told.replace(word, known)
@@ -99,7 +117,9 @@ def test_what_is_kept_is_the_run_again_wherever_the_folder_is(tmp_path):
     folder.mkdir()
     (folder / "result.json").write_text("{}")
     child = TrackedRun("e", "child", metrics={"y": float("inf")})
-    told = run(artifacts=[folder / "result.json", tmp_path], model=folder / "result.json", children=[child])
+    told = run(
+        artifacts=[folder / "result.json", tmp_path], model=folder / "result.json", children=[child]
+    )
     kept = save(folder, told, "sqlite:////x.db")
     after = folder.rename(tmp_path / "after")
     back = read(after)
@@ -119,7 +139,9 @@ def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_pat
     save(sweep, TrackedRun("e", "the sweep", ended=ended), uri, sweep=True)
     (sweep / "sweep.json").write_text('{"run": null}')
     for k in range(2):
-        save(sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri)
+        save(
+            sweep / str(k), run(f"job {k}", ended=ended, seconds=2.0, children=[run("below")]), uri
+        )
     assert sync(tmp_path) == {BROUGHT: 3}
     assert sync(tmp_path) == {THERE: 3}
     found = {r.info.run_name: r for r in runs(uri)}
@@ -129,7 +151,8 @@ def test_runs_that_wait_are_brought_in_once_under_the_run_of_their_sweep(tmp_pat
     for k in range(2):
         job = found[f"job {k}"]
         assert job.data.tags["mlflow.parentRunId"] == parent.info.run_id
-        assert abs(job.info.end_time / 1000 - ended) < 1.0  # when it ended, not when it was brought in
+        # when it ended, not when it was brought in
+        assert abs(job.info.end_time / 1000 - ended) < 1.0
         assert (job.info.status, job.data.metrics) == ("FINISHED", {"x": 1.5, "fitness": 1.0})
     assert len(runs(uri)) == 5
 
@@ -170,8 +193,12 @@ def test_a_store_that_is_away_is_asked_once_and_named_once(tmp_path):
     assert "refused" in told[0]
 
 
-@pytest.mark.parametrize(("harm", "reason"), [("locked", "database is locked"), ("torn", "malformed")])
-def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(harm, reason, uri, monkeypatch):
+@pytest.mark.parametrize(
+    ("harm", "reason"), [("locked", "database is locked"), ("torn", "malformed")]
+)
+def test_a_store_that_is_locked_or_torn_is_told_before_mlflow_tries_for_minutes(
+    harm, reason, uri, monkeypatch
+):
     import mlflow
 
     from tractexp.tracking import store
@@ -204,13 +231,18 @@ def names(uri: str, name: str) -> list[str]:
     client, (found,) = open_store(uri), [r for r in runs(uri) if r.info.run_name == name]
     listed = client.list_artifacts(found.info.run_id)
     listed += [
-        one for folder in listed if folder.is_dir for one in client.list_artifacts(found.info.run_id, folder.path)
+        one
+        for folder in listed
+        if folder.is_dir
+        for one in client.list_artifacts(found.info.run_id, folder.path)
     ]
     return [one.path for one in listed if not one.is_dir]
 
 
 @pytest.mark.parametrize("command", ["sync", "doctor"])
-def test_of_a_received_folder_only_its_own_files_are_sent(command, tmp_path, uri, capsys, monkeypatch):
+def test_of_a_received_folder_only_its_own_files_are_sent(
+    command, tmp_path, uri, capsys, monkeypatch
+):
     from tractexp.cli import doctor
 
     monkeypatch.setattr(doctor, "cores", lambda: iter(()))
@@ -224,16 +256,32 @@ def test_of_a_received_folder_only_its_own_files_are_sent(command, tmp_path, uri
     (folder / "figures" / "deep").symlink_to(key)
     (folder / "again.txt").symlink_to(folder / "own.txt")
     os.mkfifo(folder / "pipe")
-    ways = [str(key), "../../home/id_rsa", "link.txt", "home", "home/id_rsa", "figures", "pipe", "../run/../../home"]
+    ways = [
+        str(key),
+        "../../home/id_rsa",
+        "link.txt",
+        "home",
+        "home/id_rsa",
+        "figures",
+        "pipe",
+        "../run/../../home",
+    ]
     given = json.loads(hostile(folder, run(children=[run("below")]), uri).read_text())
-    given["run"] |= {"artifacts": [*ways, "own.txt", "again.txt", "figures/own.svg"], "model": str(key)}
+    given["run"] |= {
+        "artifacts": [*ways, "own.txt", "again.txt", "figures/own.svg"],
+        "model": str(key),
+    }
     given["run"]["children"][0] |= {"artifacts": [*ways, "own.txt"], "model": "link.txt"}
     (folder / FILE).write_text(json.dumps(given))
-    getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given"), "--uri", uri])
+    getattr(importlib.import_module(f"tractexp.cli.{command}"), command)(
+        [str(tmp_path / "given"), "--uri", uri]
+    )
     assert sorted(names(uri, "one")) == ["again.txt", "own.svg", "own.txt"]
     assert names(uri, "below") == ["own.txt"]
     said = capsys.readouterr().out
-    assert f"{key} is not sent: it does not lie in the folder {folder} of its run" in " ".join(said.split())
+    assert f"{key} is not sent: it does not lie in the folder {folder} of its run" in " ".join(
+        said.split()
+    )
     store = Path(uri.removeprefix("sqlite:///")).parent
     assert [p for p in store.rglob("*") if p.is_file() and p.name == key.name] == []
 
@@ -256,7 +304,12 @@ def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, mo
     monkeypatch.chdir(tmp_path / "here")
     foreign = f"sqlite:///{tmp_path / 'foreign' / 'mlflow.db'}"
     hostile(tmp_path / "given" / "run", run(), foreign)
-    assert getattr(importlib.import_module(f"tractexp.cli.{command}"), command)([str(tmp_path / "given")]) == 2
+    assert (
+        getattr(importlib.import_module(f"tractexp.cli.{command}"), command)(
+            [str(tmp_path / "given")]
+        )
+        == 2
+    )
     said = " ".join(capsys.readouterr().out.split())
     assert f"where it is yours, tractexp sync --uri {foreign} sends it there" in said
     assert "1 not logged" in said
@@ -265,27 +318,44 @@ def test_no_store_is_used_that_only_a_folder_names(command, tmp_path, capsys, mo
 
 def test_a_received_file_changes_no_run_that_is_not_its_own(tmp_path, uri):
     mine = save(tmp_path / "mine", run("mine"), uri)
-    sweep = save(tmp_path / "sweep", TrackedRun("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True)
+    sweep = save(
+        tmp_path / "sweep", TrackedRun("e", "my sweep", tags={"sweep": "seed=1,2"}), uri, sweep=True
+    )
     assert sync(tmp_path) == {BROUGHT: 2}
     ids = {name: read(tmp_path / name).run_id for name in ("mine", "sweep")}
     before = {r.info.run_id: r.to_dictionary() for r in runs(uri)}
     given = tmp_path / "given"
     for k, (name, run_id) in enumerate(ids.items()):
         hostile(given / str(k), run("other", status="KILLED"), uri)
-        content = json.loads((given / str(k) / FILE).read_text()) | {"run_id": run_id, "sweep": name == "sweep"}
+        content = json.loads((given / str(k) / FILE).read_text()) | {
+            "run_id": run_id,
+            "sweep": name == "sweep",
+        }
         (given / str(k) / FILE).write_text(json.dumps(content))
     hostile(given / "2", run("other", status="KILLED", key=mine.run.key), uri)
     (given / "sweep.json").write_text(json.dumps({"run": ids["sweep"]}))
     sync(given)
-    assert {r.info.run_id: r.to_dictionary() for r in runs(uri) if r.info.run_id in before} == before
+    assert {
+        r.info.run_id: r.to_dictionary() for r in runs(uri) if r.info.run_id in before
+    } == before
     assert sweep.run.name == "my sweep"
 
 
 @pytest.mark.parametrize(
     ("place", "value"),
-    [("uri", 5), ("run_id", ["x"]), ("key", "x' or 1=1"), ("key", None), ("name", 3), ("artifacts", 7), ("model", 7),
-     ("status", {}), ("children", [1]), ("curves", [1])],
-)  # fmt: skip
+    [
+        ("uri", 5),
+        ("run_id", ["x"]),
+        ("key", "x' or 1=1"),
+        ("key", None),
+        ("name", 3),
+        ("artifacts", 7),
+        ("model", 7),
+        ("status", {}),
+        ("children", [1]),
+        ("curves", [1]),
+    ],
+)
 def test_a_file_that_no_run_wrote_is_a_sentence(place, value, tmp_path, uri):
     given = json.loads(hostile(tmp_path / "run", run(), uri).read_text())
     (given if place in given else given["run"])[place] = value
@@ -343,7 +413,9 @@ def doctor(folder, *arguments, capsys):
     return code, " ".join(capsys.readouterr().out.split())
 
 
-def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_anew(tmp_path, uri, capsys, monkeypatch):
+def test_the_doctor_closes_stale_runs_sets_a_damaged_store_aside_and_makes_it_anew(
+    tmp_path, uri, capsys, monkeypatch
+):
     monkeypatch.setattr(owner, "closed", [])  # of this process, whose other tests close runs, too
     save(tmp_path / "outputs" / "job", run(), uri)
     sync(tmp_path)
@@ -407,7 +479,9 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
     with contextlib.closing(sqlite3.connect(tmp_path / "newer.db")) as newer:
         newer.execute("UPDATE alembic_version SET version_num = 'ffff00000000'")
         newer.commit()
-    code, told = doctor(tmp_path / "none", "--uri", f"sqlite:///{tmp_path / 'newer.db'}", capsys=capsys)
+    code, told = doctor(
+        tmp_path / "none", "--uri", f"sqlite:///{tmp_path / 'newer.db'}", capsys=capsys
+    )
     assert code == 2
     assert "comes from another version of MLflow" in told
 
@@ -418,11 +492,22 @@ def test_the_doctor_says_what_it_cannot_heal(tmp_path, uri, capsys, monkeypatch)
 @pytest.mark.skipif(os.name == "nt", reason="ends a run by a signal")
 @pytest.mark.parametrize(("way", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
 def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_path, uri):
-    command = [sys.executable, "-m", "tractexp", "optimizer=pso", "optimizer.iterations=10000000", "hydra.run.dir=run"]
+    command = [
+        sys.executable,
+        "-m",
+        "tractexp",
+        "optimizer=pso",
+        "optimizer.iterations=10000000",
+        "hydra.run.dir=run",
+    ]
     job = subprocess.Popen(
-        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        command,
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
         preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),
-    )  # fmt: skip
+    )
     said = ""
     while "optimizer: pso" not in said:
         line = job.stdout.readline()
@@ -433,7 +518,9 @@ def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_p
     _, err = job.communicate(timeout=60)
     assert job.returncode == code, err
     assert err.count("\n") == 1, err
-    assert err.startswith(f"tractexp: {'ended by SIGTERM' if code == 143 else 'interrupted'}; the best of ")
+    assert err.startswith(
+        f"tractexp: {'ended by SIGTERM' if code == 143 else 'interrupted'}; the best of "
+    )
     from tractexp.identification.result import load
 
     kept = load(tmp_path / "run" / "interrupted.json")
@@ -446,7 +533,8 @@ def test_a_search_that_is_ended_keeps_what_it_found_and_says_so(way, code, tmp_p
 @pytest.mark.skipif(os.name == "nt", reason="ends a process by a signal")
 def test_the_process_that_logs_finishes_its_run_when_the_job_is_ended(uri):
     script = """
-import sys, time; from tractexp.tracking import TrackedRun; from tractexp.tracking.process import Logger
+import sys, time; from tractexp.tracking import TrackedRun; \
+from tractexp.tracking.process import Logger
 logger = Logger(sys.argv[1])
 logger._tell(TrackedRun("e", "r", key="k"))
 print(logger._process.pid, flush=True)
@@ -478,14 +566,24 @@ def postgres():
     if POSTGRES is None:
         pytest.skip("PostgreSQL is not installed: apt-get install postgresql")
     pytest.importorskip("psycopg2", reason="psycopg2 is not installed: pip install psycopg2-binary")
-    folder, port = Path(tempfile.mkdtemp(prefix="tractexp-pg-")), free_port()  # where another user may go, too
+    # where another user may go, too
+    folder, port = Path(tempfile.mkdtemp(prefix="tractexp-pg-")), free_port()
     folder.chmod(0o777)
-    as_user = ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"] if os.getuid() == 0 else []
+    as_user = (
+        ["setpriv", "--reuid=postgres", "--regid=postgres", "--clear-groups"]
+        if os.getuid() == 0
+        else []
+    )
     data = folder / "data"
     made = [POSTGRES / "initdb", "-D", data, "-A", "trust", "-U", "tester", "--no-sync"]
     subprocess.run([*as_user, *map(str, made)], check=True, capture_output=True)
-    settings = f"-c fsync=off -c listen_addresses=127.0.0.1 -c port={port} -c unix_socket_directories={folder}"
-    server = subprocess.Popen([*as_user, str(POSTGRES / "postgres"), "-D", str(data), *settings.split()], stderr=-3)
+    settings = (
+        f"-c fsync=off -c listen_addresses=127.0.0.1 -c port={port} -c"
+        f" unix_socket_directories={folder}"
+    )
+    server = subprocess.Popen(
+        [*as_user, str(POSTGRES / "postgres"), "-D", str(data), *settings.split()], stderr=-3
+    )
     try:
         deadline = time.monotonic() + 30
         ready = [str(POSTGRES / "pg_isready"), "-h", "127.0.0.1", "-p", str(port)]
@@ -501,15 +599,39 @@ def postgres():
 
 @contextlib.contextmanager
 def mlflow_server(store: str, folder: Path, port: int):
-    command = [sys.executable, "-m", "mlflow", "server", "--backend-store-uri", store, "--host", "127.0.0.1"]
-    command += ["--port", str(port), "--workers", "1", "--artifacts-destination", str(folder / "artifacts")]
-    env = os.environ | {"MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false", "MLFLOW_DISABLE_TELEMETRY": "true"}
+    command = [
+        sys.executable,
+        "-m",
+        "mlflow",
+        "server",
+        "--backend-store-uri",
+        store,
+        "--host",
+        "127.0.0.1",
+    ]
+    command += [
+        "--port",
+        str(port),
+        "--workers",
+        "1",
+        "--artifacts-destination",
+        str(folder / "artifacts"),
+    ]
+    env = os.environ | {
+        "MLFLOW_SERVER_ENABLE_JOB_EXECUTION": "false",
+        "MLFLOW_DISABLE_TELEMETRY": "true",
+    }
     with (folder / "server.txt").open("ab") as said:
-        server = subprocess.Popen(command, env=env, stdout=said, stderr=said, start_new_session=True, cwd=folder)
+        server = subprocess.Popen(
+            command, env=env, stdout=said, stderr=said, start_new_session=True, cwd=folder
+        )
     try:
         deadline = time.monotonic() + 120
         while True:
-            with contextlib.suppress(OSError), urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=2):
+            with (
+                contextlib.suppress(OSError),
+                urllib.request.urlopen(f"http://127.0.0.1:{port}/health", timeout=2),
+            ):
                 break
             assert server.poll() is None, (folder / "server.txt").read_text()
             assert time.monotonic() < deadline
@@ -527,7 +649,9 @@ def test_a_run_reaches_a_server_on_postgresql_also_one_made_while_that_was_away(
     assert sync(tmp_path) == {NOT: 1}
     (tmp_path / "result.json").write_text("{}")
     with mlflow_server(postgres, tmp_path, port) as address:
-        run_id = tracking.log(run("there", artifacts=[tmp_path / "result.json"], children=[run("child")]), address)
+        run_id = tracking.log(
+            run("there", artifacts=[tmp_path / "result.json"], children=[run("child")]), address
+        )
         assert sync(tmp_path) == {BROUGHT: 1}
         assert sync(tmp_path) == {THERE: 1}
         found = {r.info.run_name: r for r in runs(address)}
@@ -544,11 +668,18 @@ def test_a_run_reaches_a_server_on_postgresql_also_one_made_while_that_was_away(
 
 # A folder that holds an earlier run
 
-SEARCH = ("optimizer=multistart_least_squares", "budget=200", "tracking.enabled=false", "hydra.run.dir=run")
+SEARCH = (
+    "optimizer=multistart_least_squares",
+    "budget=200",
+    "tracking.enabled=false",
+    "hydra.run.dir=run",
+)
 
 
 def state(folder: Path) -> dict[str, bytes]:
-    return {str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        str(p.relative_to(folder)): p.read_bytes() for p in sorted(folder.rglob("*")) if p.is_file()
+    }
 
 
 @pytest.fixture(scope="module")
@@ -562,16 +693,34 @@ def earlier(tmp_path_factory):
 
 
 def seed_of(folder: Path) -> str:
-    return next(line for line in (folder / ".hydra" / "overrides.yaml").read_text().split() if "seed" in line)
+    return next(
+        line
+        for line in (folder / ".hydra" / "overrides.yaml").read_text().split()
+        if "seed" in line
+    )
 
 
 @pytest.mark.skipif(os.name == "nt", reason="ends a run by a signal")
 @pytest.mark.parametrize("way", [signal.SIGKILL, signal.SIGTERM])
-def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configuration(earlier, way, tmp_path):
+def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configuration(
+    earlier, way, tmp_path
+):
     shutil.copytree(earlier / "run", tmp_path / "run")
-    command = [sys.executable, "-m", "tractexp", *SEARCH, "seed=2", "optimizer=pso", "optimizer.iterations=10000000"]
-    command = [word for word in command if word not in ("budget=200", "optimizer=multistart_least_squares")]
-    job = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    command = [
+        sys.executable,
+        "-m",
+        "tractexp",
+        *SEARCH,
+        "seed=2",
+        "optimizer=pso",
+        "optimizer.iterations=10000000",
+    ]
+    command = [
+        word for word in command if word not in ("budget=200", "optimizer=multistart_least_squares")
+    ]
+    job = subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
     while "optimizer: pso" not in (line := job.stdout.readline()):
         assert line, job.stderr.read()
     time.sleep(1.0)
@@ -586,12 +735,18 @@ def test_a_run_killed_in_an_old_folder_leaves_no_result_under_its_own_configurat
         assert {"interrupted.json", "notes.txt"} <= left.keys()
     assert (run_command(*SEARCH, "seed=3", cwd=tmp_path)).returncode == 0
     assert seed_of(tmp_path / "run") == "seed=3"
-    assert {p.name for p in (tmp_path / "run").iterdir()} == {p.name for p in (earlier / "run").iterdir()}
+    assert {p.name for p in (tmp_path / "run").iterdir()} == {
+        p.name for p in (earlier / "run").iterdir()
+    }
 
 
 def test_a_run_that_is_refused_in_an_old_folder_leaves_it_as_it_was(earlier):
     before = state(earlier / "run")
-    for wrong in (("data=csv", "data.train=[absent.csv]"), ("budget=0",), ("model.bounds.C=[2,1]",)):
+    for wrong in (
+        ("data=csv", "data.train=[absent.csv]"),
+        ("budget=0",),
+        ("model.bounds.C=[2,1]",),
+    ):
         assert run_command(*SEARCH, "seed=2", *wrong, cwd=earlier).returncode == 2
         assert state(earlier / "run") == before
 
@@ -599,12 +754,19 @@ def test_a_run_that_is_refused_in_an_old_folder_leaves_it_as_it_was(earlier):
 def test_the_results_of_another_task_go_and_those_that_a_task_reads_stay(earlier, tmp_path):
     shutil.copytree(earlier / "run", tmp_path / "run")
     result = (tmp_path / "run" / "result.json").read_bytes()
-    export = ("task=export", "task.parameters=run/result.json", "task.format=modelica", "hydra.run.dir=run")
+    export = (
+        "task=export",
+        "task.parameters=run/result.json",
+        "task.format=modelica",
+        "hydra.run.dir=run",
+    )
     assert run_command(*export, cwd=tmp_path).returncode == 0
     assert state(tmp_path / "run").keys() == {*state(earlier / "run"), "load.mo"}
     assert seed_of(tmp_path / "run") == "seed=1"  # of the result that is there
     simulate = (*SIMULATE, "tracking.enabled=false")
-    of_result = ["task.parameters=run/result.json" if "values" in word else word for word in simulate]
+    of_result = [
+        "task.parameters=run/result.json" if "values" in word else word for word in simulate
+    ]
     assert run_command(*of_result, cwd=tmp_path).returncode == 0
     assert (tmp_path / "run" / "result.json").read_bytes() == result
     assert not (tmp_path / "run" / "history.csv").exists()
@@ -620,16 +782,24 @@ def test_the_results_of_another_task_go_and_those_that_a_task_reads_stay(earlier
 @pytest.mark.parametrize(
     "arguments",
     [
-        (*SIMULATE, "tracking.uri=http://me:hunter2@127.0.0.1:9"), (*SIMULATE, "tracking.url=http://me:hunter2@h"),
-        ("-m", "seed=1,2", "hydra.sweep.dir=run", "tracking.uri=postgresql://me:hunter2@127.0.0.1:9/db"),
-        ("ui", "--uri", "http://me:hunter2@127.0.0.1:9"), ("sync", ".", "--uri=http://me:hunter2@127.0.0.1:9"),
-        ("doctor", "--uri", "http://hunter2@127.0.0.1:9"), ("sync", "http://me:hunter2@127.0.0.1:9"),
+        (*SIMULATE, "tracking.uri=http://me:hunter2@127.0.0.1:9"),
+        (*SIMULATE, "tracking.url=http://me:hunter2@h"),
+        (
+            "-m",
+            "seed=1,2",
+            "hydra.sweep.dir=run",
+            "tracking.uri=postgresql://me:hunter2@127.0.0.1:9/db",
+        ),
+        ("ui", "--uri", "http://me:hunter2@127.0.0.1:9"),
+        ("sync", ".", "--uri=http://me:hunter2@127.0.0.1:9"),
+        ("doctor", "--uri", "http://hunter2@127.0.0.1:9"),
+        ("sync", "http://me:hunter2@127.0.0.1:9"),
         ("--config-dir=own", "+mine=store", *SIMULATE),
         ("--config-dir=own", "+mine=store", *SIMULATE[:-1], "hydra.run.dir=old"),
         ("-m", "--config-dir=own", "+mine=store", "seed=1,2", "hydra.sweep.dir=run"),
         (*SIMULATE, "tracking.uri=${oc.env:STORE}"),
     ],
-)  # fmt: skip
+)
 def test_a_password_is_neither_printed_nor_written(arguments, tmp_path):
     own = tmp_path / "own" / "mine" / "store.yaml"
     own.parent.mkdir(parents=True)
@@ -639,10 +809,14 @@ def test_a_password_is_neither_printed_nor_written(arguments, tmp_path):
     assert done.returncode == 2
     assert "MLFLOW_TRACKING_PASSWORD" in done.stderr
     assert "hunter2" not in done.stdout + done.stderr
-    assert [p for p in tmp_path.rglob("*") if p.is_file() and p != own and b"hunter2" in p.read_bytes()] == []
+    assert [
+        p for p in tmp_path.rglob("*") if p.is_file() and p != own and b"hunter2" in p.read_bytes()
+    ] == []
 
 
-def test_a_store_that_an_earlier_version_wrote_down_with_its_password_is_not_repeated(tmp_path, capsys):
+def test_a_store_that_an_earlier_version_wrote_down_with_its_password_is_not_repeated(
+    tmp_path, capsys
+):
     from tractexp.cli.sync import sync as command
 
     save(tmp_path / "run", run(), "http://me:hunter2@127.0.0.1:9")
@@ -665,7 +839,8 @@ asked = []
 class Server(BaseHTTPRequestHandler):
     def do_GET(self):
         asked.append(self.headers.get("Authorization"))
-        self.send_response(200); self.send_header("Content-Type", "application/json"); self.end_headers()
+        self.send_response(200); self.send_header("Content-Type", "application/json"); \
+self.end_headers()
         self.wfile.write(b"{}")
     do_POST = do_GET
     def log_message(self, *_): pass
@@ -679,5 +854,7 @@ print(*sorted({str(each) for each in asked[1:]}))"""
     netrc.chmod(0o600)
     names = {"MLFLOW_TRACKING_USERNAME": "me", "MLFLOW_TRACKING_PASSWORD": "hunter2"}
     for more in (names, {"NETRC": str(netrc)}):
-        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=os.environ | more)
+        done = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, env=os.environ | more
+        )
         assert done.stdout.strip() == "Basic bWU6aHVudGVyMg==", done.stderr

@@ -1,4 +1,6 @@
-"""Damaged configurations and sidecars: it works, or one sentence (a short run of `benchmarks/mutated_settings.py`)."""
+"""Damaged configurations and sidecars: it works, or one sentence (a short run of
+`benchmarks/mutated_settings.py`).
+"""
 
 import json
 import os
@@ -26,14 +28,22 @@ def test_a_damaged_setting_works_or_is_refused_with_a_sentence(monkeypatch):
 
 
 def test_the_stored_run_is_long_and_found_nothing():
-    stored = json.loads(Path(mutated_settings.__file__).with_suffix(".json").read_text(encoding="utf-8"))
+    stored = json.loads(
+        Path(mutated_settings.__file__).with_suffix(".json").read_text(encoding="utf-8")
+    )
     assert stored["bad"] == []
-    assert sum(sum(counts.values()) for counts in stored["counts"].values()) == stored["mutants"] >= 10_000
+    assert (
+        sum(sum(counts.values()) for counts in stored["counts"].values())
+        == stored["mutants"]
+        >= 10_000
+    )
     assert {kind for counts in stored["counts"].values() for kind in counts} == {"works", "refused"}
 
 
 def test_the_same_seed_makes_the_same_mutants(tmp_path, monkeypatch):
-    monkeypatch.setattr(mutated_settings, "keys_of", lambda arguments: ["seed", "data.train", "model.bounds.C"])
+    monkeypatch.setattr(
+        mutated_settings, "keys_of", lambda arguments: ["seed", "data.train", "model.bounds.C"]
+    )
     beside = tmp_path / "dip.json"
 
     def mutants():
@@ -80,9 +90,18 @@ def test_a_range_without_an_end_holds_finite_numbers_only(value):
 
 
 REFUSED = [
-    (["data=csv", "data.train=[dip.csv]", "data.base_power=inf"], "data.base_power=inf is out of range: it must be"),
-    (["data=csv", "data.train=[dip.csv]", "data.frequency=1e20"], "data.frequency=1e+20 is out of range: it must be"),
-    (["data=csv", "data.train=[deep.csv]"], "deep.json: its brackets lie deeper within one another than can be read"),
+    (
+        ["data=csv", "data.train=[dip.csv]", "data.base_power=inf"],
+        "data.base_power=inf is out of range: it must be",
+    ),
+    (
+        ["data=csv", "data.train=[dip.csv]", "data.frequency=1e20"],
+        "data.frequency=1e+20 is out of range: it must be",
+    ),
+    (
+        ["data=csv", "data.train=[deep.csv]"],
+        "deep.json: its brackets lie deeper within one another than can be read",
+    ),
     (["data=csv", "data.train=dip.csv"], "data.train takes a list, such as data.train=[a,b]"),
     (["~seed"], "~seed takes out what every run needs"),
     (["~model"], "~model takes out what every run needs"),
@@ -97,11 +116,20 @@ REFUSED = [
     (["seed=${seed}"], "Recursive interpolation detected"),
     (["data.train.x=a"], "data.train.x=a: no such value can be set there"),
     (["seed='"], "seed=' cannot be read; an argument is KEY=VALUE"),
-    (["model.effects=" + "[" * 99 + "]" * 99], "model.effects has brackets 99 deep within one another"),
+    (
+        ["model.effects=" + "[" * 99 + "]" * 99],
+        "model.effects has brackets 99 deep within one another",
+    ),
     (["tracking.uri=a\nb"], "tracking.uri=a b has a line break"),
     (["optimizer.population=99999999999"], "optimizer.population=99999999999 is out of range"),
-    (["hydra.run.dir=/dev/null/x"], "/dev/null/x cannot be created (Not a directory); choose another folder"),
-    (["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"], "/dev/null/x/.tractexp.next.lock cannot be written"),
+    (
+        ["hydra.run.dir=/dev/null/x"],
+        "/dev/null/x cannot be created (Not a directory); choose another folder",
+    ),
+    (
+        ["-m", "hydra.sweep.dir=/dev/null/x", "seed=1,2"],
+        "/dev/null/x/.tractexp.next.lock cannot be written",
+    ),
 ]
 # one process for all: what takes time is to start
 SESSION = """if True:
@@ -127,7 +155,11 @@ def test_each_fault_gets_one_sentence(tmp_path):
     (tmp_path / "deep.json").write_text(mutated_settings.DEEP)
     asked = [[*arguments, "tracking.enabled=false"] for arguments, _ in REFUSED]
     ran = subprocess.run(
-        [sys.executable, "-c", SESSION, json.dumps(asked)], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-c", SESSION, json.dumps(asked)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     for (arguments, sentence), (code, said) in zip(REFUSED, json.loads(ran.stdout), strict=True):
         assert code == 2, (arguments, said)
@@ -142,10 +174,22 @@ def test_each_fault_gets_one_sentence(tmp_path):
         ({"base": {"power": float("inf")}}, "base.power = Infinity must be a number from"),
         ({"base": {"frequency": 1e20}}, "base.frequency = 1e\\+20 must be a number from"),
         ({"base": {"voltage": True}}, "base.voltage = true must be a number from"),
-        ({"window": {"name": "w", "at": [0, 1e308], "weights": [1, 0]}}, "window is not as task=convert writes it"),
-        ({"window": {"name": "w", "at": [[0], [1]], "weights": [1, 0]}}, "window is not as task=convert writes it"),
-        ({"window": {"name": "w", "at": [0.0], "weights": [1]}}, "window is not as task=convert writes it"),
-        ({"window": {"name": "w", "at": [10**400, 1], "weights": [1, 0]}}, "window is not as task=convert writes it"),
+        (
+            {"window": {"name": "w", "at": [0, 1e308], "weights": [1, 0]}},
+            "window is not as task=convert writes it",
+        ),
+        (
+            {"window": {"name": "w", "at": [[0], [1]], "weights": [1, 0]}},
+            "window is not as task=convert writes it",
+        ),
+        (
+            {"window": {"name": "w", "at": [0.0], "weights": [1]}},
+            "window is not as task=convert writes it",
+        ),
+        (
+            {"window": {"name": "w", "at": [10**400, 1], "weights": [1, 0]}},
+            "window is not as task=convert writes it",
+        ),
     ],
 )
 def test_a_sidecar_that_is_not_finite_is_refused(tmp_path, told, sentence):

@@ -1,4 +1,6 @@
-"""`tractexp new`: the package that it writes holds what every plugin must satisfy, and overwrites nothing."""
+"""`tractexp new`: the package that it writes holds what every plugin must satisfy, and overwrites
+nothing.
+"""
 
 import os
 import subprocess
@@ -15,7 +17,9 @@ from tractexp.errors import UserError
 def test_the_test_that_is_written_passes(kind, tmp_path):
     place = written(kind, f"own_{kind}", tmp_path)
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
-    done = subprocess.run(command, cwd=place, capture_output=True, text=True, env={**os.environ, "PYTEST_ADDOPTS": ""})
+    done = subprocess.run(
+        command, cwd=place, capture_output=True, text=True, env={**os.environ, "PYTEST_ADDOPTS": ""}
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert " passed" in done.stdout
     assert "skipped" not in done.stdout
@@ -25,12 +29,21 @@ def test_it_says_how_to_test_install_and_choose(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     assert new(["effect", "motor_heating"]) == 0
     told = capsys.readouterr().out
-    for words in ("cd tractexp_motor_heating && python -m pytest", "pip install -e tractexp_motor_heating",
-                  "model.effects=[motor_heating]"):  # fmt: skip
+    for words in (
+        "cd tractexp_motor_heating && python -m pytest",
+        "pip install -e tractexp_motor_heating",
+        "model.effects=[motor_heating]",
+    ):
         assert words in told
-    project = tomllib.loads((tmp_path / "tractexp_motor_heating" / "pyproject.toml").read_text())["project"]
-    assert project["entry-points"]["tractexp.plugins"] == {"tractexp_motor_heating": "tractexp_motor_heating"}
-    code = (tmp_path / "tractexp_motor_heating" / "tractexp_motor_heating" / "motor_heating.py").read_text()
+    project = tomllib.loads((tmp_path / "tractexp_motor_heating" / "pyproject.toml").read_text())[
+        "project"
+    ]
+    assert project["entry-points"]["tractexp.plugins"] == {
+        "tractexp_motor_heating": "tractexp_motor_heating"
+    }
+    code = (
+        tmp_path / "tractexp_motor_heating" / "tractexp_motor_heating" / "motor_heating.py"
+    ).read_text()
     assert "class MotorHeating(Effect):" in code
     assert "xample" not in code
 

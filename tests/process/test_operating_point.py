@@ -1,4 +1,6 @@
-"""What a fitted load is before its dip: the circuit's own figures, and the machine that none can be."""
+"""What a fitted load is before its dip: the circuit's own figures, and the machine that none can
+be.
+"""
 
 import dataclasses
 from contextlib import nullcontext
@@ -37,11 +39,15 @@ def test_the_motor_draws_what_its_circuit_draws_at_its_slip():
     assert (point.P_motor, point.Q_motor) == pytest.approx((drawn.real, drawn.imag), rel=1e-6)
     S = abs(drawn)
     assert pytest.approx(VALUES["M"] * OMEGA / 2 / S, rel=1e-6) == point.H
-    assert point.starting == pytest.approx(result.before["U0"] ** 2 / abs(circuit.impedance(1.0)) / S, rel=1e-6)
+    assert point.starting == pytest.approx(
+        result.before["U0"] ** 2 / abs(circuit.impedance(1.0)) / S, rel=1e-6
+    )
 
 
 def test_it_is_said_in_megawatts_where_the_base_is_in_them():
-    point = OperatingPoint.of(fitted({"power": 29.7, "file_power": 100.0, "in_mva": True, "origin": "file"}))
+    point = OperatingPoint.of(
+        fitted({"power": 29.7, "file_power": 100.0, "in_mva": True, "origin": "file"})
+    )
     assert point.units == ("MW", "Mvar")
     assert pytest.approx(29.7) == point.P
     assert pytest.approx(29.7 * OperatingPoint.of(fitted()).P_motor) == point.P_motor
@@ -53,17 +59,27 @@ def test_it_is_said_in_megawatts_where_the_base_is_in_them():
     [
         ({"T_m": 0.55}, ""),
         ({"T_m": 1.15}, ""),  # 1.2 of the load's power is let pass
-        ({"T_m": 1.9, "X_prime": 0.1}, "draws 1.9 pu of a load of 1 pu and 0.6 pu, and the static part generates"),
-        ({"X_prime": 0.05, "C": 0.3}, "pu of a load of 1 pu and 0.6 pu, and the static part supplies"),
+        (
+            {"T_m": 1.9, "X_prime": 0.1},
+            "draws 1.9 pu of a load of 1 pu and 0.6 pu, and the static part generates",
+        ),
+        (
+            {"X_prime": 0.05, "C": 0.3},
+            "pu of a load of 1 pu and 0.6 pu, and the static part supplies",
+        ),
     ],
 )
 def test_a_motor_that_no_load_has_is_doubted_and_its_export_asked_for(parameters, doubt):
     result = fitted(**parameters)
-    result = dataclasses.replace(result, adequacy={"grade": "effect_missing", "sentence": "it fits"})
+    result = dataclasses.replace(
+        result, adequacy={"grade": "effect_missing", "sentence": "it fits"}
+    )
     fit = Identification(result)
     assert doubt in OperatingPoint.of(result).doubt
     assert bool(doubt) == (fit.headline != "it fits")
-    refused = pytest.raises(UserError, match=r"is no physical load: the motor draws .*doubtful=true exports it all")
+    refused = pytest.raises(
+        UserError, match=r"is no physical load: the motor draws .*doubtful=true exports it all"
+    )
     with refused if doubt else nullcontext():
         tractexp.export(fit, "andes")
     assert tractexp.export(fit, "andes", doubtful=True).text
@@ -71,7 +87,9 @@ def test_a_motor_that_no_load_has_is_doubted_and_its_export_asked_for(parameters
 
 def test_a_model_that_does_not_describe_the_load_is_exported_when_asked_for_only(tmp_path):
     sentence = "this model does not describe this load: it leaves 45 % of its response (11 % of S)"
-    wrong = dataclasses.replace(fitted(), adequacy={"grade": "wrong_model", "sentence": sentence, "p": 0.0})
+    wrong = dataclasses.replace(
+        fitted(), adequacy={"grade": "wrong_model", "sentence": sentence, "p": 0.0}
+    )
     wrong.write(tmp_path / "result.json")
     fit = tractexp.load(tmp_path)
     assert (fit.grade, fit.headline) == ("wrong_model", sentence)
@@ -84,7 +102,9 @@ def test_a_model_that_does_not_describe_the_load_is_exported_when_asked_for_only
 
 
 def test_a_parameter_that_a_bound_holds_is_exported_when_asked_for_only():
-    result = dataclasses.replace(fitted(), verdicts={"C": "at its bound (0.99; widen model.bounds.C)"})
+    result = dataclasses.replace(
+        fitted(), verdicts={"C": "at its bound (0.99; widen model.bounds.C)"}
+    )
     with pytest.raises(UserError, match="C is held by a bound alone"):
         tractexp.export(Identification(result), "andes")
 

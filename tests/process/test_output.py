@@ -1,4 +1,6 @@
-"""What a command prints: readers that end, disks that are full, terminals of few letters, and escapes of others."""
+"""What a command prints: readers that end, disks that are full, terminals of few letters, and
+escapes of others.
+"""
 
 import os
 import subprocess
@@ -22,15 +24,25 @@ SEARCH = ("optimizer=random_search", "budget=20", "tracking.enabled=false", "hyd
 def shell(line: str, cwd, **environment) -> subprocess.CompletedProcess:
     command = line.replace("tractexp", " ".join(TRACTEXP))
     there = os.environ | environment
-    return subprocess.run(["bash", "-o", "pipefail", "-c", command], cwd=cwd, capture_output=True, text=True, env=there)
+    return subprocess.run(
+        ["bash", "-o", "pipefail", "-c", command],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        env=there,
+    )
 
 
 def test_a_reader_that_ends_ends_nothing(tmp_path):
-    done = shell(f"tractexp list | head -1; tractexp {' '.join(SEARCH)} | head -1; tractexp list | true", tmp_path)
+    done = shell(
+        f"tractexp list | head -1; tractexp {' '.join(SEARCH)} | head -1; tractexp list | true",
+        tmp_path,
+    )
     assert done.returncode == 0
     assert done.stderr == ""
     assert done.stdout.startswith("task: what to do")
-    assert (tmp_path / "run" / "report.html").exists()  # what was printed was of no interest, what is found is kept
+    # what was printed was of no interest, what is found is kept
+    assert (tmp_path / "run" / "report.html").exists()
 
 
 def test_a_full_disk_for_what_is_printed_is_a_sentence(tmp_path):
@@ -39,7 +51,8 @@ def test_a_full_disk_for_what_is_printed_is_a_sentence(tmp_path):
     done = shell(f"tractexp {' '.join(SEARCH)} > /dev/full", tmp_path)
     assert done.returncode == 2
     assert done.stderr == (
-        "tractexp: what was to be printed could not be written (No space left on device); files are whole\n"
+        "tractexp: what was to be printed could not be written (No space left on device); files are"
+        " whole\n"
     )
     assert (tmp_path / "run" / "report.html").exists()
 
@@ -49,7 +62,9 @@ def test_no_output_at_all_is_none(tmp_path):
     assert (done.returncode, done.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("more", [{}, {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {"PYTHONIOENCODING": "ascii"}])
+@pytest.mark.parametrize(
+    "more", [{}, {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}, {"PYTHONIOENCODING": "ascii"}]
+)
 def test_a_terminal_of_few_letters_gets_escapes(more, tmp_path):
     (tmp_path / "станция.csv").write_text(hostile.text(hostile.VALUES))
     done = shell("tractexp look station.csv *.csv --folder run", tmp_path, LC_ALL="C", **more)
@@ -68,7 +83,8 @@ def test_escapes_of_others_are_shown_as_text(tmp_path):
     path = hostile.INPUTS["escaped_cell.csv"](tmp_path / "escaped_cell.csv")
     done = run_command("look", path.name, cwd=tmp_path)
     assert done.stderr == (
-        r"tractexp: escaped_cell.csv: line 302, column t: '\x1b]0;owned\x07\x1b[31m\x9b2J' is not a number" + "\n"
+        r"tractexp: escaped_cell.csv: line 302, column t: '\x1b]0;owned\x07\x1b[31m\x9b2J' is not a"
+        r" number" + "\n"
     )
 
 
@@ -81,7 +97,12 @@ def test_what_is_no_escape_stays():
 
 @pytest.mark.parametrize(
     ("error", "words"),
-    [(0.0123456, "1.235%"), (float("nan"), "undefined"), (float("inf"), "undefined"), (None, "undefined")],
+    [
+        (0.0123456, "1.235%"),
+        (float("nan"), "undefined"),
+        (float("inf"), "undefined"),
+        (None, "undefined"),
+    ],
 )
 def test_an_error_of_nothing_is_undefined(error, words):
     assert epsilon(error) == words

@@ -35,9 +35,21 @@ def acme(tmp_path_factory):
     """Where the second package is installed."""
     site = tmp_path_factory.mktemp("site")
     package = tmp_path_factory.mktemp("source") / "acme"
-    subprocess.run(["cp", "-r", str(TESTS / "acme"), str(package)], check=True)  # the build leaves files behind
-    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation", "--no-index"]
-    done = subprocess.run([*pip, "--target", str(site), str(package)], capture_output=True, text=True)
+    # the build leaves files behind
+    subprocess.run(["cp", "-r", str(TESTS / "acme"), str(package)], check=True)
+    pip = [
+        sys.executable,
+        "-m",
+        "pip",
+        "install",
+        "-q",
+        "--no-deps",
+        "--no-build-isolation",
+        "--no-index",
+    ]
+    done = subprocess.run(
+        [*pip, "--target", str(site), str(package)], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr
     (site / "test_acme.py").write_text((TESTS / "acme" / "test_acme.py").read_text())
     return site
@@ -45,7 +57,11 @@ def acme(tmp_path_factory):
 
 def test_a_second_package_adds_a_load_an_optimizer_and_an_experiment(acme, tmp_path):
     done = start_command(
-        "experiment=acme_trial", "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path, PYTHONPATH=str(acme)
+        "experiment=acme_trial",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+        PYTHONPATH=str(acme),
     )
     assert done.returncode == 0, done.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
@@ -58,7 +74,9 @@ def test_a_second_package_adds_a_load_an_optimizer_and_an_experiment(acme, tmp_p
 def test_a_second_package_is_in_the_help_and_checked_like_ours(acme, tmp_path):
     done = start_command("--help", cwd=tmp_path, PYTHONPATH=str(acme))
     assert "acme_descent" in done.stdout
-    done = start_command("optimizer=acme_descent", "optimizer.tries=0", cwd=tmp_path, PYTHONPATH=str(acme))
+    done = start_command(
+        "optimizer=acme_descent", "optimizer.tries=0", cwd=tmp_path, PYTHONPATH=str(acme)
+    )
     assert done.returncode == 2
     assert done.stderr == "tractexp: optimizer.tries=0 is out of range: it must be at least 1\n"
 
@@ -69,9 +87,23 @@ def test_a_second_package_keeps_the_contracts_by_one_line(acme, tmp_path):
 
 def passed(file, package, folder):
     """Run a test file with a package on the path, and the project's own settings."""
-    pytest_there = [sys.executable, "-m", "pytest", "-q", "-W", "error", "-p", "no:cacheprovider", str(file)]
+    pytest_there = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-W",
+        "error",
+        "-p",
+        "no:cacheprovider",
+        str(file),
+    ]
     done = subprocess.run(
-        pytest_there, cwd=folder, capture_output=True, text=True, env=os.environ | {"PYTHONPATH": str(package)}
+        pytest_there,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": str(package)},
     )
     assert done.returncode == 0, done.stdout[-4000:]
 
@@ -106,37 +138,64 @@ def test_a_motor_takes_what_its_sites_allow_and_says_why_not():
     refusals = {name: model.acceptance(effect).refusal for name, effect in effects.items()}
     assert {name: why for name, why in refusals.items() if why} == {
         "magnetic_saturation": "its equations have no C",
-        "negative_sequence_braking": "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)",
+        "negative_sequence_braking": (
+            "its equations have no coupling ((X - X')/X, the rotor's share in the reactance)"
+        ),
         "rotor_flux": "its rotor flux moves already",
         "saturation_curve": "its equations have no C",
         "rotor_speed": "its speed moves already",
     }
 
 
-@pytest.mark.parametrize("motor", sorted(set(discover()["model/motor"]) - {"none", "line_side_converter"}))
+MACHINES = sorted(set(discover()["model/motor"]) - {"none", "line_side_converter"})
+
+
+@pytest.mark.parametrize("motor", MACHINES)
 def test_every_motor_is_pushed_in_each_flux_and_its_speed(motor):
-    eq = compose(get("model/motor", motor)(), get("model/static", "exponential")(), [Injection()]).equations
+    static = get("model/static", "exponential")()
+    eq = compose(get("model/motor", motor)(), static, [Injection()]).equations
     for state in eq.states.values():
         pushed = {s.name for s in state.derivative.free_symbols} & set(PERTURBATIONS)
-        assert pushed == {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}[state.role]
+        expected = {"flux": {"push_flux_d", "push_flux_q"}, "speed": {"push_speed"}}
+        assert pushed == expected[state.role]
 """
 
 
 def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
-    """Each block of docs/plugins.md that is Python, as it stands there, is a plugin of a package."""
-    blocks = re.findall(r"```python\n# (\w+\.py)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    """Each block of docs/plugins.md that is Python, as it stands there, is a plugin
+    of a package.
+    """
+    blocks = re.findall(
+        r"```python\n# (\w+\.py)\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL
+    )
     assert {name for name, _ in blocks} == {
-        "linear_load.py", "rate_dependence.py", "late_load.py", "channel_gain.py", "acme_motor.py",
-        "shrinking_step.py", "tabbed.py", "raw16.py", "tabs.py", "open_y.py", "hann.py",
-    }  # fmt: skip
+        "linear_load.py",
+        "rate_dependence.py",
+        "late_load.py",
+        "channel_gain.py",
+        "acme_motor.py",
+        "shrinking_step.py",
+        "tabbed.py",
+        "raw16.py",
+        "tabs.py",
+        "open_y.py",
+        "hann.py",
+    }
     package = tmp_path / "documented"
     package.mkdir()
     for name, text in (("__init__.py", ""), *blocks):
         (package / name).write_text(text, encoding="utf-8")
     t = np.arange(100) * 0.01
-    np.savetxt(tmp_path / "dip.tsv", np.c_[t, np.ones(100), np.ones(100), np.full(100, 0.5)], delimiter="\t")
+    np.savetxt(
+        tmp_path / "dip.tsv",
+        np.c_[t, np.ones(100), np.ones(100), np.full(100, 0.5)],
+        delimiter="\t",
+    )
     t = np.arange(8000) / 4000
-    u = np.cos(2 * np.pi * (50 * t[:, None] - np.arange(3) / 3)) * np.where((t > 1) & (t < 1.2), 0.7, 1.0)[:, None]
+    u = (
+        np.cos(2 * np.pi * (50 * t[:, None] - np.arange(3) / 3))
+        * np.where((t > 1) & (t < 1.2), 0.7, 1.0)[:, None]
+    )
     np.round(np.hstack([18000 * u, 6000 * u])).astype("<i2").tofile(tmp_path / "dip.raw16")
     (tmp_path / "test_strangers.py").write_text(STRANGERS)
     passed("test_strangers.py", tmp_path, tmp_path)
@@ -144,7 +203,9 @@ def test_the_examples_of_the_documentation_keep_the_contracts(tmp_path):
 
 def test_the_package_of_the_documentation_is_the_one_that_is_installed_here():
     (told,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    assert tomllib.loads(told) == tomllib.loads((TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8"))
+    assert tomllib.loads(told) == tomllib.loads(
+        (TESTS / "acme" / "pyproject.toml").read_text(encoding="utf-8")
+    )
 
 
 def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_path):
@@ -155,14 +216,38 @@ def test_the_documentation_tells_every_word_of_the_equations_and_every_site(tmp_
     text = PAGE.read_text(encoding="utf-8")
     told = set(re.findall(r"`eq\.(\w+)", text))
     framework = {
-        "parameters", "definitions", "steps", "values_before", "shown", "states", "memories", "requirements", "edits",
-        "latex_names", "write", "declare", "close", "at_rest", "expand", "real_states", "real_starts",
-        "real_balances", "parts", "real", "latex", "outputs",
-    }  # fmt: skip
-    assert told == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
+        "parameters",
+        "definitions",
+        "steps",
+        "values_before",
+        "shown",
+        "states",
+        "memories",
+        "requirements",
+        "edits",
+        "latex_names",
+        "write",
+        "declare",
+        "close",
+        "at_rest",
+        "expand",
+        "real_states",
+        "real_starts",
+        "real_balances",
+        "parts",
+        "real",
+        "latex",
+        "outputs",
+    }
+    assert (
+        told
+        == {w for w in (*dir(Equations), *vars(Equations())) if not w.startswith("_")} - framework
+    )
     listed = sites.write(tmp_path).read_text(encoding="utf-8")
     for site in SITES.values():
-        assert f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in listed
+        assert (
+            f"| `{site.name}` | {site.owner} | {site.kind} | {site.unit} | {site.about} |" in listed
+        )
 
 
 def test_without_the_package_its_names_are_unknown(tmp_path):
@@ -185,12 +270,22 @@ class Shared(Static):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("x = 1\ndef law(:\n", r"module '\w+\.bad' cannot be imported: .*bad\.py, line 2: SyntaxError: invalid syntax"),
-        ("import json\n\njson.loads('{')\n", r"bad\.py, line 3: JSONDecodeError: Expecting property name"),
-        ("import nowhere_to_be_found\n", r"bad\.py, line 1: ModuleNotFoundError: No module named 'nowhere_to_be"),
+        (
+            "x = 1\ndef law(:\n",
+            r"module '\w+\.bad' cannot be imported: .*bad\.py, line 2: SyntaxError: invalid syntax",
+        ),
+        (
+            "import json\n\njson.loads('{')\n",
+            r"bad\.py, line 3: JSONDecodeError: Expecting property name",
+        ),
+        (
+            "import nowhere_to_be_found\n",
+            r"bad\.py, line 1: ModuleNotFoundError: No module named 'nowhere_to_be",
+        ),
         (
             FORGOTTEN,
-            r"bad\.py, line 4: the class Shared\(Static\) is not decorated with @plugin, so nothing can choose",
+            r"bad\.py, line 4: the class Shared\(Static\) is not decorated with @plugin, so nothing"
+            r" can choose",
         ),
         (
             "from tractexp.extend import sites\n\nsites.P_statc\n",
@@ -198,7 +293,9 @@ class Shared(Static):
         ),
     ],
 )
-def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(text, sentence, tmp_path, monkeypatch):
+def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(
+    text, sentence, tmp_path, monkeypatch
+):
     name = f"rough_{tmp_path.name.replace('-', '_')}"
     (tmp_path / name).mkdir()
     (tmp_path / name / "__init__.py").write_text("")
@@ -209,11 +306,17 @@ def test_a_module_that_cannot_be_a_plugin_is_refused_with_its_file_and_line(text
         discover.__wrapped__()
 
 
-def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decorator(tmp_path, monkeypatch):
+def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decorator(
+    tmp_path, monkeypatch
+):
     made = tmp_path / "shared_bases"
     made.mkdir()
     (made / "__init__.py").write_text("")
-    text = FORGOTTEN + '\n@plugin\nclass Child(Shared):\n    """Source: here."""\n\nclass _Own(Static):\n    pass\n'
+    text = (
+        FORGOTTEN
+        + '\n@plugin\nclass Child(Shared):\n    """Source: here."""\n\nclass _Own(Static):\n   '
+        " pass\n"
+    )
     (made / "shared_base_child.py").write_text(text)
     (made / "importer.py").write_text("from tractexp.extend import Static\n")
     monkeypatch.syspath_prepend(tmp_path)
@@ -223,7 +326,10 @@ def test_what_plugins_are_made_from_is_not_taken_for_a_plugin_without_its_decora
 
 @pytest.mark.parametrize(
     ("file", "sentence"),
-    [("", "cannot be imported: ModuleNotFoundError"), ("lonely_acme.py", "is a single file; make it a folder")],
+    [
+        ("", "cannot be imported: ModuleNotFoundError"),
+        ("lonely_acme.py", "is a single file; make it a folder"),
+    ],
 )
 def test_an_entry_point_that_is_no_package_is_refused(file, sentence, tmp_path, monkeypatch):
     if file:
@@ -244,7 +350,9 @@ def test_every_plugin_has_a_schema_that_says_its_name():
 
 
 def test_an_unknown_name_gets_the_nearest_one():
-    with pytest.raises(UserError, match=r"there is no optimizer 'isa'; did you mean 'issa'\? Available: .*pso"):
+    with pytest.raises(
+        UserError, match=r"there is no optimizer 'isa'; did you mean 'issa'\? Available: .*pso"
+    ):
         get("optimizer", "isa")
 
 
@@ -262,13 +370,17 @@ def test_a_plugin_without_a_source_is_refused():
 
 
 def test_python_without_docstrings_is_told_from_a_plugin_without_a_source():
-    done = subprocess.run([sys.executable, "-OO", "-m", "tractexp", "--cfg", "job"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-OO", "-m", "tractexp", "--cfg", "job"], capture_output=True, text=True
+    )
     assert done.returncode == 2
     assert done.stderr.endswith("run without -OO\n")
 
 
 def test_a_plugin_without_the_method_that_its_base_leaves_to_it_is_refused():
-    with pytest.raises(UserError, match="lacks what every plugin of group 'optimizer' must do: define search"):
+    with pytest.raises(
+        UserError, match="lacks what every plugin of group 'optimizer' must do: define search"
+    ):
 
         @plugin
         class Idle(Optimizer):
@@ -289,11 +401,14 @@ def test_a_plugin_without_a_base_is_refused():
 def test_a_taken_name_is_refused_and_both_are_named():
     discover()
     with pytest.raises(
-        UserError, match=r"the name 'ssa' in group 'optimizer' is taken by tractexp_plugins\.optimizers"
+        UserError,
+        match=r"the name 'ssa' in group 'optimizer' is taken by tractexp_plugins\.optimizers",
     ):
         plugin(
             type(
-                "Ssa", (Optimizer,), {"__doc__": "Source: here.", "__module__": "elsewhere.ssa", "__annotations__": {}}
+                "Ssa",
+                (Optimizer,),
+                {"__doc__": "Source: here.", "__module__": "elsewhere.ssa", "__annotations__": {}},
             )
         )
 
@@ -319,28 +434,61 @@ def effect(edit, **attributes):
 @pytest.mark.parametrize(
     ("made", "sentence"),
     [
-        (load(lambda self, u, p_w: (1, 1), p_v=replace(PLAIN)),
-         r"law\(\) asks for 'p_w', which is neither a parameter of it nor offered; did you mean 'p_v'\?.* f, p_v"),
-        (load(lambda self, u: (1, 1), p_v=replace(PLAIN)), r"law\(\) does not take the parameter 'p_v'"),
+        (
+            load(lambda self, u, p_w: (1, 1), p_v=replace(PLAIN)),
+            r"law\(\) asks for 'p_w', which is neither a parameter of it nor offered; did you mean"
+            r" 'p_v'\?.* f, p_v",
+        ),
+        (
+            load(lambda self, u: (1, 1), p_v=replace(PLAIN)),
+            r"law\(\) does not take the parameter 'p_v'",
+        ),
         (load(lambda self, p_v: (1, 1), p_v=replace(PLAIN)), r"law\(\) must take u first"),
         (load(lambda self, u, *p: (1, 1), p_v=replace(PLAIN)), r"by name, so it cannot take \*p"),
-        (load(lambda self, u, f: (f, 1)), r"law\(\) asks for the frequency, f, .* say reads = \('f',\)"),
+        (
+            load(lambda self, u, f: (f, 1)),
+            r"law\(\) asks for the frequency, f, .* say reads = \('f',\)",
+        ),
         (load(lambda self, u: (1, 1), reads=("frequency",)), "reads names the channel 'frequency'"),
-        (load(lambda self, u, _c: (1, 1), _c=replace(PLAIN)), "called '_c': that is no name of Python's"),
-        (load(lambda self, u, U0: (1, 1), U0=replace(PLAIN)), "called 'U0': the equations give that name"),
-        (load(lambda self, u, a, b: (1, 1), **dict.fromkeys("ab", replace(PLAIN))), "'b' is the parameter 'a' again"),
-        (load(lambda self, u, a: (1, 1), a=replace(PLAIN, unit="")), "a: the parameter has no unit"),
+        (
+            load(lambda self, u, _c: (1, 1), _c=replace(PLAIN)),
+            "called '_c': that is no name of Python's",
+        ),
+        (
+            load(lambda self, u, U0: (1, 1), U0=replace(PLAIN)),
+            "called 'U0': the equations give that name",
+        ),
+        (
+            load(lambda self, u, a, b: (1, 1), **dict.fromkeys("ab", replace(PLAIN))),
+            "'b' is the parameter 'a' again",
+        ),
+        (
+            load(lambda self, u, a: (1, 1), a=replace(PLAIN, unit="")),
+            "a: the parameter has no unit",
+        ),
         ((Static, {}, {}), "must do: define law"),
         ((Motor, {"declare": lambda self, eq, speed: None}, {}), r"declare\(\) asks for 'speed'"),
         ((Measurement, {"a": replace(SIZE)}, {}), "must do: define observe"),
-        ((Effect, {"edit": lambda self, eq, a: None}, {"a": replace(PLAIN)}), "has no size: give the .* a 'null'"),
+        (
+            (Effect, {"edit": lambda self, eq, a: None}, {"a": replace(PLAIN)}),
+            "has no size: give the .* a 'null'",
+        ),
         (effect(lambda self, eq: None), r"edit\(\) does not take the parameter 'a'"),
-        (effect(lambda self, eq, a: None, grid={"b": (1.0,)}), "grid names 'b', no parameter of it"),
+        (
+            effect(lambda self, eq, a: None, grid={"b": (1.0,)}),
+            "grid names 'b', no parameter of it",
+        ),
         (effect(lambda self, eq, a: None, grid={"a": (1.0,)}), "grid names 'a', which is a size"),
-        (effect(lambda self, eq, a, b: None, b=replace(PLAIN), relevant={"b": 0.1}), "relevant names 'b', which"),
-        (effect(lambda self, eq, a, b: None, b=replace(PLAIN), grid={"b": (3.0,)}), "grid has b = 3, outside its"),
+        (
+            effect(lambda self, eq, a, b: None, b=replace(PLAIN), relevant={"b": 0.1}),
+            "relevant names 'b', which",
+        ),
+        (
+            effect(lambda self, eq, a, b: None, b=replace(PLAIN), grid={"b": (3.0,)}),
+            "grid has b = 3, outside its",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_a_class_forgets_is_refused_when_it_is_registered(made, sentence):
     base, methods, attributes = made
     with pytest.raises(UserError, match=r"^plugin elsewhere\.stranger\.Stranger.*" + sentence):
@@ -351,7 +499,10 @@ def test_what_a_class_forgets_is_refused_when_it_is_registered(made, sentence):
     ("settings", "sentence"),
     [
         ({"default": 2.0}, r"the default 2 is outside the bounds \[0, 1\]"),
-        ({"bounds": (1.0, 0.0)}, r"bounds \[1, 0\] must be two finite numbers, the lower one first"),
+        (
+            {"bounds": (1.0, 0.0)},
+            r"bounds \[1, 0\] must be two finite numbers, the lower one first",
+        ),
         ({"bounds": (0.0, float("inf"))}, "must be two finite numbers"),
         ({"null": -1.0}, r"the null -1 is outside the bounds \[0, 1\]"),
         ({"source": " "}, "the parameter has no source"),
@@ -378,17 +529,34 @@ def test_a_second_package_replaces_a_shipped_default(acme, tmp_path):
 
 
 ENGLISH = {"none", "voltage"}  # words first, and names of plugins besides
-NAMING = ("studies/paper/", "extend/")  # the paper's subject, and parts that happen to be called as a plugin is
+# the paper's subject, and parts that happen to be called as a plugin is
+NAMING = ("studies/paper/", "extend/")
 
 
 def test_the_framework_names_no_plugin():
-    ours = {group: classes for group, classes in discover().items() if group != "task"}  # and what tests have added
-    names = {n for classes in ours.values() for n, cls in classes.items() if cls.__module__.startswith("tractexp_")}
-    names |= {path.stem for group in ("data", "model", "optimizer") for path in (CONF / group).glob("*.yaml")}
+    # and what tests have added
+    ours = {group: classes for group, classes in discover().items() if group != "task"}
+    names = {
+        n
+        for classes in ours.values()
+        for n, cls in classes.items()
+        if cls.__module__.startswith("tractexp_")
+    }
+    names |= {
+        path.stem
+        for group in ("data", "model", "optimizer")
+        for path in (CONF / group).glob("*.yaml")
+    }
     found = []
     for path in sorted(FRAMEWORK.rglob("*.py")):
         where = path.relative_to(FRAMEWORK).as_posix()
         if not where.startswith(NAMING):
-            strings = (node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Constant))
-            found += [f"{where}:{s.lineno} '{s.value}'" for s in strings if s.value in names - ENGLISH]
+            strings = (
+                node
+                for node in ast.walk(ast.parse(path.read_text()))
+                if isinstance(node, ast.Constant)
+            )
+            found += [
+                f"{where}:{s.lineno} '{s.value}'" for s in strings if s.value in names - ENGLISH
+            ]
     assert not found

@@ -19,12 +19,28 @@ HOSTILE = '<script>alert("x & y")</script>'
 @pytest.fixture
 def drawing(tmp_path):
     t, power = np.arange(50.0), np.geomspace(1, 1e-5, 50)
-    return figures.fit(tmp_path / "fit.svg", t, t, (power, power), (power, power), title="a fit", epsilon=(0.0, 0.0))
+    return figures.fit(
+        tmp_path / "fit.svg",
+        t,
+        t,
+        (power, power),
+        (power, power),
+        title="a fit",
+        epsilon=(0.0, 0.0),
+    )
 
 
 def test_whatever_is_written_is_escaped(tmp_path, drawing):
-    page = Report(HOSTILE, HOSTILE).heading(HOSTILE).text(HOSTILE).verdict(HOSTILE, kind="bad").items([HOSTILE])
-    page.chart(Chart(HOSTILE, [HOSTILE]).line(HOSTILE, np.arange(3), np.arange(3), "#000000"), HOSTILE)
+    page = (
+        Report(HOSTILE, HOSTILE)
+        .heading(HOSTILE)
+        .text(HOSTILE)
+        .verdict(HOSTILE, kind="bad")
+        .items([HOSTILE])
+    )
+    page.chart(
+        Chart(HOSTILE, [HOSTILE]).line(HOSTILE, np.arange(3), np.arange(3), "#000000"), HOSTILE
+    )
     page.table([HOSTILE, "b"], [[HOSTILE, "1"]], HOSTILE).figure(drawing, HOSTILE).equation(HOSTILE)
     with page.folded(HOSTILE):
         page.text("inside")
@@ -56,7 +72,13 @@ def test_two_copies_of_a_figure_keep_apart(tmp_path, drawing):
 
 def test_the_same_page_has_the_same_bytes(tmp_path, drawing):
     def write(name):
-        return Report("same").figure(drawing).equation(r"\frac{a}{b}").save(tmp_path / name).read_bytes()
+        return (
+            Report("same")
+            .figure(drawing)
+            .equation(r"\frac{a}{b}")
+            .save(tmp_path / name)
+            .read_bytes()
+        )
 
     assert write("one.html") == write("two.html")
 
@@ -65,7 +87,10 @@ def test_every_equation_of_the_model_is_typeset(tmp_path):
     from tractexp.model.model import compose
     from tractexp.plugin import build
 
-    model = compose(build("model/motor", {"name": "electromechanical"}), build("model/static", {"name": "exponential"}))
+    model = compose(
+        build("model/motor", {"name": "electromechanical"}),
+        build("model/static", {"name": "exponential"}),
+    )
     page = Report("equations")
     for latex in model.latex():
         page.equation(latex)
@@ -82,7 +107,9 @@ def test_latex_beyond_mathtext_is_shown_as_it_is(tmp_path):
 
 
 def test_a_table_is_as_wide_as_its_columns(tmp_path):
-    reader = read(Report("t").table(["a", "b", "c"], [["1", "2", "3"]] * 4).save(tmp_path / "page.html"))
+    reader = read(
+        Report("t").table(["a", "b", "c"], [["1", "2", "3"]] * 4).save(tmp_path / "page.html")
+    )
     assert (reader.tags.count("th"), reader.tags.count("td"), reader.tags.count("tr")) == (3, 12, 5)
     with pytest.raises(ValueError, match="a row of 1 cells"):
         Report("t").table(["a", "b"], [["1"]])

@@ -1,4 +1,6 @@
-"""A short walk through the states of a run's folder; `benchmarks/run_machine.py` is the machine and walks long."""
+"""A short walk through the states of a run's folder; `benchmarks/run_machine.py` is the machine and
+walks long.
+"""
 
 import os
 
@@ -14,4 +16,7 @@ def test_nothing_is_lost_mixed_or_logged_twice_whatever_comes_next():
 
     run_state_machine_as_test(run_machine.RunMachine, settings=run_machine.SHORT)
     assert len(run_machine.STATES) > 6
-    assert all(run_machine.COUNTS[name] for name in ("killed", "disk full", "second run", "again", "sync", "export"))
+    assert all(
+        run_machine.COUNTS[name]
+        for name in ("killed", "disk full", "second run", "again", "sync", "export")
+    )

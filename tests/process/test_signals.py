@@ -1,4 +1,5 @@
-"""Ctrl-C and SIGTERM end every task within two seconds of its own processor time, and say so in one sentence.
+"""Ctrl-C and SIGTERM end every task within two seconds of its own processor time, and say so in one
+sentence.
 
 Both raise a `KeyboardInterrupt`, of which every task hears once, and one task by either way.
 """
@@ -24,7 +25,8 @@ ALWAYS = ("tracking.enabled=false", "hydra.run.dir=run")
 QUICK = "optimizer=multistart_least_squares"
 TASKS = {
     "identify": ("optimizer=issa", "optimizer.iterations=1000000"),
-    "judgement": (QUICK, "data=tibet_30pct"),  # the search ends soon: the estimate, its profiles and rivals are at work
+    # the search ends soon: the estimate, its profiles and rivals are at work
+    "judgement": (QUICK, "data=tibet_30pct"),
     "discrepancy": ("task=discrepancy", "data=tibet_30pct"),
     "profile": (QUICK, "task=profile"),
     "posterior": (QUICK, "task=posterior", "task.steps=200000"),
@@ -39,7 +41,9 @@ WAYS = {signal.SIGTERM: 143, signal.SIGINT: 130}
 
 
 class Sender:
-    """Sends this process a signal, so many seconds of its processor time after a command has begun to run."""
+    """Sends this process a signal, so many seconds of its processor time after a command has begun
+    to run.
+    """
 
     def __init__(self, way: int, after: float):
         self.way, self.after, self.sent, self.over = way, after, 0.0, False
@@ -72,7 +76,13 @@ def desk(tmp_path_factory):
     folder, rows = tmp_path_factory.mktemp("desk"), 900_000
     t = np.arange(rows) / 50
     U = np.where((t > 100) & (t % 300 > 50) & (t % 300 < 50.2), 0.6, 1.0)
-    lines = map("{:.2f},{:.1f},{:.2f},{:.2f}".format, t.tolist(), U.tolist(), (0.8 * U).tolist(), (0.6 * U).tolist())
+    lines = map(
+        "{:.2f},{:.1f},{:.2f},{:.2f}".format,
+        t.tolist(),
+        U.tolist(),
+        (0.8 * U).tolist(),
+        (0.6 * U).tolist(),
+    )
     lines = ["t,U,P,Q", *lines]
     (folder / "long.csv").write_text("\n".join(lines) + "\n")
     (folder / "shorter.csv").write_text("\n".join(lines[:30_000]) + "\n")
@@ -86,7 +96,8 @@ def desk(tmp_path_factory):
 )
 def test_a_task_hears_a_signal(task, way, desk, tmp_path):
     folder = desk if "table" in task else tmp_path
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # as shells leave it to what they run in the background
+    # as shells leave it to what they run in the background
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     sender = Sender(way, 0.7 if way == signal.SIGTERM else 1.4)
     try:

@@ -11,9 +11,24 @@ from tractexp.errors import UserError
 from tractexp.identification.result import Result, load
 from tractexp.plugin import get
 
-TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+TRUTH = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 MOTORS = ("mechanical", "voltage", "electromechanical", "stator_flux", "double_cage", "none")
-STATICS = ("exponential", "zip", "constant_impedance", "constant_power", "exponential_frequency", "none")
+STATICS = (
+    "exponential",
+    "zip",
+    "constant_impedance",
+    "constant_power",
+    "exponential_frequency",
+    "none",
+)
 PAIRS = [pair for pair in itertools.product(MOTORS, STATICS) if pair != ("none", "none")]
 
 
@@ -25,11 +40,23 @@ def result(motor="electromechanical", static="exponential", parameters=None, eff
     """A result of known values."""
     known = TRUTH if parameters is None else parameters
     return Result(
-        parameters=known, objective=0.0, epsilon_p=0.0, epsilon_q=0.0, simulations=1, refused=0, iterations=1,
-        seconds=0.0, status="known", seed=0, events=[], at_bound=[], units={}, bounds={},
+        parameters=known,
+        objective=0.0,
+        epsilon_p=0.0,
+        epsilon_q=0.0,
+        simulations=1,
+        refused=0,
+        iterations=1,
+        seconds=0.0,
+        status="known",
+        seed=0,
+        events=[],
+        at_bound=[],
+        units={},
+        bounds={},
         model={"motor": {"name": motor}, "static": {"name": static}, "effects": list(effects)},
         before={"U0": 1.0, "P0": 1.0, "Q0": 0.6, "frequency": 50.0},
-    )  # fmt: skip
+    )
 
 
 @pytest.fixture
@@ -42,8 +69,15 @@ def read(path):
 
 
 def test_a_given_dip_is_played_as_described(saved, tmp_path):
-    done = simulate_command(f"task.parameters={saved}", "task.depth=0.4", "task.duration=0.2", "task.rate=500",
-                    "task.length=2", "hydra.run.dir=run", cwd=tmp_path)  # fmt: skip
+    done = simulate_command(
+        f"task.parameters={saved}",
+        "task.depth=0.4",
+        "task.duration=0.2",
+        "task.rate=500",
+        "task.length=2",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
     assert list(rows.dtype.names) == ["t", "U", "P", "Q"]
@@ -59,9 +93,16 @@ def test_a_given_dip_is_played_as_described(saved, tmp_path):
 
 
 def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
-    """With a sudden fall: a prediction takes U_0 from the samples before the dip, none of which has begun to fall."""
-    done = simulate_command(f"task.parameters={saved}", "task.depth=0.4", "task.fall=0", "hydra.run.dir=run",
-                    cwd=tmp_path)  # fmt: skip
+    """With a sudden fall: a prediction takes U_0 from the samples before the dip, none of which has
+    begun to fall.
+    """
+    done = simulate_command(
+        f"task.parameters={saved}",
+        "task.depth=0.4",
+        "task.fall=0",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
     P, Q = load(saved).predict(rows["t"], rows["U"])
@@ -71,7 +112,11 @@ def test_the_dip_is_the_prediction_of_the_same_result(saved, tmp_path):
 
 def test_recorded_events_are_played_and_judged(saved, tmp_path):
     done = simulate_command(
-        "task=simulate", f"task.parameters={saved}", "data=tibet_30pct", "hydra.run.dir=run", cwd=tmp_path
+        "task=simulate",
+        f"task.parameters={saved}",
+        "data=tibet_30pct",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     rows = read(tmp_path / "run" / "response.csv")
@@ -82,13 +127,24 @@ def test_recorded_events_are_played_and_judged(saved, tmp_path):
 
 def test_values_without_a_result_and_a_value_in_place_of_the_results(saved, tmp_path):
     given = "{" + ", ".join(f"{name}: {value}" for name, value in TRUTH.items()) + "}"
-    runs = {"alone": [f"task.values={given}"], "changed": [f"task.parameters={saved}", "task.values.T_m=0.3"]}
+    runs = {
+        "alone": [f"task.values={given}"],
+        "changed": [f"task.parameters={saved}", "task.values.T_m=0.3"],
+    }
     runs["same"] = [f"task.parameters={saved}"]
     for name, arguments in runs.items():
-        done = simulate_command(*arguments, "task.depth=0.4", "task.P0=1", "task.Q0=0.6",
-                        f"hydra.run.dir={name}", cwd=tmp_path)  # fmt: skip
+        done = simulate_command(
+            *arguments,
+            "task.depth=0.4",
+            "task.P0=1",
+            "task.Q0=0.6",
+            f"hydra.run.dir={name}",
+            cwd=tmp_path,
+        )
         assert done.returncode == 0, done.stderr
-    alone, changed, same = (read(tmp_path / name / "response.csv")["P"] for name in ("alone", "changed", "same"))
+    alone, changed, same = (
+        read(tmp_path / name / "response.csv")["P"] for name in ("alone", "changed", "same")
+    )
     assert np.array_equal(alone, same)
     assert np.abs(changed - same).max() > 0.01
 
@@ -103,7 +159,9 @@ PAPER = {  # Table 3
 @pytest.mark.parametrize("column", PAPER)
 def test_the_papers_table_3_gets_the_sentence_that_explains_it(column, tmp_path):
     values, ratio = PAPER[column]
-    given = "{" + ", ".join(f"{name}: {value}" for name, value in zip(TRUTH, values, strict=True)) + "}"
+    given = (
+        "{" + ", ".join(f"{name}: {value}" for name, value in zip(TRUTH, values, strict=True)) + "}"
+    )
     done = simulate_command(
         "task=simulate", f"task.values={given}", "task.depth=0.5", "hydra.run.dir=run", cwd=tmp_path
     )
@@ -116,11 +174,20 @@ def test_the_papers_table_3_gets_the_sentence_that_explains_it(column, tmp_path)
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        ([], "no value for T_prime, X_prime, C, M, T_m, p_v, q_v: give task.parameters=result.json"),
+        (
+            [],
+            "no value for T_prime, X_prime, C, M, T_m, p_v, q_v: give task.parameters=result.json",
+        ),
         (["task.parameters=nowhere.json"], "there is no result file nowhere.json"),
-        (["task.values.T_prim=0.1"], "this model has no parameter 'T_prim'; did you mean 'T_prime'?"),
+        (
+            ["task.values.T_prim=0.1"],
+            "this model has no parameter 'T_prim'; did you mean 'T_prime'?",
+        ),
         (["task.depth=1.5"], "task.depth=1.5 is out of range: it must be at least 0 and at most 1"),
-        (["task.depth=0.5", "task.length=0.1"], "task.length=0.1 is out of range: it must be at least 0.65"),
+        (
+            ["task.depth=0.5", "task.length=0.1"],
+            "task.length=0.1 is out of range: it must be at least 0.65",
+        ),
         (["task.depht=0.5"], "'task' has no key 'depht'; did you mean 'depth'?"),
     ],
 )
@@ -140,7 +207,9 @@ def test_values_given_by_hand_replace_those_found():
 
 @pytest.mark.parametrize(("motor", "static"), PAIRS)
 def test_every_pair_predicts_its_power_before_a_dip_and_less_in_it(motor, static, tmp_path):
-    """From a written result.json, as mlflow.pyfunc.load_model reads it (test_cli.py loads one for real)."""
+    """From a written result.json, as mlflow.pyfunc.load_model reads it (test_cli.py loads one for
+    real).
+    """
     parts = get("model/motor", motor)(), get("model/static", static)()
     defaults = {p.name: p.default for part in parts for p in part.parameters}
     path = result(motor, static, defaults).write(tmp_path / "result.json")
@@ -150,7 +219,8 @@ def test_every_pair_predicts_its_power_before_a_dip_and_less_in_it(motor, static
     before = 1.0, 0.6
     if static == "none":
         before = defaults["T_m"], Q[0]
-        P_loss = defaults.get("R_s", 0.0) * (P[0] ** 2 + Q[0] ** 2)  # stator resistance: input above torque
+        # stator resistance: input above torque
+        P_loss = defaults.get("R_s", 0.0) * (P[0] ** 2 + Q[0] ** 2)
         assert P[0] == pytest.approx(defaults["T_m"] + P_loss, rel=1e-6)
     else:
         assert (P[0], Q[0]) == pytest.approx(before, abs=1e-8)

@@ -1,4 +1,6 @@
-"""What the site generates, and what its pages say about the code; .ci/run builds it with warnings as errors."""
+"""What the site generates, and what its pages say about the code; .ci/run builds it with warnings
+as errors.
+"""
 
 import ast
 import dataclasses
@@ -39,7 +41,11 @@ def test_every_plugin_has_its_section_and_every_group_its_page(pages):
 
 
 def test_a_part_tells_its_parameters_their_bounds_and_its_source(pages):
-    for group, stem in (("model/motor", "motors"), ("model/static", "static-loads"), ("effect", "effects")):
+    for group, stem in (
+        ("model/motor", "motors"),
+        ("model/static", "static-loads"),
+        ("effect", "effects"),
+    ):
         for name, cls in discover()[group].items():
             told = section(pages[stem], name)
             assert "**Source:**" in told, name
@@ -113,7 +119,9 @@ def test_every_task_has_a_page_with_its_settings_and_the_commands_that_pages_sho
     made = {path.stem: path.read_text(encoding="utf-8") for path in tasks.write(tmp_path)}
     assert made.keys() == {"index", *discover()["task"]}
     assert "| `task.within` | `0.05` |" in made["plan"]
-    assert "with half of its 95 % interval `within` a share of the value" in " ".join(made["plan"].split())
+    assert "with half of its 95 % interval `within` a share of the value" in " ".join(
+        made["plan"].split()
+    )
     assert "null: in single runs, not in sweeps" in made["identify"]
     assert "task=discrepancy data=contactors" in made["discrepancy"]
     assert "[The missing effect: The order of the model](" in made["discrepancy"]
@@ -141,7 +149,10 @@ def test_every_page_is_in_the_contents():
     index = (DOCS / "index.md").read_text(encoding="utf-8")
     listed = {line for line in index.splitlines() if re.fullmatch(r"[\w/-]+", line)}
     assert {path.stem for path in DOCS.glob("*.md")} - {"index"} <= listed
-    groups = {f"generated/catalogue/{title.lower().replace(' ', '-')}" for title, _ in catalogue.GROUPS.values()}
+    groups = {
+        f"generated/catalogue/{title.lower().replace(' ', '-')}"
+        for title, _ in catalogue.GROUPS.values()
+    }
     assert {one for one in listed if "catalogue" in one} == groups
 
 

@@ -1,4 +1,6 @@
-"""A machine that is short of everything: workers that start late, or are killed before they begin."""
+"""A machine that is short of everything: workers that start late, or are killed
+before they begin.
+"""
 
 import os
 import signal

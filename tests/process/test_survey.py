@@ -1,4 +1,6 @@
-"""An archive as a table: every file a row at least, whatever it holds; resumed; the events that tell most."""
+"""An archive as a table: every file a row at least, whatever it holds; resumed; the events that
+tell most.
+"""
 
 import csv
 import json
@@ -33,13 +35,17 @@ def fill(folder, count=6):
     for k in range(count):
         path = folder / f"day {k % 2}" / f"e{k}.cfg"
         path.parent.mkdir(parents=True, exist_ok=True)
-        write(recording(constant(depth=0.1 + 0.05 * k)), path, "ASCII" if k == 1 else "BINARY", 1999)
+        write(
+            recording(constant(depth=0.1 + 0.05 * k)), path, "ASCII" if k == 1 else "BINARY", 1999
+        )
     return folder
 
 
 @pytest.fixture(scope="module")
 def field(tmp_path_factory):
-    """Six files that can be read; a broken one, a quiet one, what is no record, and what is hidden."""
+    """Six files that can be read; a broken one, a quiet one, what is no record, and
+    what is hidden.
+    """
     folder = fill(tmp_path_factory.mktemp("field"))
     (folder / "broken.cfg").write_text("a,b,1999\n3,x\n")
     write(recording(constant(depth=0.0)), folder / "quiet.cfg", "BINARY", 1999)
@@ -58,7 +64,13 @@ def surveyed(field):
 
 
 def test_no_name_of_a_file_is_a_formula_of_the_table_or_a_program_of_the_page(tmp_path):
-    harm = ["=1+1.cfg", "@SUM(A1).cfg", "</script><script>owned()<.cfg", "$(touch owned).cfg", "${oc.env:HOME}.cfg"]
+    harm = [
+        "=1+1.cfg",
+        "@SUM(A1).cfg",
+        "</script><script>owned()<.cfg",
+        "$(touch owned).cfg",
+        "${oc.env:HOME}.cfg",
+    ]
     harm = [name.replace("/", "\N{FRACTION SLASH}") for name in harm]
     for name in harm:
         write(recording(constant(depth=0.2)), tmp_path / "in" / name, "BINARY", 1999)
@@ -74,11 +86,16 @@ def test_no_name_of_a_file_is_a_formula_of_the_table_or_a_program_of_the_page(tm
 
 def test_every_record_is_a_row_and_nothing_else_is(surveyed, field):
     files = [row["file"] for row in surveyed.rows]
-    assert files == ["broken.cfg", "quiet.cfg", "recorder.rec", *(f"day {k % 2}/e{k}.cfg" for k in (0, 2, 4, 1, 3, 5))]
+    assert files == [
+        "broken.cfg",
+        "quiet.cfg",
+        "recorder.rec",
+        *(f"day {k % 2}/e{k}.cfg" for k in (0, 2, 4, 1, 3, 5)),
+    ]
     kinds = {row["file"]: row["kind"] for row in surveyed.rows}
-    assert [kinds[name] for name in ("broken.cfg", "quiet.cfg", "recorder.rec", "day 0/e0.cfg")] == [
-        "not read", "nothing", "not read", "dip",
-    ]  # fmt: skip
+    assert [
+        kinds[name] for name in ("broken.cfg", "quiet.cfg", "recorder.rec", "day 0/e0.cfg")
+    ] == ["not read", "nothing", "not read", "dip"]
     why = {row["file"]: row["why"] for row in surveyed.unread}
     assert "export it as COMTRADE" in why["recorder.rec"]
     assert "broken" in why["broken.cfg"]
@@ -104,7 +121,9 @@ def test_a_row_tells_what_a_look_tells(surveyed, field):
 
 
 def test_processes_give_the_rows_of_one(surveyed, field):
-    assert tractexp.survey(field, cores=2, progress=False).content["rows"] == surveyed.content["rows"]
+    assert (
+        tractexp.survey(field, cores=2, progress=False).content["rows"] == surveyed.content["rows"]
+    )
 
 
 def test_the_table_is_written_for_people_and_machines(surveyed, tmp_path):
@@ -133,13 +152,15 @@ def test_the_page_is_sorted_and_filtered_where_it_is_read(surveyed, tmp_path):
             return survey.report(surveyed.content).save(path)
 
     script = """
-    const names = () => [...document.querySelectorAll("#body tr td:first-child")].map(cell => cell.textContent);
+    const names = () => [...document.querySelectorAll("#body tr td:first-child")]\
+.map(cell => cell.textContent);
     const told = [names().length];
     const click = key => document.querySelector(`th[data-key=${key}]`).click();
     click("depth"); told.push(names()[0]); click("depth"); told.push(names()[0]);
     const write = (id, value) => { const field = document.getElementById(id); field.value = value;
       field.dispatchEvent(new Event("input")); };
-    write("text", "day e4"); told.push(names()); write("text", ""); write("depth", "29"); told.push(names().length);
+    write("text", "day e4"); told.push(names()); write("text", ""); write("depth", "29"); \
+told.push(names().length);
     write("depth", ""); document.getElementById("worth").click(); told.push(names().length);
     document.getElementById("told").textContent = JSON.stringify(told);
     """
@@ -160,7 +181,8 @@ def test_only_what_is_new_or_changed_is_looked_at_again(tmp_path, monkeypatch):
     os.utime(data, ns=(1, 1))  # the part of a record that is not its name
     (folder / "day 0" / "e0.cfg").unlink()
     third = tractexp.survey(folder, keep=keep, cores=1)
-    assert third.content["looked_at"] == 1 + 1  # the one changed, and the data whose configuration is gone
+    # the one changed, and the data whose configuration is gone
+    assert third.content["looked_at"] == 1 + 1
     assert len(third.rows) == 4
     assert "configuration" in third.unread.rows[0]["why"]
 
@@ -170,7 +192,8 @@ def test_a_survey_that_was_killed_goes_on_where_it_was(tmp_path):
     folder, keep = fill(tmp_path / "a", 6), tmp_path / "kept"
     script = (
         "import sys, time, tractexp\nfrom tractexp.api import surveying\nmade = surveying.rows_of\n"
-        "def slow(*given):\n    time.sleep(0.3)\n    return made(*given)\nsurveying.rows_of = slow\n"
+        "def slow(*given):\n    time.sleep(0.3)\n    return made(*given)\nsurveying.rows_of ="
+        " slow\n"
         f"tractexp.survey({str(folder)!r}, keep={str(keep)!r}, cores=1)\n"
     )
     process = subprocess.Popen([sys.executable, "-c", script])
@@ -198,7 +221,9 @@ def test_a_mistake_of_ours_is_a_row_and_no_end(field, monkeypatch):
 
 
 def test_a_file_that_kills_its_process_is_a_row_and_the_others_are_read(field):
-    """In a process of its own: one that dies takes the others' work with it, which is done again."""
+    """In a process of its own: one that dies takes the others' work with it, which
+    is done again.
+    """
     script = (
         "import os, sys\nfrom pathlib import Path\nfrom tractexp.api import surveying\n"
         "made = surveying.rows_of\n"
@@ -208,12 +233,15 @@ def test_a_file_that_kills_its_process_is_a_row_and_the_others_are_read(field):
         "if __name__ == '__main__':\n"
         "    names = [f'day {k % 2}/e{k}.cfg' for k in range(6)]\n"
         "    found = dict(surveying.looked(Path(sys.argv[1]), names, 2))\n"
-        "    print(len(found), sorted(n for n, rows in found.items() if rows[0]['kind'] == 'not read'))\n"
+        "    print(len(found), sorted(n for n, rows in found.items() if rows[0]['kind'] == 'not"
+        " read'))\n"
         "    print(found['day 1/e3.cfg'][0]['why'])\n"
     )
     path = field.parent / "deadly.py"
     path.write_text(script)
-    done = subprocess.run([sys.executable, str(path), str(field)], capture_output=True, text=True, timeout=120)
+    done = subprocess.run(
+        [sys.executable, str(path), str(field)], capture_output=True, text=True, timeout=120
+    )
     assert done.stdout.startswith("6 ['day 1/e3.cfg']\n"), done.stderr
     assert "was killed at this file" in done.stdout
 
@@ -233,16 +261,25 @@ def test_the_events_that_tell_most_are_the_deep_ones_and_one_command_fits_them(p
     assert done.returncode == 0, done.stderr
     (folder,) = (tmp_path / "outputs" / "surveys").iterdir()
     content = json.loads((folder / "survey.json").read_text())
-    assert {each["event"] for each in content["informative"]} == {"deep 1.cfg#1.1", "deep 2.cfg#1.1"}
+    assert {each["event"] for each in content["informative"]} == {
+        "deep 1.cfg#1.1",
+        "deep 2.cfg#1.1",
+    }
     assert content["command"] in done.stdout
     words = shlex.split(content["command"])
     fit = run_command(
-        *words[1:], "optimizer=multistart_least_squares", "optimizer.starts=2", "tracking.enabled=false",
-        "hydra.run.dir=run", cwd=tmp_path,
-    )  # fmt: skip
+        *words[1:],
+        "optimizer=multistart_least_squares",
+        "optimizer.starts=2",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
     assert fit.returncode == 0, fit.stderr
     result = json.loads((tmp_path / "run" / "result.json").read_text())
-    assert [e["name"] for e in result["events"]] == [each["event"] for each in content["informative"]]
+    assert [e["name"] for e in result["events"]] == [
+        each["event"] for each in content["informative"]
+    ]
     assert max(e["epsilon_p"] for e in result["events"]) < 0.01
     again = run_command(*(word for word in asked if "informative" not in word), cwd=tmp_path)
     assert "5 files" in again.stdout
@@ -258,7 +295,8 @@ def test_events_are_ranked_by_noise_as_well_as_by_depth(tmp_path):
 
 def test_an_event_is_read_by_its_name(field):
     events = build(
-        "data", {"name": "archive", "path": str(field), "train": ["day 0/e2.cfg#1.1", "day 1/e3.cfg"]}
+        "data",
+        {"name": "archive", "path": str(field), "train": ["day 0/e2.cfg#1.1", "day 1/e3.cfg"]},
     ).read()
     assert [r.name for r in events.train] == ["day 0/e2.cfg#1.1", "day 1/e3.cfg#1.1"]
     direct = tractexp.read(field / "day 0" / "e2.cfg")[0].record
@@ -286,9 +324,15 @@ def test_an_event_that_is_not_there_is_refused(field, train, sentence):
     [
         (("data.path=absent",), "data.path=absent is no folder that is there"),
         ((), "data.path is missing: give the folder"),
-        (("data=csv", "data.train=[a.csv]"), "data=csv is no folder; leave it out and give data.path=FOLDER"),
+        (
+            ("data=csv", "data.train=[a.csv]"),
+            "data=csv is no folder; leave it out and give data.path=FOLDER",
+        ),
         (("data.path=.",), "data.path=. holds no file that can be read"),
-        (("data.path=.", "model=third_order_zip"), "model=third_order_zip is not read by task=survey"),
+        (
+            ("data.path=.", "model=third_order_zip"),
+            "model=third_order_zip is not read by task=survey",
+        ),
         (("data.path=.", "task.informative=0"), "task.informative=0 is out of range"),
     ],
 )

@@ -1,4 +1,6 @@
-"""Sweeps: isolation of failures, killed workers, what is not run again, the parent run, and bit-identical results."""
+"""Sweeps: isolation of failures, killed workers, what is not run again, the parent run, and
+bit-identical results.
+"""
 
 import contextlib
 import importlib.util
@@ -20,11 +22,13 @@ QUICK = ("optimizer.population=20", "budget=200")
 TWO = "hydra.launcher.n_jobs=2"
 SILENT = ("budget=200", "tracking.enabled=false")
 HERE = "hydra.sweep.dir=sweep"
-ONE = "hydra.launcher.backend=sequential"  # one job after the other in this process: where workers are not the point
+# one job after the other in this process: where workers are not the point
+ONE = "hydra.launcher.backend=sequential"
 PLAIN = "hydra.sweeper.compare=false"
 
 needs_dask = pytest.mark.skipif(
-    importlib.util.find_spec("distributed") is None, reason="Dask is not installed: pip install 'tractexp[dask]'"
+    importlib.util.find_spec("distributed") is None,
+    reason="Dask is not installed: pip install 'tractexp[dask]'",
 )
 needs_submitit = pytest.mark.skipif(
     importlib.util.find_spec("submitit") is None,
@@ -58,7 +62,9 @@ PLUGINS = {
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder for PYTHONPATH with an installed package of optimizers that fail in their own ways."""
+    """A folder for PYTHONPATH with an installed package of optimizers that fail in
+    their own ways.
+    """
     site = tmp_path_factory.mktemp("site")
     package, info = site / "faulty", site / "faulty-1.0.dist-info"
     package.mkdir()
@@ -71,7 +77,8 @@ def site(tmp_path_factory):
         head += "from tractexp.plugin import plugin\n"
         settings = "    odds: float = 0.5\n    marker: str = 'marker'\n    population: int = 20\n"
         text = (
-            f'{head}\n@plugin\nclass Faulty(Optimizer):\n    """Fails.\n\n    Source: none.\n    """\n{settings}{body}'
+            f'{head}\n@plugin\nclass Faulty(Optimizer):\n    """Fails.\n\n    Source: none.\n   '
+            f' """\n{settings}{body}'
         )
         (package / f"{name}.py").write_text(text)
     return site
@@ -96,7 +103,9 @@ def results(folder):
     for path in folder.glob("*/result.json"):
         content = json.loads(path.read_text())
         del content["seconds"], content["search"]["seconds"]
-        history = [line.split(",") for line in (path.parent / "history.csv").read_text().splitlines()]
+        history = [
+            line.split(",") for line in (path.parent / "history.csv").read_text().splitlines()
+        ]
         content["history"] = [(row[0], row[1], row[3]) for row in history]
         found[content["optimizer"], content["seed"]] = content
     return found
@@ -129,7 +138,14 @@ def test_each_job_leaves_its_status_and_what_it_printed(logged):
         assert end["seed"] == number % 2
         assert end["seconds"] > 0
         names = {path.name for path in (sweep / str(number)).iterdir()}
-        assert names == {".hydra", "history.csv", "mlflow.json", "output.txt", "result.json", "status.json"}
+        assert names == {
+            ".hydra",
+            "history.csv",
+            "mlflow.json",
+            "output.txt",
+            "result.json",
+            "status.json",
+        }
         assert f"seed {number % 2}" in (sweep / str(number) / "output.txt").read_text()
     assert len({end["configuration"] for end in ends.values()}) == 4
 
@@ -138,19 +154,33 @@ def test_workers_print_nothing_and_the_end_is_a_table_of_optimizers(logged):
     _, _, done = logged
     assert "Runge-Kutta" not in done.stdout + done.stderr
     lines = [line.split() for line in done.stdout.splitlines()]
-    assert sorted(line[:2] for line in lines if line[:1] in (["ssa"], ["pso"])) == [["pso", "0"], ["ssa", "0"]]
+    assert sorted(line[:2] for line in lines if line[:1] in (["ssa"], ["pso"])) == [
+        ["pso", "0"],
+        ["ssa", "0"],
+    ]
 
 
 def test_a_sweep_of_several_variants_and_seeds_ends_with_their_comparison(logged, tmp_path):
     folder, sweep, done = logged
     assert "comparison.html" in done.stdout
     told = json.loads((sweep / "comparison.json").read_text())
-    assert {(run["variant"], run["seed"]) for run in told["runs"]} == {(v, s) for v in ("ssa", "pso") for s in (0, 1)}
+    assert {(run["variant"], run["seed"]) for run in told["runs"]} == {
+        (v, s) for v in ("ssa", "pso") for s in (0, 1)
+    }
     parent = json.loads((sweep / "sweep.json").read_text())["run"]
     (uri,) = ask(folder, f"select artifact_uri from runs where run_uuid = '{parent}'")[0]
     assert "comparison.html" in {path.name for path in Path(uri.removeprefix("file://")).iterdir()}
     for quiet in (("seed=0",), ("seed=0,1", PLAIN)):
-        done = run_command("-m", *QUICK, *quiet, ONE, "optimizer=ssa,pso", "tracking.enabled=false", HERE, cwd=tmp_path)
+        done = run_command(
+            "-m",
+            *QUICK,
+            *quiet,
+            ONE,
+            "optimizer=ssa,pso",
+            "tracking.enabled=false",
+            HERE,
+            cwd=tmp_path,
+        )
         assert "best objective" in done.stdout
         assert not (tmp_path / "sweep" / "comparison.html").exists()
 
@@ -160,7 +190,12 @@ def test_a_sweep_of_several_variants_and_seeds_ends_with_their_comparison(logged
     [("bob=3", "task 'compare' has no setting 'bob'"), ("bbob=-1", "task.bbob=-1 is out of range")],
 )
 def test_what_the_comparison_would_refuse_is_refused_before_the_jobs(setting, sentence, tmp_path):
-    asked = ("optimizer=ssa,pso", "seed=0,1", "tracking.enabled=false", f"hydra.sweeper.comparison.{setting}")
+    asked = (
+        "optimizer=ssa,pso",
+        "seed=0,1",
+        "tracking.enabled=false",
+        f"hydra.sweeper.comparison.{setting}",
+    )
     done = run_command("-m", *QUICK, *asked, HERE, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
@@ -171,10 +206,14 @@ def test_the_sweep_is_a_finished_parent_run_with_its_jobs_as_children(logged):
     folder, sweep, _ = logged
     parent = json.loads((sweep / "sweep.json").read_text())["run"]
     assert ask(folder, f"select status from runs where run_uuid = '{parent}'") == [("FINISHED",)]
-    children = ask(folder, f"select run_uuid from tags where key = 'mlflow.parentRunId' and value = '{parent}'")
+    children = ask(
+        folder, f"select run_uuid from tags where key = 'mlflow.parentRunId' and value = '{parent}'"
+    )
     assert len(children) == 4
     assert ask(folder, "select distinct status from runs") == [("FINISHED",)]
-    metrics = dict(ask(folder, f"select key, value from latest_metrics where run_uuid = '{parent}'"))
+    metrics = dict(
+        ask(folder, f"select key, value from latest_metrics where run_uuid = '{parent}'")
+    )
     best = min(content["objective"] for content in results(sweep).values())
     assert (metrics["jobs"], metrics["jobs_finished"], metrics["best_objective"]) == (4, 4, best)
 
@@ -189,19 +228,39 @@ def test_the_same_command_again_runs_nothing_and_more_seeds_run_only_those(logge
     assert len(ask(folder, "select run_uuid from runs")) == 5
 
     shutil.copytree(sweep, tmp_path / "sweep")
-    more = (*QUICK, ONE, PLAIN, "tracking.enabled=false", "optimizer=ssa,pso", "seed=range(0,3)", HERE)
+    more = (
+        *QUICK,
+        ONE,
+        PLAIN,
+        "tracking.enabled=false",
+        "optimizer=ssa,pso",
+        "seed=range(0,3)",
+        HERE,
+    )
     done = run_command("-m", *more, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "4 of them are finished and kept" in done.stdout
     ends = statuses(tmp_path / "sweep")
-    assert [(ends[n]["choices"]["optimizer"], ends[n]["seed"]) for n in (4, 5)] == [("ssa", 2), ("pso", 2)]
+    assert [(ends[n]["choices"]["optimizer"], ends[n]["seed"]) for n in (4, 5)] == [
+        ("ssa", 2),
+        ("pso", 2),
+    ]
 
 
 def test_other_data_of_the_same_name_are_computed_anew_in_the_same_folder(tmp_path):
     import tractexp as package
 
     shipped = os.path.join(os.path.dirname(package.__file__), "data", "tibet_{}pct.csv")
-    sweep = ("-m", *SILENT, ONE, "optimizer=ssa", "data=csv", "data.train=[dip.csv]", "seed=0,1", HERE)
+    sweep = (
+        "-m",
+        *SILENT,
+        ONE,
+        "optimizer=ssa",
+        "data=csv",
+        "data.train=[dip.csv]",
+        "seed=0,1",
+        HERE,
+    )
     found = []
     for depth in (50, 30):
         shutil.copy(shipped.format(depth), tmp_path / "dip.csv")
@@ -256,7 +315,16 @@ def test_failing_jobs_are_isolated_listed_and_change_the_exit_code(site, tmp_pat
 
 
 def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
-    done = run_command("-m", *SILENT, ONE, "optimizer=ssa", "optimizer.producers=0.2,3", "seed=0", HERE, cwd=tmp_path)
+    done = run_command(
+        "-m",
+        *SILENT,
+        ONE,
+        "optimizer=ssa",
+        "optimizer.producers=0.2,3",
+        "seed=0",
+        HERE,
+        cwd=tmp_path,
+    )
     assert done.returncode != 0
     sentence = "optimizer.producers=3.0 is out of range: it must be at least 0 and at most 1"
     assert statuses(tmp_path / "sweep")[1]["message"] == sentence
@@ -266,7 +334,9 @@ def test_a_bad_value_fails_its_job_with_the_same_sentence_as_alone(tmp_path):
 
 
 @needs_dask  # the next test has another that dies once, by loky
-def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(logged, site, tmp_path):
+def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blamed(
+    logged, site, tmp_path
+):
     """And those end with the same bits as on processes."""
     launcher = ("tracking.enabled=false", "hydra/launcher=dask", TWO)
     sweep = (*QUICK, *launcher, PLAIN, "optimizer=dies,pso", "seed=0,1", HERE)
@@ -275,11 +345,15 @@ def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blame
     assert (tmp_path / "marker").exists()
     ends = results(tmp_path / "sweep")
     assert len(ends) == 4
-    assert [ends["pso", seed] for seed in (0, 1)] == [results(logged[1])["pso", seed] for seed in (0, 1)]
+    assert [ends["pso", seed] for seed in (0, 1)] == [
+        results(logged[1])["pso", seed] for seed in (0, 1)
+    ]
 
 
 def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(site, tmp_path):
-    """Next to each there is one in work; one of them kills its worker the first time only. By an earlier spelling."""
+    """Next to each there is one in work; one of them kills its worker the first time only. By an
+    earlier spelling.
+    """
     loky = (TWO, "hydra.launcher.backend=processes", "hydra.launcher.tries=2")
     sweep = (*SILENT, *loky, PLAIN, "seed=0", "optimizer=kills,pso,dies", HERE)
     done = tractexp("-m", *sweep, cwd=tmp_path, site=site)
@@ -296,7 +370,8 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
     _, sweep, _ = logged
     threads = ("hydra.launcher.backend=threading", TWO)
     first = {of: content for of, content in results(sweep).items() if of[1] == 0}
-    launchers = [("hydra.launcher.n_jobs=1",), threads, ("hydra/launcher=basic",)]  # two processes ran `logged`
+    # two processes ran `logged`
+    launchers = [("hydra.launcher.n_jobs=1",), threads, ("hydra/launcher=basic",)]
     for k, launcher in enumerate(launchers):
         command = (
             "-m",
@@ -317,7 +392,11 @@ def test_results_are_the_same_bits_for_any_number_of_workers_and_backend(logged,
 def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site, tmp_path, uri):
     launcher = ["hydra/launcher=submitit_local", "hydra.launcher.timeout_min=3"]
     if shutil.which("sinfo") and subprocess.run(["sinfo", "-h"], capture_output=True).stdout:
-        launcher = ["hydra/launcher=submitit_slurm", "hydra.launcher.timeout_min=3", "hydra.launcher.cpus_per_task=1"]
+        launcher = [
+            "hydra/launcher=submitit_slurm",
+            "hydra.launcher.timeout_min=3",
+            "hydra.launcher.cpus_per_task=1",
+        ]
     sweep = ("-m", "budget=200", *launcher, "optimizer=stumbles", "seed=1,2", HERE)
     done = tractexp(*sweep, cwd=tmp_path, site=site)
     from numpy.random import default_rng
@@ -328,22 +407,36 @@ def test_submitit_runs_a_sweep_isolates_a_failure_and_logs_below_the_parent(site
     assert "the third step divides by the width of nothing" in done.stdout
     assert len(results(tmp_path / "sweep")) == 2 - failed
     parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
-    children = ask(tmp_path, f"select 1 from tags where key = 'mlflow.parentRunId' and value = '{parent}'")
+    children = ask(
+        tmp_path, f"select 1 from tags where key = 'mlflow.parentRunId' and value = '{parent}'"
+    )
     assert len(children) == 2 - failed
 
 
 @pytest.mark.parametrize(("way", "logged"), [(signal.SIGTERM, True), (signal.SIGINT, False)])
-def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way, logged, tmp_path, uri):
+def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(
+    way, logged, tmp_path, uri
+):
     """Both ways raise a `KeyboardInterrupt`, by which the parent is closed."""
     short_and_endless = "budget=400,1000000000"
-    command = [sys.executable, "-m", "tractexp", "-m", "optimizer=pso", "seed=0,1", short_and_endless, HERE]
+    command = [
+        sys.executable,
+        "-m",
+        "tractexp",
+        "-m",
+        "optimizer=pso",
+        "seed=0,1",
+        short_and_endless,
+        HERE,
+    ]
     process = subprocess.Popen(
         [*command, "optimizer.iterations=20000000", f"tracking.enabled={str(logged).lower()}"],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),  # a shell has what it runs behind ignore interrupts
+        # a shell has what it runs behind ignore interrupts
+        preexec_fn=lambda: signal.signal(way, signal.SIG_DFL),
     )
     states = lambda: {status["status"] for status in statuses(tmp_path / "sweep").values()}  # noqa: E731
     while process.poll() is None and states() != {"finished", "running"}:
@@ -358,7 +451,9 @@ def test_a_sweep_that_is_ended_keeps_what_is_finished_and_closes_its_parent(way,
     assert {end["message"] for end in ends} == {""}
     if logged:
         parent = json.loads((tmp_path / "sweep" / "sweep.json").read_text())["run"]
-        assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [("KILLED",)]
+        assert ask(tmp_path, f"select status from runs where run_uuid = '{parent}'") == [
+            ("KILLED",)
+        ]
         assert len(ask(tmp_path, "select 1 from runs where status = 'FINISHED'")) >= 1
 
 
@@ -380,20 +475,36 @@ for _ in Workers(1, apart=True).completed(time.sleep, [0, 600], 2):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["seed=range(3,3)"], "the sweep has no jobs: seed=range(3,3) is empty; a range ends before its second number"),
-        (["optimizer.producers=interval(0,1)"], "optimizer.producers=interval(0,1): a sweep over a grid needs values"),
+        (
+            ["seed=range(3,3)"],
+            "the sweep has no jobs: seed=range(3,3) is empty; a range ends"
+            " before its second number",
+        ),
+        (
+            ["optimizer.producers=interval(0,1)"],
+            "optimizer.producers=interval(0,1): a sweep over a grid needs values",
+        ),
         (["optimizer=glob(nothing*)"], "the sweep has no jobs: optimizer=glob(nothing*) is empty"),
         (
             ["hydra.launcher.backend=threads"],
-            "hydra.launcher.backend=threads is not one of dask, loky, multiprocessing, sequential, threading",
+            "hydra.launcher.backend=threads is not one of dask, loky, multiprocessing, sequential,"
+            " threading",
         ),
-        (["hydra.launcher.n_jobs=0"], "hydra.launcher.n_jobs=0 is out of range: it must be at least 1"),
+        (
+            ["hydra.launcher.n_jobs=0"],
+            "hydra.launcher.n_jobs=0 is out of range: it must be at least 1",
+        ),
         (["optimizer=issa,isa"], "optimizer=isa: there is no such choice; did you mean 'issa'?"),
         (["seed=1,abc"], "seed=abc is not a whole number"),
-        (["optimizer.populatoin=9,10"], "'optimizer' has no key 'populatoin'; did you mean 'population'?"),
+        (
+            ["optimizer.populatoin=9,10"],
+            "'optimizer' has no key 'populatoin'; did you mean 'population'?",
+        ),
     ],
 )
-def test_a_sweep_that_cannot_be_is_refused_in_one_sentence_before_it_starts(arguments, sentence, tmp_path):
+def test_a_sweep_that_cannot_be_is_refused_in_one_sentence_before_it_starts(
+    arguments, sentence, tmp_path
+):
     done = run_command("-m", *arguments, cwd=tmp_path)
     assert done.returncode == 2
     assert sentence in done.stderr
@@ -405,12 +516,17 @@ def test_a_sweep_that_cannot_be_is_refused_in_one_sentence_before_it_starts(argu
 def test_an_unreachable_dask_scheduler_is_named(tmp_path, monkeypatch):
     address = ("hydra/launcher=dask", "hydra.launcher.address=tcp://127.0.0.1:9")
     if importlib.util.find_spec("distributed") is None:
-        sentence = "hydra.launcher.backend=dask needs Dask, which is not installed: pip install 'tractexp[dask]'"
+        sentence = (
+            "hydra.launcher.backend=dask needs Dask, which is not installed: pip install"
+            " 'tractexp[dask]'"
+        )
     else:
         import distributed
 
         client = distributed.Client
-        monkeypatch.setattr(distributed, "Client", lambda address, timeout: client(address, timeout="1s"))
+        monkeypatch.setattr(
+            distributed, "Client", lambda address, timeout: client(address, timeout="1s")
+        )
         sentence = "hydra.launcher.address=tcp://127.0.0.1:9: no Dask scheduler answers there"
     done = run_command("-m", *SILENT, *address, cwd=tmp_path)
     assert done.returncode == 2
@@ -433,19 +549,46 @@ def test_an_experiment_is_a_sweep_by_itself_of_thirty_seeds(tmp_path):
 
 
 def test_settings_of_one_optimizer_are_not_pooled_under_its_name(tmp_path):
-    sweep = ("-m", "optimizer=pso,random_search", "budget=100,200", "seed=0,1", "model.fixed.q_v=3", HERE)
+    sweep = (
+        "-m",
+        "optimizer=pso,random_search",
+        "budget=100,200",
+        "seed=0,1",
+        "model.fixed.q_v=3",
+        HERE,
+    )
     done = run_command(*sweep, ONE, "tracking.enabled=false", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    names = [line.strip().split("  ")[0] for line in done.stdout.splitlines() if re.match(r" *\w+ budget=\d+  ", line)]
-    assert sorted(names) == [f"{name} budget={n}" for name in ("pso", "random_search") for n in (100, 200)]
+    names = [
+        line.strip().split("  ")[0]
+        for line in done.stdout.splitlines()
+        if re.match(r" *\w+ budget=\d+  ", line)
+    ]
+    assert sorted(names) == [
+        f"{name} budget={n}" for name in ("pso", "random_search") for n in (100, 200)
+    ]
 
 
 @pytest.mark.parametrize(
     ("chosen", "name"),
     [
-        ({"optimizer": "issa", "seed": "3", "task": "identify", "tracking.uri": "sqlite:///x.db"}, "issa"),
-        ({"optimizer.levy": "false", "optimizer.gaussian": "true", "seed": "0"}, "issa gaussian=true levy=false"),
-        ({"model": "third_order_zip", "budget": "500", "data": "csv"}, "issa budget=500 model=third_order_zip"),
+        (
+            {
+                "optimizer": "issa",
+                "seed": "3",
+                "task": "identify",
+                "tracking.uri": "sqlite:///x.db",
+            },
+            "issa",
+        ),
+        (
+            {"optimizer.levy": "false", "optimizer.gaussian": "true", "seed": "0"},
+            "issa gaussian=true levy=false",
+        ),
+        (
+            {"model": "third_order_zip", "budget": "500", "data": "csv"},
+            "issa budget=500 model=third_order_zip",
+        ),
         ({"data.train": "[/home/me/dip1.csv,b/dip2.csv]"}, "issa data.train=[dip1.csv,dip2.csv]"),
     ],
 )
@@ -473,7 +616,12 @@ def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
     (tmp_path / "sweep").mkdir()
     for name in ("comparison.html", "comparison.json", "multirun.yaml", "notes.txt"):
         (tmp_path / "sweep" / name).write_text("of an earlier sweep")
-    budget = ("budget=200", "optimizer=multistart_least_squares", "tracking.enabled=false", "seed=1,2")
+    budget = (
+        "budget=200",
+        "optimizer=multistart_least_squares",
+        "tracking.enabled=false",
+        "seed=1,2",
+    )
     done = run_command("-m", *budget, "hydra.launcher.backend=threading", HERE, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     names = {p.name for p in (tmp_path / "sweep").iterdir()}
@@ -481,7 +629,9 @@ def test_what_an_earlier_sweep_came_to_goes_before_its_configuration(tmp_path):
     assert (tmp_path / "sweep" / "multirun.yaml").read_text() != "of an earlier sweep"
 
 
-def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(tmp_path):
+def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses_is_touched(
+    tmp_path,
+):
     from tractexp.sweep.job import SweepJob
     from tractexp.sweep.placing import place
 
@@ -497,7 +647,9 @@ def test_a_folder_that_a_full_disk_left_empty_is_the_jobs_again_and_nobody_elses
 
 
 @pytest.mark.parametrize(("error", "sends"), [(None, 1), (RuntimeError, 1), (KeyboardInterrupt, 0)])
-def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(error, sends, tmp_path, monkeypatch):
+def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(
+    error, sends, tmp_path, monkeypatch
+):
     """To look for each of 2,000 finished jobs in the store takes a minute."""
     from types import SimpleNamespace
 
@@ -507,10 +659,19 @@ def test_who_ends_a_sweep_does_not_wait_while_what_is_left_is_sent(error, sends,
     run, closed, sent = tracking.TrackedRun("experiment", "sweep", {}), [], []
     monkeypatch.setattr(parent, "_describe_sweep", lambda *_: run)
     monkeypatch.setattr(parent, "_open_parent_run", lambda *_: "id")
-    monkeypatch.setattr(parent, "_close_parent_run", lambda folder, run, *_: closed.append(run.status))
+    monkeypatch.setattr(
+        parent, "_close_parent_run", lambda folder, run, *_: closed.append(run.status)
+    )
     monkeypatch.setattr(parent, "_send", lambda *_: sent.append(closed[-1]))
-    jobs = [SimpleNamespace(config={"tracking": {"enabled": True, "uri": "sqlite:///x.db"}}, folder=tmp_path / "0")]
-    with contextlib.suppress(RuntimeError, KeyboardInterrupt), parent.parent_run(tmp_path, jobs, [], afresh=False):
+    jobs = [
+        SimpleNamespace(
+            config={"tracking": {"enabled": True, "uri": "sqlite:///x.db"}}, folder=tmp_path / "0"
+        )
+    ]
+    with (
+        contextlib.suppress(RuntimeError, KeyboardInterrupt),
+        parent.parent_run(tmp_path, jobs, [], afresh=False),
+    ):
         if error:
             raise error
     assert closed == ["KILLED" if error is KeyboardInterrupt else "FAILED"]
@@ -523,7 +684,9 @@ def test_what_the_jobs_of_a_sweep_share_is_spelled_once_for_each(monkeypatch):
     from tractexp.sweep.parent import shared_settings
 
     flatten, spelled = tracking.flatten, []
-    monkeypatch.setattr(tracking, "flatten", lambda config: (spelled.append(config), flatten(config))[1])
+    monkeypatch.setattr(
+        tracking, "flatten", lambda config: (spelled.append(config), flatten(config))[1]
+    )
     configs = [{"seed": k, "optimizer": {"name": "pso", "population": 20}} for k in range(5)]
     assert shared_settings(configs) == {"optimizer.name": "pso", "optimizer.population": "20"}
     assert len(spelled) == len(configs)

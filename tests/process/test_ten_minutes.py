@@ -1,4 +1,6 @@
-"""docs/ten-minutes.md done as it stands, in an empty folder: the files it shows are written, its commands are run."""
+"""docs/ten-minutes.md done as it stands, in an empty folder: the files it shows are written, its
+commands are run.
+"""
 
 import os
 import re
@@ -14,7 +16,9 @@ BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)
 
 
 def command(line, site):
-    """A command of the page as this test runs it: this Python, and what is installed goes into a folder of its own."""
+    """A command of the page as this test runs it: this Python, and what is installed goes into a
+    folder of its own.
+    """
     words = shlex.split(line)
     if "pip" in words:
         offline = ["--no-deps", "--no-build-isolation", "--no-index", "--target", str(site), "."]
@@ -37,7 +41,9 @@ def followed(tmp_path_factory):
             continue
         for line in block.splitlines():
             there = os.environ | {"PYTHONPATH": str(site), "PYTEST_ADDOPTS": "-p no:cacheprovider"}
-            done = subprocess.run(command(line, site), cwd=folder, capture_output=True, text=True, env=there)
+            done = subprocess.run(
+                command(line, site), cwd=folder, capture_output=True, text=True, env=there
+            )
             assert done.returncode == 0, f"{line}\n{done.stdout}\n{done.stderr}"
             told[line] = done.stdout
     return told

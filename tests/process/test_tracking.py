@@ -40,11 +40,16 @@ def client(uri: str):
 
 
 def python(script: str, *arguments: str, **more) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", script, *arguments], capture_output=True, text=True, **more)
+    return subprocess.run(
+        [sys.executable, "-c", script, *arguments], capture_output=True, text=True, **more
+    )
 
 
 def test_importing_tracking_does_not_import_mlflow():
-    script = "import sys, tractexp.tracking.model, tractexp.tracking.ui; print({'mlflow', 'pandas'} & set(sys.modules))"
+    script = (
+        "import sys, tractexp.tracking.model, tractexp.tracking.ui; print({'mlflow', 'pandas'} &"
+        " set(sys.modules))"
+    )
     assert python(script, check=True).stdout.strip() == "set()"
 
 
@@ -65,7 +70,11 @@ def test_a_run_comes_back_as_it_was_logged(tmp_path, uri):
     assert found.info.run_name == "issa-s0"
     assert found.info.status == "FINISHED"
     assert found.info.end_time - found.info.start_time == pytest.approx(12_500, abs=1000)
-    assert found.data.params == {"optimizer.population": "50", "T_prime": "0.25", "optimizer.levy": "true"}
+    assert found.data.params == {
+        "optimizer.population": "50",
+        "T_prime": "0.25",
+        "optimizer.levy": "true",
+    }
     last = {"fitness": FITNESS[-1], "fitness_by_simulations": FITNESS[-1]}
     assert found.data.metrics == {"objective": 8.1e-6, "epsilon_p": 0.012} | last
     assert found.data.tags["optimizer"] == "issa"
@@ -84,22 +93,33 @@ def test_what_was_never_reached_is_no_number_of_a_chart(uri):
 def test_a_new_experiment_leads_to_the_columns_that_matter_from_any_page_of_mlflows(uri):
     found = client(uri).get_run(tracking.log(TrackedRun("e", "r"), uri))
     experiment = client(uri).get_experiment(found.info.experiment_id)
-    address = f"#/experiments/{experiment.experiment_id}/runs?viewStateShareKey=tractexp&compareRunsMode=TABLE"
+    address = (
+        f"#/experiments/{experiment.experiment_id}/runs"
+        "?viewStateShareKey=tractexp&compareRunsMode=TABLE"
+    )
     assert f"]({address})" in experiment.tags["mlflow.note.content"]
     packed = experiment.tags["mlflow.sharedViewState.tractexp"].removeprefix("deflate;")
     columns = json.loads(zlib.decompress(base64.b64decode(packed)))["selectedColumns"]
-    assert {"metrics.`search_objective`", "metrics.`model_error`", "metrics.`grade`"} <= set(columns)
+    assert {"metrics.`search_objective`", "metrics.`model_error`", "metrics.`grade`"} <= set(
+        columns
+    )
 
 
 def test_curves_keep_their_steps_and_every_point(uri):
-    run_id = tracking.log(TrackedRun("e", "r", curves={"fitness_by_simulations": (50 * STEPS, FITNESS)}), uri)
+    run_id = tracking.log(
+        TrackedRun("e", "r", curves={"fitness_by_simulations": (50 * STEPS, FITNESS)}), uri
+    )
     points = client(uri).get_metric_history(run_id, "fitness_by_simulations")
-    assert sorted((p.step, p.value) for p in points) == list(zip((50 * STEPS).tolist(), FITNESS.tolist(), strict=True))
+    assert sorted((p.step, p.value) for p in points) == list(
+        zip((50 * STEPS).tolist(), FITNESS.tolist(), strict=True)
+    )
 
 
 def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
     n = 15_000
-    run_id = tracking.log(TrackedRun("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri)
+    run_id = tracking.log(
+        TrackedRun("e", "r", curves={"fitness": (np.arange(n), np.linspace(1, 0, n))}), uri
+    )
     steps = sorted(p.step for p in client(uri).get_metric_history(run_id, "fitness"))
     assert len(steps) == CURVE_POINTS
     assert (steps[0], steps[-1]) == (0, n - 1)
@@ -108,7 +128,9 @@ def test_a_very_long_curve_is_thinned_but_keeps_its_ends(uri):
 def test_more_than_one_batch_of_everything_arrives(uri):
     parameters = {f"p{i}": i for i in range(250)}
     curves = {f"c{i}": (STEPS, FITNESS) for i in range(7)}
-    found = client(uri).get_run(tracking.log(TrackedRun("e", "r", parameters=parameters, curves=curves), uri))
+    found = client(uri).get_run(
+        tracking.log(TrackedRun("e", "r", parameters=parameters, curves=curves), uri)
+    )
     assert found.data.params == {name: str(i) for name, i in parameters.items()}
     for name in curves:
         assert len(client(uri).get_metric_history(found.info.run_id, name)) == 300
@@ -129,7 +151,9 @@ def test_children_point_to_their_sweep_which_closes_with_its_status(tmp_path, ur
 
 def test_children_are_logged_below_their_run(uri):
     child = tracking.TrackedRun("experiment", "candidate", metrics={"deviance_lowered_by": 12.5})
-    run_id = tracking.log(tracking.TrackedRun("experiment", "investigation", children=[child, child]), uri)
+    run_id = tracking.log(
+        tracking.TrackedRun("experiment", "investigation", children=[child, child]), uri
+    )
     experiment = client(uri).get_run(run_id).info.experiment_id
     found = client(uri).search_runs([experiment], f"tags.`mlflow.parentRunId` = '{run_id}'")
     assert [r.data.metrics["deviance_lowered_by"] for r in found] == [12.5, 12.5]
@@ -145,7 +169,9 @@ def test_a_run_that_cannot_be_written_whole_is_marked_failed(uri):
 
 def test_experiment_tags_carry_a_shared_view(uri):
     number = tracking.tag_experiment("e", {"mlflow.sharedViewState.tractexp": "deflate;abc"}, uri)
-    assert client(uri).get_experiment(number).tags["mlflow.sharedViewState.tractexp"] == "deflate;abc"
+    assert (
+        client(uri).get_experiment(number).tags["mlflow.sharedViewState.tractexp"] == "deflate;abc"
+    )
 
 
 def test_artifacts_lie_beside_the_database_wherever_the_process_runs(tmp_path, empty_store):
@@ -159,7 +185,9 @@ import sys; from pathlib import Path; from tractexp import provenance, tracking
 run = tracking.TrackedRun("identify: tibet/50", "r", artifacts=[Path("note.txt")])
 print(tracking.log(run, tracking.default_uri(Path(sys.argv[1]))))"""
     run_id = python(script, str(home), cwd=elsewhere, check=True).stdout.strip()
-    kept = home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
+    kept = (
+        home / "outputs" / "mlartifacts" / "identify_tibet_50" / run_id / "artifacts" / "note.txt"
+    )
     assert kept.read_text() == "hello"
     assert [p.name for p in elsewhere.iterdir()] == ["note.txt"]
 
@@ -171,15 +199,22 @@ import sys; from pathlib import Path; from tractexp import provenance, tracking
 run = tracking.TrackedRun("sweep", f"job-{sys.argv[2]}", metrics={"x": 1.0})
 tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
     jobs = [
-        subprocess.Popen([sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True)
+        subprocess.Popen(
+            [sys.executable, "-c", script, str(tmp_path), str(i)], stdout=-1, stderr=-1, text=True
+        )
         for i in range(2)
     ]
     said = [job.communicate(timeout=120) for job in jobs]
-    assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [(0, "", "")] * 2
+    assert [(job.returncode, *words) for job, words in zip(jobs, said, strict=True)] == [
+        (0, "", "")
+    ] * 2
     uri = tracking.default_uri(tmp_path)
     runs = client(uri).search_runs([client(uri).get_experiment_by_name("sweep").experiment_id])
     assert sorted(run.info.run_name for run in runs) == [f"job-{i}" for i in range(2)]
-    assert sorted(p.name for p in (tmp_path / "outputs").iterdir()) == ["mlflow.db", "mlflow.db.lock"]
+    assert sorted(p.name for p in (tmp_path / "outputs").iterdir()) == [
+        "mlflow.db",
+        "mlflow.db.lock",
+    ]
 
 
 def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):
@@ -217,7 +252,10 @@ def test_flatten_joins_keys_and_spells_values_as_the_configuration_does():
 
 
 def test_a_name_of_a_metric_is_one_that_mlflow_takes(uri):
-    names = [tracking.metric_name(f"median {name}") for name in ("issa levy=false", "a*b (c)", "issa bounds.C=[0.5]")]
+    names = [
+        tracking.metric_name(f"median {name}")
+        for name in ("issa levy=false", "a*b (c)", "issa bounds.C=[0.5]")
+    ]
     assert names == ["median issa levy:false", "median a_b _c_", "median issa bounds.C:_0.5_"]
     run_id = tracking.log(TrackedRun("e", "r", metrics=dict.fromkeys(names, 1.0)), uri)
     assert set(client(uri).get_run(run_id).data.metrics) == set(names)
@@ -245,7 +283,9 @@ def test_the_commit_is_that_of_the_folder_and_says_when_files_were_changed(tmp_p
 
     def git(*arguments: str) -> str:
         who = ["-c", "user.name=n", "-c", "user.email=e@x", "-c", "commit.gpgsign=false"]
-        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
         return done.stdout.strip()
 
     git("init", "-q")
@@ -277,7 +317,10 @@ def test_what_a_run_has_read_is_listed_by_its_digest(uri):
         (TrackedRun("", "r"), "needs experiment"),
         (TrackedRun("e", " "), "needs name"),
         (TrackedRun("e", "r", status="DONE"), "status=DONE is not one of FINISHED, FAILED, KILLED"),
-        (TrackedRun("e", "r", artifacts=[Path("gone.json")]), "gone.json of run 'r' does not exist"),
+        (
+            TrackedRun("e", "r", artifacts=[Path("gone.json")]),
+            "gone.json of run 'r' does not exist",
+        ),
         (TrackedRun("e", "r", curves={"c": ([1, 2], [1.0])}), "'c' has 2 steps and 1 values"),
     ],
 )
@@ -289,7 +332,9 @@ def test_a_run_that_is_not_right_is_refused_before_a_store_is_made(tmp_path, run
 
 def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_store):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(UserError, match=r"file/outputs/mlflow\.db cannot be used: .*File exists|Not a directory"):
+    with pytest.raises(
+        UserError, match=r"file/outputs/mlflow\.db cannot be used: .*File exists|Not a directory"
+    ):
         tracking.open_store(tracking.default_uri(tmp_path / "file"))
     (tmp_path / "junk.db").write_bytes(b"not a database " * 100)
     with pytest.raises(UserError, match=r"junk\.db cannot be used: .*not a database"):
@@ -306,7 +351,8 @@ def test_a_store_that_cannot_be_used_is_named_with_the_reason(tmp_path, empty_st
 def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence(monkeypatch):
     """It logs a traceback of each error of the database, and raises it as well."""
     logger, said = logging.getLogger("mlflow.store.db.utils"), []
-    monkeypatch.setattr(logger, "disabled", False)  # the migration of a store in this process disables all there are
+    # the migration of a store in this process disables all there are
+    monkeypatch.setattr(logger, "disabled", False)
     handler = logging.Handler()
     handler.emit = lambda record: said.append(record.getMessage())
     logger.addHandler(handler)
@@ -329,14 +375,22 @@ def test_what_mlflow_logs_of_an_error_is_not_shown_but_told_in_the_sentence(monk
 def test_a_relative_address_counts_from_the_folder_where_the_command_runs(tmp_path, empty_store):
     (tmp_path / "x.db").write_bytes(empty_store.read_bytes())
     values = "T_prime: 0.05, X_prime: 0.2, C: 0.9, M: 0.01, T_m: 0.5, p_v: 1.5, q_v: 2.5"
-    asked = ("task=simulate", f"task.values={{{values}}}", "task.depth=0.4", "tracking.uri=sqlite:///x.db")
+    asked = (
+        "task=simulate",
+        f"task.values={{{values}}}",
+        "task.depth=0.4",
+        "tracking.uri=sqlite:///x.db",
+    )
     done = run_command(*asked, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "to see it: tractexp ui --uri sqlite:///x.db" in done.stdout
     reader = client(f"sqlite:///{tmp_path / 'x.db'}")
     (logged,) = reader.search_runs([e.experiment_id for e in reader.search_experiments()])
     assert logged.info.artifact_uri.startswith((tmp_path / "mlartifacts").as_uri())
-    assert {path.name for path in (tmp_path / "mlartifacts").rglob("response.*")} == {"response.csv", "response.svg"}
+    assert {path.name for path in (tmp_path / "mlartifacts").rglob("response.*")} == {
+        "response.csv",
+        "response.svg",
+    }
 
 
 def test_addresses_are_absolute_and_the_default_is_below_outputs(tmp_path, monkeypatch):
@@ -371,7 +425,9 @@ def test_the_store_of_another_version_of_mlflow_is_refused_with_the_remedy(tmp_p
     connection.execute("UPDATE alembic_version SET version_num = 'ffff00000000'")
     connection.commit()
     connection.close()
-    with pytest.raises(UserError, match=r"another version of MLflow: 'mlflow db upgrade sqlite:.*newer\.db'"):
+    with pytest.raises(
+        UserError, match=r"another version of MLflow: 'mlflow db upgrade sqlite:.*newer\.db'"
+    ):
         tracking.open_store(f"sqlite:///{database}")
 
 
@@ -384,7 +440,9 @@ def test_the_signature_of_the_model_is_what_mlflow_itself_writes(tmp_path, uri):
     (logged,) = client(uri).search_logged_models([client(uri).get_run(run_id).info.experiment_id])
     there = Path(logged.artifact_location.removeprefix("file://"))
     columns = [ColSpec(DataType.double, name, required=name != "f") for name in "tUf"]
-    signature = ModelSignature(Schema(columns), Schema([ColSpec(DataType.double, name) for name in "PQ"]))
+    signature = ModelSignature(
+        Schema(columns), Schema([ColSpec(DataType.double, name) for name in "PQ"])
+    )
     assert Model.load(str(there)).signature == signature
     assert signature.to_dict() == model.SIGNATURE
 
@@ -399,7 +457,8 @@ def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):
 STAND_IN = '''
 import json, sys, types
 class Model:
-    """Stands in for the identified model: P is a share of U, Q follows the frequency where it is known."""
+    """Stands in for the identified model: P is a share of U, Q follows the frequency where \
+it is known."""
     def __init__(self, path): self.share = json.loads(path.read_text())["share"]
     def predict(self, t, U, f=None): return self.share * U, (U if f is None else f / 50.0)
 stand_in = types.ModuleType("tractexp.identification.result")
@@ -411,7 +470,8 @@ for address in sys.argv[2:]:
     model = mlflow.pyfunc.load_model(address)
     frame = pd.DataFrame({"t": [0.0, 0.1], "U": [1.0, 0.5]}, index=[7, 8])
     plain, driven = model.predict(frame), model.predict(frame.assign(f=[50.0, 49.0]))
-    print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), driven.Q.tolist()]))
+    print(json.dumps([list(plain.columns), list(plain.index), plain.values.tolist(), \
+driven.Q.tolist()]))
     try:
         model.predict(frame[["t"]])
     except Exception as error:
@@ -444,8 +504,12 @@ def answers(address: str) -> bool:
 
 
 def refused(address: str, headers: dict) -> int:
-    """The status of a request that would make an experiment without a name, which is itself refused as 400."""
-    request = urllib.request.Request(address, b"{}", {"Content-Type": "application/json", **headers})
+    """The status of a request that would make an experiment without a name, which is itself refused
+    as 400.
+    """
+    request = urllib.request.Request(
+        address, b"{}", {"Content-Type": "application/json", **headers}
+    )
     try:
         with urllib.request.urlopen(request, timeout=20) as answer:
             return answer.status
@@ -454,7 +518,9 @@ def refused(address: str, headers: dict) -> int:
 
 
 def reflected(address: str, headers: dict) -> str | None:
-    """The origin that an answer lets read it, whether the page asks for leave first or reads at once."""
+    """The origin that an answer lets read it, whether the page asks for leave first or reads at
+    once.
+    """
     for method in ("OPTIONS", "GET"):
         more = {"Access-Control-Request-Method": "POST"} if method == "OPTIONS" else {}
         request = urllib.request.Request(address, headers=headers | more, method=method)
@@ -490,18 +556,24 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     port = free_port()
-    script = "import sys; from tractexp.tracking.ui import serve; sys.exit(serve(sys.argv[1], port=int(sys.argv[2])))"
+    script = (
+        "import sys; from tractexp.tracking.ui import serve; sys.exit(serve(sys.argv[1],"
+        " port=int(sys.argv[2])))"
+    )
     ui = subprocess.Popen(
         [sys.executable, "-c", script, uri, str(port)],
         stdout=-1,
         stderr=-1,
         text=True,
         cwd=elsewhere,
-        env=os.environ | {"MLFLOW_SERVER_ALLOWED_HOSTS": "*", "MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE": "true"},
+        env=os.environ
+        | {"MLFLOW_SERVER_ALLOWED_HOSTS": "*", "MLFLOW_SERVER_DISABLE_SECURITY_MIDDLEWARE": "true"},
     )
     try:
         said = ui.stdout.readline()
-        assert said.startswith(f"starting the MLflow UI on http://127.0.0.1:{port}/, which takes about")
+        assert said.startswith(
+            f"starting the MLflow UI on http://127.0.0.1:{port}/, which takes about"
+        )
         assert f"it shows {uri}" in said
         assert re.match(rf"ready after \d+ s: http://127\.0\.0\.1:{port}/", ui.stdout.readline())
         assert answers(f"http://127.0.0.1:{port}/")
@@ -512,8 +584,16 @@ def test_the_ui_answers_on_loopback_and_leaves_nothing_behind(tmp_path, uri):
         for headers, status in FOREIGN:
             headers = {name: value.replace("PORT", str(port)) for name, value in headers.items()}
             if status == 403:
-                assert reflected(f"http://127.0.0.1:{port}/ajax-api/2.0/mlflow/experiments/search", headers) is None
-            assert refused(f"http://127.0.0.1:{port}/api/2.0/mlflow/experiments/create", headers) == status, headers
+                assert (
+                    reflected(
+                        f"http://127.0.0.1:{port}/ajax-api/2.0/mlflow/experiments/search", headers
+                    )
+                    is None
+                )
+            assert (
+                refused(f"http://127.0.0.1:{port}/api/2.0/mlflow/experiments/create", headers)
+                == status
+            ), headers
         with pytest.raises(UserError, match=f"port {port} on 127.0.0.1 cannot be used"):
             serve(uri, port=port)
     finally:
@@ -538,7 +618,9 @@ def test_the_ui_says_why_it_cannot_open(tmp_path, uri):
 
 def test_a_second_process_logs_as_this_one_would(tmp_path, uri):
     (tmp_path / "result.json").write_text("{}")
-    run = TrackedRun("e", "r", curves={"fitness": (STEPS, FITNESS)}, artifacts=[tmp_path / "result.json"])
+    run = TrackedRun(
+        "e", "r", curves={"fitness": (STEPS, FITNESS)}, artifacts=[tmp_path / "result.json"]
+    )
     with Logger(uri) as logger:
         found = client(uri).get_run(logger.log(run))
     assert (found.info.status, found.data.metrics) == ("FINISHED", {"fitness": FITNESS[-1]})
@@ -577,7 +659,9 @@ def test_a_command_that_logs_nothing_waits_for_nothing_and_leaves_no_word(told, 
         f"(ahead,) = process._ahead; {told}print(ahead._process.pid, time.time(), flush=True)"
     )
     with (tmp_path / "said.txt").open("w+") as said:
-        done = subprocess.Popen([sys.executable, "-c", program, uri], stdout=-1, stderr=said, text=True)
+        done = subprocess.Popen(
+            [sys.executable, "-c", program, uri], stdout=-1, stderr=said, text=True
+        )
         pid, ended = done.stdout.readline().split()
         assert done.wait(30) == 0
         assert time.time() - float(ended) < 1.0  # MLflow alone takes longer
@@ -603,7 +687,8 @@ def alive(pid):
 def test_to_start_the_process_imports_nothing_that_takes_time():
     program = (
         "import sys; import tractexp.tracking.process;"
-        "heavy = {'mlflow', 'numpy', 'pandas', 'sqlalchemy', 'hydra'} & sys.modules.keys(); assert not heavy, heavy"
+        "heavy = {'mlflow', 'numpy', 'pandas', 'sqlalchemy', 'hydra'} & sys.modules.keys(); assert"
+        " not heavy, heavy"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -612,7 +697,8 @@ def test_to_start_the_process_imports_nothing_that_takes_time():
 def test_the_process_that_logs_imports_nothing_that_mlflow_does_without(uri):
     program = (
         "import sys; from tractexp.tracking import process;"
-        "process.log = lambda run, uri: [name for name, module in sys.modules.items() if module]; process.main()"
+        "process.log = lambda run, uri: [name for name, module in sys.modules.items() if module];"
+        " process.main()"
     )
     told = pickle.dumps(uri) + pickle.dumps(TrackedRun("e", "r"))
     done = subprocess.run([sys.executable, "-c", program], input=told, capture_output=True)

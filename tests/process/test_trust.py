@@ -1,4 +1,6 @@
-"""What somebody else gave is data: none of it runs, sends, overwrites, or stands in for what is ours."""
+"""What somebody else gave is data: none of it runs, sends, overwrites, or stands in for what is
+ours.
+"""
 
 import json
 import os
@@ -25,7 +27,18 @@ QUICK = ("optimizer=random_search", "budget=10", "hydra.run.dir=run")
 
 # Modules beside the records
 
-TRAPS = ("mlflow", "numpy", "pickle", "yaml", "joblib", "hydra", "json", "typing_extensions", "uvicorn", "tempfile")
+TRAPS = (
+    "mlflow",
+    "numpy",
+    "pickle",
+    "yaml",
+    "joblib",
+    "hydra",
+    "json",
+    "typing_extensions",
+    "uvicorn",
+    "tempfile",
+)
 TRAP = "open('trapped', 'a').write(__name__ + ' ')\nraise ImportError(__name__)\n"
 
 
@@ -38,7 +51,10 @@ def trapped(tmp_path) -> Path:
     return tmp_path
 
 
-COMMAND, MODULE = (str(Path(sys.executable).with_name("tractexp")),), (sys.executable, "-m", "tractexp")
+COMMAND, MODULE = (
+    (str(Path(sys.executable).with_name("tractexp")),),
+    (sys.executable, "-m", "tractexp"),
+)
 
 
 @pytest.mark.parametrize(
@@ -57,8 +73,17 @@ def test_no_module_beside_the_records_is_imported(start, arguments, trapped):
 
 
 def test_the_server_of_the_pages_imports_none_either(trapped, uri):
-    command = [str(Path(sys.executable).with_name("tractexp")), "ui", "--uri", uri, "--port", str(free_port())]
-    with subprocess.Popen(command, cwd=trapped, stdout=subprocess.PIPE, text=True, env=os.environ) as server:
+    command = [
+        str(Path(sys.executable).with_name("tractexp")),
+        "ui",
+        "--uri",
+        uri,
+        "--port",
+        str(free_port()),
+    ]
+    with subprocess.Popen(
+        command, cwd=trapped, stdout=subprocess.PIPE, text=True, env=os.environ
+    ) as server:
         assert server.stdout is not None
         said = [server.stdout.readline(), server.stdout.readline()]
         server.terminate()
@@ -83,14 +108,34 @@ def given(folder: Path, *settings: str, cwd: str = ".", searched: str = "") -> P
 @pytest.mark.parametrize(
     "setting",
     [
-        "+hydra.callbacks.x._target_=numpy.testing.measure", "hydra.run.dir=mine", "hydra.sweep.dir=mine",
-        "hydra/launcher=basic", "hydra.launcher.address=tcp://1.2.3.4:5", "hydra.job.env_set={A: b}",
-        "hydra.searchpath=[file:///tmp]", "tracking.uri=http://1.2.3.4", "tracking.experiment=theirs",
-        "++tracking.uri=x", "~tracking", "optimizer@hydra.callbacks=pso", "optimizer=../../evil", "data=/tmp/evil",
-        "seed=${oc.env:HOME}", "data.path=${oc.env:HOME}", "task.docs=/home", "task.sweep=../mine", "hydra=x", "=5",
-        "experiment=../evil", "--config-dir=x", "unknown=1", "model=../evil", "model/motor=[../a]", "-m",
+        "+hydra.callbacks.x._target_=numpy.testing.measure",
+        "hydra.run.dir=mine",
+        "hydra.sweep.dir=mine",
+        "hydra/launcher=basic",
+        "hydra.launcher.address=tcp://1.2.3.4:5",
+        "hydra.job.env_set={A: b}",
+        "hydra.searchpath=[file:///tmp]",
+        "tracking.uri=http://1.2.3.4",
+        "tracking.experiment=theirs",
+        "++tracking.uri=x",
+        "~tracking",
+        "optimizer@hydra.callbacks=pso",
+        "optimizer=../../evil",
+        "data=/tmp/evil",
+        "seed=${oc.env:HOME}",
+        "data.path=${oc.env:HOME}",
+        "task.docs=/home",
+        "task.sweep=../mine",
+        "hydra=x",
+        "=5",
+        "experiment=../evil",
+        "--config-dir=x",
+        "unknown=1",
+        "model=../evil",
+        "model/motor=[../a]",
+        "-m",
     ],
-)  # fmt: skip
+)
 def test_what_the_folder_of_a_run_may_not_say_is_refused_by_its_name(setting, tmp_path):
     folder = given(tmp_path / "given", "optimizer=pso", setting)
     done = run_command("again", str(folder), cwd=tmp_path)
@@ -104,7 +149,10 @@ def test_what_the_folder_of_a_run_may_not_say_is_refused_by_its_name(setting, tm
 def test_what_is_refused_may_be_said_by_the_user(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = given(tmp_path / "given", "optimizer=pso", "tracking.uri=http://1.2.3.4")
-    assert build_repeat_command([str(folder), "tracking.uri=null"]) == ["optimizer=pso", "tracking.uri=null"]
+    assert build_repeat_command([str(folder), "tracking.uri=null"]) == [
+        "optimizer=pso",
+        "tracking.uri=null",
+    ]
 
 
 def test_configurations_of_others_are_looked_for_where_the_user_says(tmp_path, monkeypatch):
@@ -112,23 +160,33 @@ def test_configurations_of_others_are_looked_for_where_the_user_says(tmp_path, m
     folder = given(tmp_path / "given", "optimizer=pso", searched="/theirs")
     with pytest.raises(UserError, match="used configurations in /theirs, which only you can name"):
         build_repeat_command([str(folder)])
-    assert build_repeat_command([str(folder), "--config-dir", "mine"]) == ["--config-dir", str(tmp_path / "mine"), "optimizer=pso"]
+    assert build_repeat_command([str(folder), "--config-dir", "mine"]) == [
+        "--config-dir",
+        str(tmp_path / "mine"),
+        "optimizer=pso",
+    ]
 
 
 def test_a_run_is_repeated_above_its_folder_or_here_and_nowhere_else(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "elsewhere").mkdir()
-    build_repeat_command([str(given(tmp_path / "given", "seed=1", cwd=str(tmp_path / "elsewhere")))])
+    build_repeat_command(
+        [str(given(tmp_path / "given", "seed=1", cwd=str(tmp_path / "elsewhere")))]
+    )
     assert Path.cwd() == tmp_path
     (tmp_path / "place").mkdir()
-    build_repeat_command([str(given(tmp_path / "place" / "runs" / "own", "seed=1", cwd=str(tmp_path / "place")))])
+    build_repeat_command(
+        [str(given(tmp_path / "place" / "runs" / "own", "seed=1", cwd=str(tmp_path / "place")))]
+    )
     assert Path.cwd() == tmp_path / "place"
 
 
 def test_a_job_of_a_sweep_is_repeated_too(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     folder = given(tmp_path / "sweep" / "0", "seed=2", cwd=str(tmp_path))
-    (folder / ".hydra" / "hydra.yaml").write_text(yaml.safe_dump({"hydra": {"runtime": {"cwd": str(tmp_path)}}}))
+    (folder / ".hydra" / "hydra.yaml").write_text(
+        yaml.safe_dump({"hydra": {"runtime": {"cwd": str(tmp_path)}}})
+    )
     assert build_repeat_command([str(folder)]) == ["seed=2"]
 
 
@@ -164,7 +222,20 @@ LAUGHS = "- &a0 [x, x, x, x, x, x, x, x, x, x]\n" + "".join(
         (b" " * (4 << 20) + b"x", "a file of its kind at most"),
         (None, "is a named pipe"),
     ],
-    ids=["laughs", "cycle", "deep", "object", "date", "cut", "zero", "bytes", "number", "empty", "giant", "pipe"],
+    ids=[
+        "laughs",
+        "cycle",
+        "deep",
+        "object",
+        "date",
+        "cut",
+        "zero",
+        "bytes",
+        "number",
+        "empty",
+        "giant",
+        "pipe",
+    ],
 )
 def test_a_damaged_configuration_is_a_sentence_and_takes_no_time(content, sentence, tmp_path):
     folder = given(tmp_path / "given", "optimizer=pso")
@@ -180,7 +251,11 @@ def test_a_damaged_configuration_is_a_sentence_and_takes_no_time(content, senten
 
 # Runs that are brought into a store
 
-PICKLE = {"flavors": {"python_function": {"loader_module": "mlflow.pyfunc.model", "python_model": "p.pkl"}}}
+PICKLE = {
+    "flavors": {
+        "python_function": {"loader_module": "mlflow.pyfunc.model", "python_model": "p.pkl"}
+    }
+}
 
 
 def brought(folder: Path, uri: str, **content) -> tuple[dict, list[str]]:
@@ -215,7 +290,12 @@ def test_no_model_of_others_comes_into_the_store_but_as_a_result_that_is_read(tm
 
 
 def test_a_run_of_others_sets_no_tag_of_mlflow_and_shows_no_link(tmp_path, uri):
-    tags = {"mlflow.parentRunId": "x", "mlflow.source.name": "theirs", "tractexp.key": "y", "load": "7"}
+    tags = {
+        "mlflow.parentRunId": "x",
+        "mlflow.source.name": "theirs",
+        "tractexp.key": "y",
+        "load": "7",
+    }
     picture = "A ![x](http://127.0.0.1:9/x) <img src=x> that is \\<own\\>"
     found, _ = brought(tmp_path / "given", uri, tags=tags, description=picture)
     assert found["tags"]["mlflow.source.name"] == "tractexp"
@@ -241,7 +321,9 @@ def test_a_name_prints_no_line_of_its_own(tmp_path):
     said = done.stdout + done.stderr
     header, body = (DATA / "tibet_30pct.csv").read_text().split("\n", 1)
     (tmp_path / "dip.csv").write_text(header + "\n" + body)
-    (tmp_path / "dip.json").write_text(json.dumps({"name": FORGED, "station": FORGED, "source": FORGED}))
+    (tmp_path / "dip.json").write_text(
+        json.dumps({"name": FORGED, "station": FORGED, "source": FORGED})
+    )
     said += (done := run_command("look", "dip.csv", cwd=tmp_path)).stdout + done.stderr
     assert not [line for line in said.splitlines() if line.startswith("next:")]
 
@@ -253,9 +335,11 @@ def test_a_report_prints_a_name_in_its_line(kind):
 
     report = Report(FORGED if kind == "a title" else "Report")
     made = {
-        "a text": lambda: report.text(FORGED), "an item": lambda: report.items([FORGED]),
-        "a heading": lambda: report.heading(FORGED), "a cell": lambda: report.add(Table(["name"], [[FORGED]])),
-    }  # fmt: skip
+        "a text": lambda: report.text(FORGED),
+        "an item": lambda: report.items([FORGED]),
+        "a heading": lambda: report.heading(FORGED),
+        "a cell": lambda: report.add(Table(["name"], [[FORGED]])),
+    }
     made.get(kind, lambda: None)()
     assert "next:" in plain(report)
     assert not [line for line in plain(report).splitlines() if line.strip().startswith("next:")]

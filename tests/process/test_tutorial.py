@@ -13,7 +13,9 @@ BLOCK = re.compile(r"```(\w*)\n(.*?)```", re.DOTALL)
 
 @pytest.fixture(scope="module")
 def followed(tmp_path_factory):
-    """The folder at the end, and of each command and quotation in order: (whether it is quoted, its words)."""
+    """The folder at the end, and of each command and quotation in order: (whether it is quoted, its
+    words).
+    """
     folder, told = tmp_path_factory.mktemp("empty"), []
     for language, block in BLOCK.findall(PAGE.read_text(encoding="utf-8")):
         if language != "sh":

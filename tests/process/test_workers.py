@@ -28,7 +28,9 @@ print(sorted(k for _, k in Workers(2).completed(grow, range(10), 10)))
 
 def test_jobs_end_where_warnings_are_errors_and_their_workers_grow():
     """With joblib's warning the last jobs never end: this one is killed."""
-    done = subprocess.run([sys.executable, "-W", "error", "-c", GROWING], capture_output=True, text=True, timeout=100)
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", GROWING], capture_output=True, text=True, timeout=100
+    )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[0] == str(list(range(10)))
     assert "A worker stopped" not in done.stderr
@@ -48,9 +50,19 @@ def counted(case):
 @pytest.mark.parametrize("n_jobs", [1, 2])
 def test_a_call_that_kills_its_worker_is_blamed_and_no_other(n_jobs, tmp_path):
     cases = [(tmp_path, k) for k in range(5)]
-    ends = {case[1]: result for case, result in Workers(n_jobs, apart=True).results(counted, cases, tries=3)}
-    assert {k: result and result[0] for k, result in ends.items()} == {0: 0, 1: 1, 2: None, 3: 3, 4: 4}
-    assert os.getpid() not in {result[1] for result in ends.values() if result}  # nor with one worker
+    ends = {
+        case[1]: result
+        for case, result in Workers(n_jobs, apart=True).results(counted, cases, tries=3)
+    }
+    assert {k: result and result[0] for k, result in ends.items()} == {
+        0: 0,
+        1: 1,
+        2: None,
+        3: 3,
+        4: 4,
+    }
+    # nor with one worker
+    assert os.getpid() not in {result[1] for result in ends.values() if result}
     begun = {k: len((tmp_path / str(k)).read_text()) for k in range(5)}
     assert begun[2] == 3
     assert all(1 <= begun[k] <= 2 for k in (0, 1, 3, 4))
@@ -81,7 +93,9 @@ class Killed(Workers):
 
 def test_workers_that_never_begin_are_refused_in_a_sentence():
     looks = []
-    with pytest.raises(UserError, match="killed before they begin: is there enough memory for them"):
+    with pytest.raises(
+        UserError, match="killed before they begin: is there enough memory for them"
+    ):
         list(Killed().results(abs, [1, 2], trace=lambda item: bool(looks.append(item))))
     assert looks == [1] * BARREN
 

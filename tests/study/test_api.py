@@ -1,4 +1,6 @@
-"""The front door: public calls with named arguments, and results that print, tabulate, save and load."""
+"""The front door: public calls with named arguments, and results that print, tabulate, save and
+load.
+"""
 
 import ast
 import dataclasses
@@ -21,10 +23,14 @@ QUICK = {"name": "multistart_least_squares", "starts": 2}
 
 
 def same(one, other):
-    """Whether two identifications are the same in all but the time they took, and the commands that they advise."""
+    """Whether two identifications are the same in all but the time they took, and the commands that
+    they advise.
+    """
 
     def timeless(result):
-        return dataclasses.replace(result, seconds=0.0, search=result.search | {"seconds": 0.0}, advice=[])
+        return dataclasses.replace(
+            result, seconds=0.0, search=result.search | {"seconds": 0.0}, advice=[]
+        )
 
     return timeless(one.result) == timeless(other.result)
 
@@ -36,7 +42,9 @@ def dips(resistive_dips):
 
 @pytest.fixture(scope="module")
 def fit(dips):
-    return tractexp.identify(dips[0], model="third_order_exponential", optimizer=QUICK, validate=dips[2])
+    return tractexp.identify(
+        dips[0], model="third_order_exponential", optimizer=QUICK, validate=dips[2]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -67,7 +75,9 @@ def test_values_have_names(fit, dips):
     response = fit.predict(dips[1])
     assert response.P.shape == dips[1].record.t.shape
     record = dips[1].record
-    assert response.epsilon[0] == pytest.approx(np.linalg.norm(response.P - record.P) / np.linalg.norm(record.P))
+    assert response.epsilon[0] == pytest.approx(
+        np.linalg.norm(response.P - record.P) / np.linalg.norm(record.P)
+    )
     assert "electromechanical motor and exponential static load\n" in repr(fit)
     assert "95 % interval" in repr(fit)
     assert fit.headline[1:] in repr(fit)
@@ -91,9 +101,13 @@ def test_an_investigation_names_what_is_missing_and_gives_a_model_again(found, f
 
 def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
     """A base model under the name of an extended one would pass for an answer."""
-    found = tractexp.investigate(dips[:2], effects=["speed_dependent_torque"], criteria={"adequate_p": 1.0})
+    found = tractexp.investigate(
+        dips[:2], effects=["speed_dependent_torque"], criteria={"adequate_p": 1.0}
+    )
     assert found.names == ()
-    with pytest.raises(UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"):
+    with pytest.raises(
+        UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"
+    ):
         _ = found.extended
     assert found.question.model.effects == ()
     assert found.fit.parameters.keys() == set(MOTOR)
@@ -102,7 +116,9 @@ def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
     written = {path.name for path in found.write(tmp_path)}
     assert "extended.yaml" not in written
     assert ("unexplained.csv" in written) == (found.verdict == "unexplained")
-    assert found.remainder.caption == (found.content["remainder"]["sentence"] if found.content["remainder"] else "")
+    assert found.remainder.caption == (
+        found.content["remainder"]["sentence"] if found.content["remainder"] else ""
+    )
 
 
 def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_path):
@@ -121,15 +137,21 @@ def test_what_is_saved_is_json_and_comes_back_the_same(fit, found, dips, tmp_pat
             assert "<figure" in result.report().html
         again = tractexp.load(path)
         assert type(again) is type(result)
-        assert [list(map(str, row)) for row in again.table().rows] == [list(map(str, r)) for r in result.table().rows]
+        assert [list(map(str, row)) for row in again.table().rows] == [
+            list(map(str, r)) for r in result.table().rows
+        ]
         assert again.to_dict().keys() == result.to_dict().keys()
         assert type(result).load(path).table().title == result.table().title
     again = tractexp.load(tmp_path / "fit.json")
     assert again.result == fit.result
     assert np.array_equal(again.predict(dips[1]).P, fit.predict(dips[1]).P)
-    assert again.details.uncertainty.values == pytest.approx(fit.details.uncertainty.values, rel=1e-12)
+    assert again.details.uncertainty.values == pytest.approx(
+        fit.details.uncertainty.values, rel=1e-12
+    )
     assert again.advice == fit.advice
-    assert np.array_equal(tractexp.load(tmp_path / "found.json").predict(dips[2]).Q, found.predict(dips[2]).Q)
+    assert np.array_equal(
+        tractexp.load(tmp_path / "found.json").predict(dips[2]).Q, found.predict(dips[2]).Q
+    )
     assert np.array_equal(tractexp.load(tmp_path / "simulation.json").P, made["simulation"].P)
     with pytest.raises(UserError, match="kind 'identification', not 'plan'"):
         type(made["plan"]).load(tmp_path / "fit.json")
@@ -167,7 +189,8 @@ def test_all_dips_of_a_comtrade_file_are_read(tmp_path):
     path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4), (1.3, 1.4, 0.2)]), [(3200, 6400)])
     made = tractexp.read(path, voltages=[0, 1, 2], currents=[3, 4, 5])
     assert [round(e.depth, 1) for e in made] == [0.4, 0.2]
-    assert [e.depth for e in tractexp.read(path)] == [e.depth for e in made]  # the only load needs no channels
+    # the only load needs no channels
+    assert [e.depth for e in tractexp.read(path)] == [e.depth for e in made]
 
 
 def test_a_base_makes_a_table_per_unit(resistive_dips):
@@ -181,18 +204,37 @@ def test_a_base_makes_a_table_per_unit(resistive_dips):
 
 
 def test_the_command_and_the_call_give_the_same_numbers(resistive_dips, tmp_path):
-    settings = {"seed": 2, "budget": 600, "per_event": ["T_m"], "bounds": {"C": [0.5, 0.95]}, "fixed": {"q_v": 3.0}}
+    settings = {
+        "seed": 2,
+        "budget": 600,
+        "per_event": ["T_m"],
+        "bounds": {"C": [0.5, 0.95]},
+        "fixed": {"q_v": 3.0},
+    }
     call = tractexp.identify(
-        [*map(str, resistive_dips[:2])], validate=str(resistive_dips[2]),
+        [*map(str, resistive_dips[:2])],
+        validate=str(resistive_dips[2]),
         objective={"name": "squares", "weight_P": 2.0},
-        optimizer="issa_polish", progress=False, **settings,
-    )  # fmt: skip
+        optimizer="issa_polish",
+        progress=False,
+        **settings,
+    )
     done = run_command(
-        "data=csv", f"data.train=[{resistive_dips[0]},{resistive_dips[1]}]",
-        f"data.validate=[{resistive_dips[2]}]", "objective.weight_P=2", "optimizer=issa_polish", "seed=2", "budget=600",
-        "model.per_event=[T_m]", "model.bounds.C=[0.5,0.95]", "model.fixed.q_v=3", "task.figures=false",
-        "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path,
-    )  # fmt: skip
+        "data=csv",
+        f"data.train=[{resistive_dips[0]},{resistive_dips[1]}]",
+        f"data.validate=[{resistive_dips[2]}]",
+        "objective.weight_P=2",
+        "optimizer=issa_polish",
+        "seed=2",
+        "budget=600",
+        "model.per_event=[T_m]",
+        "model.bounds.C=[0.5,0.95]",
+        "model.fixed.q_v=3",
+        "task.figures=false",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     told = tractexp.load(tmp_path / "run" / "result.json")
     assert same(told, call)
@@ -208,9 +250,15 @@ def test_a_model_is_found_by_name_by_file_and_by_parts(tmp_path, found):
     parts = tractexp.compose(motor="double_cage", static={"name": "exponential"})
     assert named.node == parts.node
     file = tmp_path / "mine.yaml"
-    file.write_text("defaults:\n  - motor: mechanical\n  - static: zip\n  - _self_\nfixed: {T_m: 0.5}\n")
+    file.write_text(
+        "defaults:\n  - motor: mechanical\n  - static: zip\n  - _self_\nfixed: {T_m: 0.5}\n"
+    )
     mine = tractexp.compose(file.as_posix(), bounds={"M": [0.001, 0.02]})
-    assert (mine.motor["name"], mine.static["name"], mine.fixed) == ("mechanical", "zip", {"T_m": 0.5})
+    assert (mine.motor["name"], mine.static["name"], mine.fixed) == (
+        "mechanical",
+        "zip",
+        {"T_m": 0.5},
+    )
     assert mine.parameters["M"].bounds == (0.001, 0.02)
     assert "fixed" in repr(mine)
     again = tractexp.compose(found.extended.model)
@@ -228,7 +276,9 @@ def test_progress_tells_each_line_or_nothing(dips, capsys):
 
 T = np.arange(100) * 0.01
 REFUSED = {
-    "identify() has no argument 'optimiser'; did you mean 'optimizer'?": lambda d: tractexp.identify(d, optimiser=1),
+    "identify() has no argument 'optimiser'; did you mean 'optimizer'?": lambda d: (
+        tractexp.identify(d, optimiser=1)
+    ),
     "investigate() has no argument 'optimizer'": lambda d: tractexp.investigate(d, optimizer="pso"),
     "investigate() has no argument 'budget'": lambda d: tractexp.investigate(d, budget=10),
     "per_event=['T_m'] has no meaning in an investigation": lambda d: tractexp.investigate(
@@ -238,26 +288,38 @@ REFUSED = {
     "seed='x' is a text, but it must be a whole number": lambda d: tractexp.identify(d, seed="x"),
     "seed=-1 is out of range": lambda d: tractexp.identify(d, seed=-1),
     "budget=0 is out of range": lambda d: tractexp.identify(d, budget=0),
-    "bounds={'C': 3} is a mapping, but it must be a mapping": lambda d: tractexp.identify(d, bounds={"C": 3}),
-    "bounds.C: bounds [0.9, 0.5] must be two finite numbers": lambda d: tractexp.identify(d, bounds={"C": [0.9, 0.5]}),
-    "fixed.Cc: this model has no parameter 'Cc'; did you mean 'C'?": lambda d: tractexp.identify(d, fixed={"Cc": 1.0}),
+    "bounds={'C': 3} is a mapping, but it must be a mapping": lambda d: tractexp.identify(
+        d, bounds={"C": 3}
+    ),
+    "bounds.C: bounds [0.9, 0.5] must be two finite numbers": lambda d: tractexp.identify(
+        d, bounds={"C": [0.9, 0.5]}
+    ),
+    "fixed.Cc: this model has no parameter 'Cc'; did you mean 'C'?": lambda d: tractexp.identify(
+        d, fixed={"Cc": 1.0}
+    ),
     "substeps=0 is out of range": lambda d: tractexp.identify(d, substeps=0),
     "model=third: there is no such choice": lambda d: tractexp.identify(d, model="third"),
     "model is of type int": lambda d: tractexp.identify(d, model=3),
-    "optimizer=issa_polsh: there is no such choice; did you mean 'issa_polish'": lambda d: tractexp.identify(
-        d, optimizer="issa_polsh"
+    "optimizer=issa_polsh: there is no such choice; did you mean 'issa_polish'": lambda d: (
+        tractexp.identify(d, optimizer="issa_polsh")
     ),
-    "optimizer 'pso' has no setting 'populaton'; did you mean 'population'?": lambda d: tractexp.identify(
-        d, optimizer={"name": "pso", "populaton": 3}
+    "optimizer 'pso' has no setting 'populaton'; did you mean 'population'?": lambda d: (
+        tractexp.identify(d, optimizer={"name": "pso", "populaton": 3})
     ),
     "optimizer.population='many' is a text": lambda d: tractexp.identify(
         d, optimizer={"name": "pso", "population": "many"}
     ),
-    "objective=3 is a whole number, but it must be a text or a mapping": lambda d: tractexp.identify(d, objective=3),
-    "per_event='T_m' is a text, but it must be a list, each a text": lambda d: tractexp.identify(d, per_event="T_m"),
+    "objective=3 is a whole number, but it must be a text or a mapping": lambda d: (
+        tractexp.identify(d, objective=3)
+    ),
+    "per_event='T_m' is a text, but it must be a list, each a text": lambda d: tractexp.identify(
+        d, per_event="T_m"
+    ),
     "records is empty": lambda d: tractexp.identify([]),
     "false_alarms=0.9 is out of range": lambda d: tractexp.investigate(d, false_alarms=0.9),
-    "names 'stator_resistence', which is no effect": lambda d: tractexp.investigate(d, effects=["stator_resistence"]),
+    "names 'stator_resistence', which is no effect": lambda d: tractexp.investigate(
+        d, effects=["stator_resistence"]
+    ),
     "is both in records and in validate": lambda d: tractexp.investigate(d, validate=d),
     "nothing to read": lambda d: tractexp.read(),
     "nowhere.csv: there is no such file": lambda d: tractexp.read("nowhere.csv"),
@@ -265,17 +327,25 @@ REFUSED = {
     "tibet_5pct is neither a file with an ending nor": lambda d: tractexp.read("tibet_5pct"),
     "has no setting 'voltages'": lambda d: tractexp.read("tibet_50pct", voltages=[1, 2, 3]),
     "arrays: Q missing; t, U, P, Q are needed": lambda d: tractexp.read(t=T, U=T, P=T),
-    "arrays: P holds 'a' at sample 1, which is no number": lambda d: tractexp.read(t=T, U=T, P=["a"] * 100, Q=T),
+    "arrays: P holds 'a' at sample 1, which is no number": lambda d: tractexp.read(
+        t=T, U=T, P=["a"] * 100, Q=T
+    ),
     "U has shape (99,) where t has 100 samples": lambda d: tractexp.read(t=T, U=T[1:], P=T, Q=T),
-    "values.T_prim: this model has no parameter 'T_prim'": lambda d: tractexp.simulate(None, {"T_prim": 1}, depth=0),
+    "values.T_prim: this model has no parameter 'T_prim'": lambda d: tractexp.simulate(
+        None, {"T_prim": 1}, depth=0
+    ),
     "no value for T_prime": lambda d: tractexp.simulate(depth=0.3),
     "depth=1.5 is out of range": lambda d: tractexp.simulate(values=MOTOR, depth=1.5),
     "either records to play, or the depth of a dip": lambda d: tractexp.simulate(values=MOTOR),
-    "duration describes a dip made by hand": lambda d: tractexp.simulate(values=MOTOR, records=d, duration=0.3),
+    "duration describes a dip made by hand": lambda d: tractexp.simulate(
+        values=MOTOR, records=d, duration=0.3
+    ),
     "parameter=X_prim is not a free parameter": lambda d: tractexp.plan(d, parameter="X_prim"),
-    "fit='result.json' is a text, but it must be an Identification": lambda d: tractexp.profile("result.json"),
+    "fit='result.json' is a text, but it must be an Identification": lambda d: tractexp.profile(
+        "result.json"
+    ),
     "nowhere.json cannot be read": lambda d: tractexp.load("nowhere.json"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("sentence", REFUSED)
@@ -301,14 +371,20 @@ def test_a_damaged_file_gets_a_sentence(fit, tmp_path):
 
 
 def test_the_door_is_light():
-    """No module of a tracker, a plotter or a configurator is imported by a fit; none at all by the import."""
+    """No module of a tracker, a plotter or a configurator is imported by a fit; none at all by the
+    import.
+    """
     code = (
         "import sys, tractexp; assert 'numpy' not in sys.modules;"
-        "d = tractexp.read('tibet_50pct'); tractexp.identify(d, optimizer={'name': 'random_search'}, budget=50,"
+        "d = tractexp.read('tibet_50pct'); tractexp.identify(d, optimizer={'name':"
+        " 'random_search'}, budget=50,"
         " check_intervals=False, progress=False);"
-        "print([m for m in ('mlflow', 'matplotlib', 'hydra', 'omegaconf', 'pandas') if m in sys.modules])"
+        "print([m for m in ('mlflow', 'matplotlib', 'hydra', 'omegaconf', 'pandas') if m in"
+        " sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=os.environ)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env=os.environ
+    )
     assert done.stdout.strip() == "[]", done.stderr
 
 
@@ -322,11 +398,19 @@ def test_every_public_name_is_there_and_says_what_it_does():
 
 
 def test_type_checkers_see_the_names_that_a_program_gets():
-    """The block that only they read, beside the table by which a name is imported at its first use."""
+    """The block that only they read, beside the table by which a name is imported at
+    its first use.
+    """
     tree = ast.parse(Path(tractexp.__file__).read_text(encoding="utf-8"))
-    (block,) = (node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING")
+    (block,) = (
+        node
+        for node in tree.body
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"
+    )
     imports = [node for node in block.body if isinstance(node, ast.ImportFrom)]
-    assert {alias.asname: node.module for node in imports for alias in node.names} == tractexp.PUBLIC
+    assert {
+        alias.asname: node.module for node in imports for alias in node.names
+    } == tractexp.PUBLIC
 
 
 def test_every_call_has_the_door_and_every_result_a_picture():
@@ -337,7 +421,9 @@ def test_every_call_has_the_door_and_every_result_a_picture():
 
     for name in (name for name, module in PUBLIC.items() if ".api." in module):
         with pytest.raises(
-            UserError, match=rf"^{name}\(\) has no argument 'nonsense'|is no setting|nothing to|missing a required"
+            UserError,
+            match=rf"^{name}\(\) has no argument 'nonsense'|is no setting|nothing to|missing a"
+            r" required",
         ):
             getattr(tractexp, name)(nonsense=1)
     assert len(result_kinds()) == 15

@@ -1,4 +1,6 @@
-"""Whatever unit of power a record is in, it is fitted on the base of its load and told on that of its file."""
+"""Whatever unit of power a record is in, it is fitted on the base of its load and told on that of
+its file.
+"""
 
 import dataclasses
 import json
@@ -20,13 +22,20 @@ from tractexp.record.own_base import convert_base
 from tractexp.tracking.model import Predictor
 
 QUICK = {"name": "multistart_least_squares", "starts": 2}
-ASKED = {"model": "third_order_exponential", "optimizer": QUICK, "check_intervals": False, "progress": False}
+ASKED = {
+    "model": "third_order_exponential",
+    "optimizer": QUICK,
+    "check_intervals": False,
+    "progress": False,
+}
 EXPONENTS = {"X_prime": -1, "M": 1, "T_m": 1}
 SYSTEM = 100.0  # MVA
 
 
 def scaled(record, k, **base):
-    """The record on a base of a k-th of the power, of which nobody says what it is, or whose MVA are given."""
+    """The record on a base of a k-th of the power, of which nobody says what it is, or whose MVA
+    are given.
+    """
     base = dataclasses.replace(record.base, **base)
     return dataclasses.replace(record, P=k * record.P, Q=k * record.Q, base=base)
 
@@ -43,11 +52,15 @@ def close(one, other, rel):
 
 @pytest.fixture(scope="module")
 def records():
-    """Two dips of one load that draws S = 1.17 pu before them, the second of less load; noise of 0.1 %."""
+    """Two dips of one load that draws S = 1.17 pu before them, the second of less load; noise of
+    0.1 %.
+    """
     load, noise, made = tractexp.compose(), np.random.default_rng(3), []
     for depth, share in ((0.4, 1.0), (0.5, 0.8)):
         values = MOTOR | {"T_m": share * MOTOR["T_m"]}
-        run = tractexp.simulate(load, values, depth=depth, rate=200, length=2, P0=share, Q0=0.6 * share)
+        run = tractexp.simulate(
+            load, values, depth=depth, rate=200, length=2, P0=share, Q0=0.6 * share
+        )
         P, Q = (power + 1e-3 * noise.standard_normal(len(power)) for power in (run.P, run.Q))
         made.append(tractexp.read(t=run.t, U=run.U, P=P, Q=Q, name=f"dip{len(made) + 1}")[0].record)
     return made
@@ -55,9 +68,12 @@ def records():
 
 @pytest.fixture(scope="module")
 def fits(records):
-    """Identified with the file on three bases, in per unit of the load's P, of a system, and of something large."""
+    """Identified with the file on three bases, in per unit of the load's P, of a system, and of
+    something large.
+    """
     return {
-        k: tractexp.identify(scaled(records[0], k), validate=scaled(records[1], k), **ASKED) for k in (1.0, 5.04, 0.02)
+        k: tractexp.identify(scaled(records[0], k), validate=scaled(records[1], k), **ASKED)
+        for k in (1.0, 5.04, 0.02)
     }
 
 
@@ -77,9 +93,13 @@ def test_a_base_that_was_the_steady_state_of_the_load_is_its_own(records, tmp_pa
     loud = detect(scaled(records[0], 0.4, power=20.0, origin="load"))
     assert on_own_base([loud])[0] is loud
     given = detect(scaled(records[0], 0.4, power=20.0))
-    assert on_own_base([given])[0].record.base.power == pytest.approx(20 * np.hypot(given.P0, given.Q0), rel=1e-12)
+    assert on_own_base([given])[0].record.base.power == pytest.approx(
+        20 * np.hypot(given.P0, given.Q0), rel=1e-12
+    )
     path = tmp_path / "megawatts.csv"
-    rows = np.column_stack([records[0].t, 27.5 * records[0].U, 12 * records[0].P, 12 * records[0].Q])
+    rows = np.column_stack(
+        [records[0].t, 27.5 * records[0].U, 12 * records[0].P, 12 * records[0].Q]
+    )
     np.savetxt(path, rows, delimiter=",", header="t [s],U [kV],P [MW],Q [Mvar]", comments="")
     read = tractexp.read(path)[0]
     assert read.record.base.origin == "load"
@@ -97,8 +117,10 @@ def test_all_events_of_a_call_are_put_on_one_base(records):
     assert pytest.approx(second.P0 / S, rel=1e-12) == other.P0
     assert (one.record.original_base, one.record.base.power) == (Base(), S)
     assert other.record.notes[-1] == (
-        f"put on a base of {S:.4g} pu of the file, the apparent power before the first dip that is fitted: on the"
-        f" file's base powers, torque and inertia are {S:.5g} times, impedances {1 / S:.5g} times the values on this"
+        f"put on a base of {S:.4g} pu of the file, the apparent power before the first dip that is"
+        " fitted: on the"
+        f" file's base powers, torque and inertia are {S:.5g} times, impedances {1 / S:.5g} times"
+        " the values on this"
         " base"
     )
     again = on_own_base([other, one])  # an event that was put on a base stays on it
@@ -115,7 +137,10 @@ def test_records_of_other_megavolt_amperes_are_put_on_that_of_the_first(records)
     assert "on the file's base (100 MVA)" in one.record.notes[-1]
     unknown = detect(dataclasses.replace(scaled(records[1], 5.0), source="b.csv"))
     for pair in ([first, unknown], [unknown, first]):
-        with pytest.raises(UserError, match=r"b\.csv does not say how many MVA .* per unit of 100 MVA.*say it of both"):
+        with pytest.raises(
+            UserError,
+            match=r"b\.csv does not say how many MVA .* per unit of 100 MVA.*say it of both",
+        ):
             on_own_base(pair)
 
 
@@ -134,7 +159,9 @@ def test_the_unit_of_the_file_does_not_move_the_estimate(fits):
         own = result.base.ratio / k  # of the first base
         close(result.parameters, on_base(plain.parameters, 1 / own), 1e-5)
         assert result.epsilon_q == pytest.approx(plain.epsilon_q, rel=1e-5)
-        assert result.events[1]["epsilon_p"] == pytest.approx(plain.events[1]["epsilon_p"], rel=1e-5)
+        assert result.events[1]["epsilon_p"] == pytest.approx(
+            plain.events[1]["epsilon_p"], rel=1e-5
+        )
         assert not result.at_bound
     assert fits[1.0].result.parameters_on_given_base == {}
     assert fits[5.04].result.base.ratio == pytest.approx(5.04 * np.hypot(1, 0.6), rel=1e-3)
@@ -143,7 +170,11 @@ def test_the_unit_of_the_file_does_not_move_the_estimate(fits):
 def test_values_are_told_on_the_base_of_the_file(fits):
     fit, plain = fits[5.04], fits[1.0].result
     close(fit.result.parameters_on_given_base, on_base(plain.parameters, 5.04), 1e-5)
-    close({n: e.value for n, e in fit.on_given_base.items()}, fit.result.parameters_on_given_base, 1e-12)
+    close(
+        {n: e.value for n, e in fit.on_given_base.items()},
+        fit.result.parameters_on_given_base,
+        1e-12,
+    )
     inertia, own = fit.on_given_base["M"], fit.parameters["M"]
     ratio = fit.result.base.ratio
     assert inertia.bounds == pytest.approx([ratio * bound for bound in own.bounds])
@@ -157,12 +188,22 @@ def test_values_are_told_on_the_base_of_the_file(fits):
 
 
 def test_the_result_says_what_one_per_unit_is(records):
-    event = dataclasses.replace(scaled(records[0], 5.0, power=SYSTEM, voltage=230.0), source="north.csv")
+    event = dataclasses.replace(
+        scaled(records[0], 5.0, power=SYSTEM, voltage=230.0), source="north.csv"
+    )
     (told,) = tractexp.identify(event, **ASKED, budget=200).result.records
     assert told["source"] == {"file": "north.csv"}
-    assert told["given_base"] == {"voltage_kV": 230.0, "power_MVA": 100.0, "frequency_Hz": 50.0, "origin": "given"}
+    assert told["given_base"] == {
+        "voltage_kV": 230.0,
+        "power_MVA": 100.0,
+        "frequency_Hz": 50.0,
+        "origin": "given",
+    }
     S = np.hypot(1, 0.6)
-    assert told["base"] == told["given_base"] | {"power_MVA": pytest.approx(500 * S, rel=1e-3), "origin": "load"}
+    assert told["base"] == told["given_base"] | {
+        "power_MVA": pytest.approx(500 * S, rel=1e-3),
+        "origin": "load",
+    }
     (unknown,) = tractexp.identify(records[0], **ASKED, budget=200).result.records
     assert unknown["base"]["power_MVA"] is unknown["base"]["voltage_kV"] is None
     assert "given_base" not in unknown
@@ -176,9 +217,12 @@ def test_bounds_mean_the_own_base(records):
     assert fit.result.parameters["M"] == 0.005
     assert fit.result.parameters_on_given_base["M"] == pytest.approx(0.005 * fit.result.base.ratio)
     with pytest.raises(
-        UserError, match=r"could be simulated: .*bounds .*which are meant on the record's own base of 5\.8"
+        UserError,
+        match=r"could be simulated: .*bounds .*which are meant on the record's own base of 5\.8",
     ):
-        tractexp.identify(record, bounds={"T_m": [2.5, 3.0]}, fixed={"X_prime": 1.4}, **ASKED, budget=50)
+        tractexp.identify(
+            record, bounds={"T_m": [2.5, 3.0]}, fixed={"X_prime": 1.4}, **ASKED, budget=50
+        )
 
 
 def test_units_of_the_user_in_and_out(records, fits):
@@ -187,7 +231,8 @@ def test_units_of_the_user_in_and_out(records, fits):
     assert np.allclose(answer.measured[0], held.P, rtol=1e-12)
     assert np.allclose(answer.P, 5.04 * plain.predict(records[1]).P, rtol=1e-4)
     assert answer.notes == held.notes
-    from_own = fit.predict(fit.setup.validate[0])  # put on the own base already, and told on that of its file
+    # put on the own base already, and told on that of its file
+    from_own = fit.predict(fit.setup.validate[0])
     assert np.allclose(from_own.P, answer.P, rtol=1e-12)
     t, U = held.t, held.U
     by_hand = fit.predict(t=t, U=U, P0=4.0, Q0=2.4)
@@ -206,7 +251,9 @@ def test_units_of_the_user_in_and_out(records, fits):
 
 def test_a_model_without_an_identification_is_played_in_the_units_of_its_values(records, fits):
     fit, held = fits[5.04], scaled(records[1], 5.04)
-    played = tractexp.simulate("third_order_exponential", fit.result.parameters_on_given_base, records=held)
+    played = tractexp.simulate(
+        "third_order_exponential", fit.result.parameters_on_given_base, records=held
+    )
     assert np.allclose(played.P, fit.predict(held).P, rtol=1e-6)
 
 
@@ -238,7 +285,9 @@ def test_what_is_saved_comes_back_on_its_bases(fits, records, tmp_path):
 def test_a_plan_takes_the_values_of_an_identification_in_its_base(records, fits, tmp_path):
     fit, heavier = fits[5.04], scaled(records[1], 5.04)
     path = fit.result.write(tmp_path / "result.json")
-    given, read = (tractexp.plan(heavier, parameter="M", values=values) for values in (fit, str(path)))
+    given, read = (
+        tractexp.plan(heavier, parameter="M", values=values) for values in (fit, str(path))
+    )
     assert given.content["parameters"] == read.content["parameters"]
     close(given.content["parameters"], on_base(fit.result.parameters, 1 / 0.8), 5e-3)
 
@@ -255,11 +304,17 @@ def test_waveforms_are_rebased_with_their_record(tmp_path):
 @pytest.mark.parametrize("form", ["andes", "psse_dyr", "modelica"])
 def test_an_export_is_on_either_base(fits, form):
     fit, ratio = fits[5.04], fits[5.04].result.base.ratio
-    own, file = (tractexp.export(fit, form, base=base, power=SYSTEM, voltage=230) for base in ("own", "file"))
+    own, file = (
+        tractexp.export(fit, form, base=base, power=SYSTEM, voltage=230) for base in ("own", "file")
+    )
     assert f"per unit of {SYSTEM * ratio:.6g} MVA and 230 kV, the record's own base" in own.notes
     assert "per unit of 100 MVA and 230 kV, the base of the record's file" in file.notes
     for made, mva in ((own, SYSTEM * ratio), (file, SYSTEM)):
-        texts = {"andes": f'"Sn": {mva!r}', "psse_dyr": f"{mva:.8g}", "modelica": f"per unit of {mva:.6g} MVA"}
+        texts = {
+            "andes": f'"Sn": {mva!r}',
+            "psse_dyr": f"{mva:.8g}",
+            "modelica": f"per unit of {mva:.6g} MVA",
+        }
         assert texts[form] in made.text
     if form == "andes":
         (one,), (other,) = (json.loads(made.text)["Motor3"] for made in (own, file))
@@ -270,9 +325,13 @@ def test_an_export_is_on_either_base(fits, form):
 
 
 def test_an_export_says_which_base_it_takes(records, fits):
-    known = tractexp.identify(scaled(records[0], 5.0, power=SYSTEM, voltage=230.0), **ASKED, budget=200)
+    known = tractexp.identify(
+        scaled(records[0], 5.0, power=SYSTEM, voltage=230.0), **ASKED, budget=200
+    )
     assert "per unit of 230 kV and 583.111 MVA" in tractexp.export(known, "andes").notes[0]
-    assert json.loads(tractexp.export(known, "andes", base="file").text)["Motor3"][0]["Sn"] == SYSTEM
+    assert (
+        json.loads(tractexp.export(known, "andes", base="file").text)["Motor3"][0]["Sn"] == SYSTEM
+    )
     assert json.loads(tractexp.export(known, "andes").text)["Bus"][0]["Vn"] == 230.0
     guessed = "1 pu of the file is taken for 100 MVA, for no power is given"
     assert any(guessed in note for note in tractexp.export(fits[5.04], "andes").notes)
@@ -285,7 +344,10 @@ def test_the_command_line_tells_both_bases(records, tmp_path):
     record = scaled(records[0], 5.04)
     rows = np.column_stack([getattr(record, name) for name in "tUPQ"])
     np.savetxt(tmp_path / "north.csv", rows, delimiter=",", header="t,U,P,Q", comments="")
-    units, base = "data.units={U: pu, P: pu, Q: pu}", ["data.base_power=100", "data.base_voltage=230"]
+    units, base = (
+        "data.units={U: pu, P: pu, Q: pu}",
+        ["data.base_power=100", "data.base_voltage=230"],
+    )
     run = [
         "data=csv",
         "data.train=[north.csv]",
@@ -294,13 +356,19 @@ def test_the_command_line_tells_both_bases(records, tmp_path):
         "optimizer=multistart_least_squares",
         "optimizer.starts=2",
     ]
-    done = command(tmp_path, *run, "tracking.enabled=false", "task.figures=false", "hydra.run.dir=run")
+    done = command(
+        tmp_path, *run, "tracking.enabled=false", "task.figures=false", "hydra.run.dir=run"
+    )
     assert "on the file's base (100 MVA): X_prime = " in done
     told = json.loads((tmp_path / "run" / "result.json").read_text(encoding="utf-8"))
     assert told["records"][0]["given_base"]["power_MVA"] == 100
     assert told["parameters_on_given_base"]["T_m"] == pytest.approx(5.04 * 0.55, rel=0.05)
     exported = command(
-        tmp_path, "task=export", "task.parameters=run/result.json", "task.base=file", "hydra.run.dir=out"
+        tmp_path,
+        "task=export",
+        "task.parameters=run/result.json",
+        "task.base=file",
+        "hydra.run.dir=out",
     )
     assert "note: per unit of 100 MVA and 230 kV, the base of the record's file" in exported
 
@@ -320,14 +388,22 @@ def andes():
 
 
 def test_a_load_in_per_unit_of_a_system_is_found_as_in_its_own(andes):
-    """P0 = 5.05 pu of 100 MVA: within bounds that mean P0 = 1, the torque rested on its bound of 1."""
+    """P0 = 5.05 pu of 100 MVA: within bounds that mean P0 = 1, the torque rested on
+    its bound of 1.
+    """
     fitted, held = andes
     system = tractexp.identify(fitted, validate=held, **ASKED).result
-    own = tractexp.identify(scaled(fitted, 1 / 5.04), validate=scaled(held, 1 / 5.04), **ASKED).result
+    own = tractexp.identify(
+        scaled(fitted, 1 / 5.04), validate=scaled(held, 1 / 5.04), **ASKED
+    ).result
     assert own.base.ratio == 1
     assert system.base.ratio == pytest.approx(5.264, rel=1e-3)
     assert "T_m" not in system.at_bound
-    close(system.search["parameters"], on_base(own.search["parameters"], 5.04 / system.base.ratio), 1e-6)
+    close(
+        system.search["parameters"],
+        on_base(own.search["parameters"], 5.04 / system.base.ratio),
+        1e-6,
+    )
     close(system.parameters, on_base(own.parameters, 5.04 / system.base.ratio), 1e-5)
     close(system.parameters_on_given_base, on_base(own.parameters, 5.04), 1e-5)
     assert system.events[1]["epsilon_q"] == pytest.approx(own.events[1]["epsilon_q"], rel=1e-4)

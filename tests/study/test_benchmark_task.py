@@ -1,4 +1,6 @@
-"""The benchmark on BBOB: ioh's own values and counts, known optima, running times worked out by hand, refusals."""
+"""The benchmark on BBOB: ioh's own values and counts, known optima, running times worked out by
+hand, refusals.
+"""
 
 import base64
 import json
@@ -16,7 +18,16 @@ from tractexp.plugin import build
 from tractexp.studies.api.benchmark import BenchmarkResult
 from tractexp.studies.bbob import page as report
 from tractexp.studies.bbob import runs as bbob
-from tractexp.studies.bbob.runs import GROUPS, Bbob, BbobPlan, BbobRun, BbobRuns, perform, run, seed_of
+from tractexp.studies.bbob.runs import (
+    GROUPS,
+    Bbob,
+    BbobPlan,
+    BbobRun,
+    BbobRuns,
+    perform,
+    run,
+    seed_of,
+)
 
 TARGETS = tuple(10.0**k for k in range(2, -9, -1))
 SMALL = BbobPlan((1,), (2,), (1,), 500, TARGETS, 0)
@@ -58,14 +69,19 @@ def test_evaluations_are_those_that_ioh_counts(ioh, name):
     problem = Bbob(8, 3, 1, TARGETS)
     found = search(problem, optimizer(name), 0, Limits(simulations=777))
     assert problem.problem.state.evaluations == problem.evaluations == found.simulations == 777
-    assert problem.best == problem.problem.state.current_best_internal.y + problem.optimum == found.objective
+    assert (
+        problem.best
+        == problem.problem.state.current_best_internal.y + problem.optimum
+        == found.objective
+    )
 
 
 def test_a_target_is_met_at_the_evaluation_that_met_it_not_at_the_end_of_its_batch(ioh):
     problem = Bbob(1, 2, 1, (10.0, 1.0, 0.01, 1e-8))
     best = np.array(problem.problem.optimum.x)
     east = np.array([1.0, 0.0])
-    far, near, nearer = best + 4 * east, best + 0.9 * east, best + 0.05 * east  # the sphere: 16, 0.81, 0.0025 above it
+    # the sphere: 16, 0.81, 0.0025 above it
+    far, near, nearer = best + 4 * east, best + 0.9 * east, best + 0.05 * east
     problem.objective(np.array([far, far]))
     assert np.isinf(problem.hits).all()
     problem.objective(np.array([far, near, far, nearer, near]))
@@ -78,7 +94,8 @@ def test_a_target_is_met_at_the_evaluation_that_met_it_not_at_the_end_of_its_bat
 def test_cmaes_reaches_the_known_optimum_of_the_sphere(ioh, cma):
     done = run("cmaes", optimizer("cmaes"), (1, 2, 1), SMALL)
     assert 0 <= done.distance <= 1e-8
-    assert done.evaluations - 6 < done.hits[-1] <= done.evaluations < 1000  # within its last population of 6
+    # within its last population of 6
+    assert done.evaluations - 6 < done.hits[-1] <= done.evaluations < 1000
     assert list(done.hits) == sorted(done.hits)
 
 
@@ -107,15 +124,21 @@ def test_runs_are_the_same_on_any_number_of_processes_and_differ_by_seed(ioh):
 
 @pytest.fixture
 def by_hand():
-    """Two optimizers on two functions and two instances, budget 100; `a` solves f1 always and f16 once."""
+    """Two optimizers on two functions and two instances, budget 100; `a` solves f1 always and f16
+    once.
+    """
     inf = float("inf")
     plan = BbobPlan((1, 16), (2,), (1, 2), 50, (1.0, 1e-8), 0)
     rows = [
-        ("a", 1, 1, 30, (10.0, 30.0)), ("a", 1, 2, 50, (20.0, 50.0)),
-        ("a", 16, 1, 80, (40.0, 80.0)), ("a", 16, 2, 100, (90.0, inf)),
-        ("b", 1, 1, 100, (60.0, inf)), ("b", 1, 2, 100, (inf, inf)),
-        ("b", 16, 1, 100, (inf, inf)), ("b", 16, 2, 100, (inf, inf)),
-    ]  # fmt: skip
+        ("a", 1, 1, 30, (10.0, 30.0)),
+        ("a", 1, 2, 50, (20.0, 50.0)),
+        ("a", 16, 1, 80, (40.0, 80.0)),
+        ("a", 16, 2, 100, (90.0, inf)),
+        ("b", 1, 1, 100, (60.0, inf)),
+        ("b", 1, 2, 100, (inf, inf)),
+        ("b", 16, 1, 100, (inf, inf)),
+        ("b", 16, 2, 100, (inf, inf)),
+    ]
     runs = [BbobRun(name, f, 2, i, spent, 1, 0.5, hits) for name, f, i, spent, hits in rows]
     return BbobRuns(plan, ("a", "b"), {1: "Sphere", 16: "Weierstrass"}, runs)
 
@@ -137,22 +160,31 @@ def test_page_and_json_hold_the_numbers_and_load_nothing_from_elsewhere(by_hand,
     path = result.report().save(tmp_path / "benchmark.html")
     page = read(path)
     assert "Take a in dimension 2: it met most targets, 88% against 12% of b." in page.words
-    assert path.read_text().count('class="chart"') == 3  # over all functions, and over each of two groups
+    # over all functions, and over each of two groups
+    assert path.read_text().count('class="chart"') == 3
     for part in ("180 (1/2)", "160 (1/2)", "–", "88%", "12%", "f16 Weierstrass", "1 of 2"):
         assert part in page.words, part
     content = json.loads(result.write_results(tmp_path)[0].read_text())
-    assert content["running_times"][1] == {"optimizer": "a", "dimension": 2, "function": 16, "ert": [65.0, 180.0]}
+    assert content["running_times"][1] == {
+        "optimizer": "a",
+        "dimension": 2,
+        "function": 16,
+        "ert": [65.0, 180.0],
+    }
     assert content["running_times"][3]["ert"] == [None, None]
     assert content["runs"][3]["hits"] == [90.0, None]
     assert content["sentences"] == [
-        "On BBOB in dimension 2, 2 runs of 100 evaluations on each function, a met 88% of the targets and solved 1"
+        "On BBOB in dimension 2, 2 runs of 100 evaluations on each function, a met 88% of the"
+        " targets and solved 1"
         " of 2 functions; b met 12% of the targets and solved 0 of 2 functions."
     ]
 
 
 def test_curves_are_drawn_where_no_target_was_met_at_all(tmp_path):
     plan = BbobPlan((1,), (2,), (1,), 50, (1e-8,), 0)
-    nothing = BbobRuns(plan, ("a",), {1: "Sphere"}, [BbobRun("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))])
+    nothing = BbobRuns(
+        plan, ("a",), {1: "Sphere"}, [BbobRun("a", 1, 2, 1, 100, 1, 3.0, (float("inf"),))]
+    )
     ((whole, each),) = report.charts(nothing, 2).values()
     (curve,) = whole.plain()["data"]
     assert (np.frombuffer(base64.b64decode(curve["y"]["bdata"]), "<f4") == 0).all()
@@ -160,7 +192,10 @@ def test_curves_are_drawn_where_no_target_was_met_at_all(tmp_path):
 
 
 def test_the_answer_tells_where_another_was_better(by_hand):
-    runs = [replace(r, hits=(5.0, 6.0)) if (r.optimizer, r.function) == ("b", 16) else r for r in by_hand.runs]
+    runs = [
+        replace(r, hits=(5.0, 6.0)) if (r.optimizer, r.function) == ("b", 16) else r
+        for r in by_hand.runs
+    ]
     told = report.answer(replace(by_hand, runs=runs), 2)
     assert told == (
         "Take a in dimension 2: it met most targets, 88% against 62% of b."
@@ -170,7 +205,9 @@ def test_the_answer_tells_where_another_was_better(by_hand):
 
 def test_the_package_absent_is_told_with_its_pip_line(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "ioh", None)  # what makes an import fail
-    with pytest.raises(UserError, match=r"'ioh', which is not installed: pip install 'tractexp\[benchmark\]'"):
+    with pytest.raises(
+        UserError, match=r"'ioh', which is not installed: pip install 'tractexp\[benchmark\]'"
+    ):
         Bbob(1, 2, 1, TARGETS)
 
 
@@ -189,7 +226,10 @@ def test_an_optimizer_that_never_evaluates_is_refused_not_waited_for(ioh, monkey
 @pytest.mark.parametrize(
     ("settings", "sentence"),
     [
-        ({"functions": [1, 25]}, "task.functions=25 is out of range: it must be at least 1 and at most 24"),
+        (
+            {"functions": [1, 25]},
+            "task.functions=25 is out of range: it must be at least 1 and at most 24",
+        ),
         ({"functions": []}, "task.functions is empty"),
         ({"functions": [3, 3]}, "task.functions names 3 twice"),
         ({"instances": [0]}, "task.instances=0 is out of range"),
@@ -205,20 +245,39 @@ def test_a_setting_out_of_range_is_refused_in_one_sentence(settings, sentence):
         build("task", {"name": "benchmark", **settings})
 
 
-TINY = ("task=benchmark", "task.functions=[1,15]", "task.dimensions=[2]", "task.instances=[1]", "task.multiplier=50",
-        "task.cores=1", "tracking.enabled=false", "hydra.run.dir=run")  # fmt: skip
+TINY = (
+    "task=benchmark",
+    "task.functions=[1,15]",
+    "task.dimensions=[2]",
+    "task.instances=[1]",
+    "task.multiplier=50",
+    "task.cores=1",
+    "tracking.enabled=false",
+    "hydra.run.dir=run",
+)
 
 
 def test_the_task_runs_from_the_command_line(ioh, tmp_path):
     done = run_command(*TINY, "optimizer=issa_no_levy", "task.against=[pso]", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for part in ("issa_no_levy", "pso", " f1 ", " f15 ", "of 2", "benchmark.html", "benchmark.json"):
+    for part in (
+        "issa_no_levy",
+        "pso",
+        " f1 ",
+        " f15 ",
+        "of 2",
+        "benchmark.html",
+        "benchmark.json",
+    ):
         assert part in done.stdout, part
     content = json.loads((tmp_path / "run" / "benchmark.json").read_text())
     assert content["optimizers"]["issa_no_levy"]["levy"] is False
     assert [(r["optimizer"], r["function"], r["evaluations"]) for r in content["runs"]] == [
-        ("issa_no_levy", 1, 100), ("issa_no_levy", 15, 100), ("pso", 1, 100), ("pso", 15, 100),
-    ]  # fmt: skip
+        ("issa_no_levy", 1, 100),
+        ("issa_no_levy", 15, 100),
+        ("pso", 1, 100),
+        ("pso", 15, 100),
+    ]
     assert "to see it" not in done.stdout
 
 
@@ -241,8 +300,13 @@ def test_ours_against_the_same_with_other_settings_has_a_name_of_its_own(ioh):
 
     task = build("task", {"name": "benchmark", "against": ["pso"]})
     config = {"optimizer": {"name": "pso", "population": 20}}
-    assert list(task.optimizers(Job(config, {"optimizer": "pso"}, None))) == ["pso", "pso by default"]
-    assert list(task.optimizers(Job({"optimizer": {"name": "pso"}}, {"optimizer": "pso"}, None))) == ["pso"]
+    assert list(task.optimizers(Job(config, {"optimizer": "pso"}, None))) == [
+        "pso",
+        "pso by default",
+    ]
+    assert list(
+        task.optimizers(Job({"optimizer": {"name": "pso"}}, {"optimizer": "pso"}, None))
+    ) == ["pso"]
 
 
 def test_a_function_has_the_name_that_ioh_gives_it(ioh):

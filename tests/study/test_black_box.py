@@ -31,9 +31,13 @@ def test_its_error_is_told_of_the_dip_fitted_and_of_the_one_held_out(fit):
 
 def test_it_is_the_yardstick_of_an_identification_of_the_same_dips(fit, dips):
     other = tractexp.identify(
-        dips[0], validate=dips[1], optimizer="multistart_least_squares", budget=300, check_intervals=False,
+        dips[0],
+        validate=dips[1],
+        optimizer="multistart_least_squares",
+        budget=300,
+        check_intervals=False,
         progress=False,
-    )  # fmt: skip
+    )
     beside = other.result.linear_network
     assert beside["poles"] == fit.poles
     assert beside["model_error"] == fit.content["model_error"]
@@ -97,15 +101,22 @@ def test_more_poles_than_the_samples_tell_are_refused():
     t = np.arange(130) / 200
     U = np.where((t >= 0.5) & (t < 0.56), 0.7, 1.0)
     (dip,) = tractexp.read(t=t, U=U, P=U**1.5, Q=0.4 * U**2, name="short")
-    with pytest.raises(UserError, match=r"^poles=4: the samples from the dips on are enough for [12]; ask for fewer"):
+    with pytest.raises(
+        UserError,
+        match=r"^poles=4: the samples from the dips on are enough for [12]; ask for fewer",
+    ):
         tractexp.linear_network(dip, poles=4, progress=False)
 
 
 def test_the_command_writes_its_result_and_its_page(tmp_path):
     done = run_command(
-        "task=linear_network", "data=tibet_50pct", "task.poles=2", "tracking.enabled=false", "hydra.run.dir=run",
+        "task=linear_network",
+        "data=tibet_50pct",
+        "task.poles=2",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
         cwd=tmp_path,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "run" / "linear_network.json").read_text(encoding="utf-8"))
     assert len(content["poles"]) == 2
@@ -116,6 +127,9 @@ def test_the_command_writes_its_result_and_its_page(tmp_path):
 def test_as_a_model_it_is_refused_with_the_task_that_fits_it(tmp_path):
     done = run_command("model=linear_network", cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "tractexp: model=linear_network: there is no such choice, but there is task=linear_network\n"
+    assert (
+        done.stderr == "tractexp: model=linear_network: there is no such choice, but there is"
+        " task=linear_network\n"
+    )
     with pytest.raises(UserError, match="but there is task=linear_network"):
         tractexp.identify("tibet_50pct", model="linear_network")

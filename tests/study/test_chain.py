@@ -1,7 +1,8 @@
-"""Each command that is printed leads on: what a task hands on is whole, and the chain of commands ends.
+"""Each command that is printed leads on: what a task hands on is whole, and the chain of commands
+ends.
 
-The commands are read from the console as a person reads them there, and run. Where the next task fits the model that
-the last one ended with, it gives the same grade.
+The commands are read from the console as a person reads them there, and run. Where the next task
+fits the model that the last one ended with, it gives the same grade.
 """
 
 import json
@@ -20,7 +21,8 @@ EXTENDED, AS_BASE = "use the extended model", "use it as the base model"
 
 @dataclass
 class Step:
-    """A command that was run: what printed it, its grade and verdict ("" for none), and what it prints to go on.
+    """A command that was run: what printed it, its grade and verdict ("" for none), and what it
+    prints to go on.
 
     An investigation grades its base model, too.
     """
@@ -44,7 +46,9 @@ class Step:
 
 
 def printed_commands(output: str) -> list[tuple[str, tuple[str, ...]]]:
-    """What the console advises: (what the command does, its words), split as a shell splits them."""
+    """What the console advises: (what the command does, its words), split as a shell
+    splits them.
+    """
     commands = []
     for line in output.splitlines():
         if ADVICE.match(line):
@@ -67,10 +71,13 @@ def run_step(step: Step, folder: Path) -> None:
     done = run_command(*step.command, *quiet, cwd=folder)
     assert done.returncode == 0, f"{step.command}: {done.stderr}"
     step.next = printed_commands(done.stdout)
-    assert not [line for line in done.stdout.splitlines() if ADVICE.match(line) and "docs/" in line]  # no wheel has it
+    # no wheel has it
+    assert not [line for line in done.stdout.splitlines() if ADVICE.match(line) and "docs/" in line]
     for run in {*folder.glob("outputs/runs/*")} - before:
         if (run / "result.json").is_file():
-            step.grade = json.loads((run / "result.json").read_text(encoding="utf-8"))["adequacy"]["grade"]
+            step.grade = json.loads((run / "result.json").read_text(encoding="utf-8"))["adequacy"][
+                "grade"
+            ]
         if (run / "discrepancy.json").is_file():
             content = json.loads((run / "discrepancy.json").read_text(encoding="utf-8"))
             step.verdict, step.base_grade = content["verdict"], content["base_adequacy"]["grade"]
@@ -84,7 +91,10 @@ def follow(command: str, folder: Path) -> list[Step]:
         assert step.depth <= LONGEST, " -> ".join(shlex.join(one.command) for one in step.line)
         run_step(step, folder)
         steps.append(step)
-        print(f"{'  ' * step.depth}{step.said}tractexp {shlex.join(step.command)}: {step.verdict} {step.grade}")
+        print(
+            f"{'  ' * step.depth}{step.said}tractexp {shlex.join(step.command)}: {step.verdict}"
+            f" {step.grade}"
+        )
         known = {one.command for one in (*steps, *waiting)}
         for said, words in step.next:
             assert words not in {one.command for one in step.line}, f"a circle: {shlex.join(words)}"
@@ -111,7 +121,8 @@ def leads_elsewhere(words: tuple[str, ...]) -> bool:
 
 def test_commands_are_read_as_a_shell_reads_them():
     told = (
-        "next: find what is missing: tractexp a 'b=c; d'; or choose another model: tractexp list model\nsays tractexp"
+        "next: find what is missing: tractexp a 'b=c; d'; or choose another model: tractexp list"
+        " model\nsays tractexp"
     )
     assert printed_commands(told) == [
         ("next: find what is missing: ", ("a", "b=c; d")),
@@ -122,7 +133,8 @@ def test_commands_are_read_as_a_shell_reads_them():
 @pytest.mark.parametrize(
     "command",
     [
-        "tractexp task=discrepancy data=contactors 'task.effects=[undervoltage_trip,stator_resistance]'",
+        "tractexp task=discrepancy data=contactors"
+        " 'task.effects=[undervoltage_trip,stator_resistance]'",
         "tractexp task=discrepancy data=tibet 'task.effects=[stator_transients]'",
     ],
     ids=["contactors", "tibet"],
@@ -151,7 +163,8 @@ def test_the_chain_of_another_simulator_ends(shared_data, tmp_path):
         pytest.skip("needs ../shared/cases/andes")
     files = {name: cases / f"dip_{name}.csv" for name in "abc"}
     command = (
-        f"tractexp task=discrepancy data=csv 'data.train=[{files['a']},{files['b']}]' 'data.validate=[{files['c']}]'"
+        f"tractexp task=discrepancy data=csv 'data.train=[{files['a']},{files['b']}]'"
+        f" 'data.validate=[{files['c']}]'"
         " data.frequency=60"
     )
     check_grades(follow(command, tmp_path))

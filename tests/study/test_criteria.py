@@ -1,4 +1,6 @@
-"""Every decision threshold decides: each has a case that its default settles one way and a looser one the other."""
+"""Every decision threshold decides: each has a case that its default settles one way and a looser
+one the other.
+"""
 
 import dataclasses
 from types import SimpleNamespace
@@ -38,7 +40,8 @@ from tractexp.plugin import get
 
 
 def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
-    """The tests at a fit with these names: p of the best further effect, of a fault of the measurement, of the rest.
+    """The tests at a fit with these names: p of the best further effect, of a fault of the
+    measurement, of the rest.
 
     Chance gives every p from 0.001 to 1 with the same probability.
     """
@@ -48,7 +51,8 @@ def at_fit(c, p, names=(), fault_p=1.0, blur=0.0, left=1.0):
         tangent=SimpleNamespace(context=SimpleNamespace(criteria=c)),
         projection=SimpleNamespace(fault_p=lambda: {"time_skew": np.array([fault_p])}),
         chance=SimpleNamespace(
-            critical_p=Chance(np.arange(1, 1001) / 1000, {}).critical_p, surprises=lambda *_: {"a test": left}
+            critical_p=Chance(np.arange(1, 1001) / 1000, {}).critical_p,
+            surprises=lambda *_: {"a test": left},
         ),
         scores=[Score("an effect", 10.0, p, {}, {}, {})],
     )
@@ -72,16 +76,23 @@ def measured_gap(c, closed=1.0, gain=100.0, expected=100.0):
 
 
 def test_no_share_is_told_of_a_gap_within_the_error_of_the_noise():
-    """273 came out once, where less was left than noise leaves by that much more than there had been."""
+    """273 came out once, where less was left than noise leaves by that much more than there had
+    been.
+    """
 
     def closed(before, after):
-        curves = (SimpleNamespace(error=SimpleNamespace(square=square)) for square in (before, after))
+        curves = (
+            SimpleNamespace(error=SimpleNamespace(square=square)) for square in (before, after)
+        )
         return GapTest(*curves, 1.0, 1.0, 1.0, 10.8, None).closed
 
     assert closed(4e-4, 1e-4) == pytest.approx(0.75)
     assert closed(4e-4, -4e-5) == pytest.approx(1.1)
     assert closed(4e-4, 8e-4) == pytest.approx(-1.0)
-    assert all(np.isnan(closed(before, after)) for before, after in ((1e-6, -2.7e-4), (0.0, 1e-5), (-1e-6, 1e-6)))
+    assert all(
+        np.isnan(closed(before, after))
+        for before, after in ((1e-6, -2.7e-4), (0.0, 1e-5), (-1e-6, 1e-6))
+    )
 
 
 def deviance(left):
@@ -98,32 +109,50 @@ def word_of(c, row, base_p=0.0):
 
 
 def closes_share(c, closed, kept=1):
-    """Whether an investigation of all events that keeps so many sets closes a share of the model's error."""
+    """Whether an investigation of all events that keeps so many sets closes a share of the model's
+    error.
+    """
     errors = {"before": 1.0, "after": 1.0 - closed}
-    graded = {"base_grade": "before", "final_grade": "after", "context": SimpleNamespace(criteria=c)}
+    graded = {
+        "base_grade": "before",
+        "final_grade": "after",
+        "context": SimpleNamespace(criteria=c),
+    }
     judged = {"judged": lambda which: SimpleNamespace(error=SimpleNamespace(square=errors[which]))}
     verdict = SimpleNamespace(kept=("one",) * kept)
     return Findings.closes_share.fget(SimpleNamespace(verdict=verdict, **graded, **judged))
 
 
 def wandering(seen, seed, rests=(), walk=0.0):
-    """How a load wanders that shows noise and a random walk before its event; None where it is not said to."""
+    """How a load wanders that shows noise and a random walk before its event; None where it is not
+    said to.
+    """
     rng = np.random.default_rng(seed)
-    before = rng.normal(size=(2, 250)) + np.cumsum(rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1)
+    before = rng.normal(size=(2, 250)) + np.cumsum(
+        rng.normal(size=(2, 250)) * np.array([[walk], [0.0]]), axis=1
+    )
     return find([before], 0.002, steady(1000), rests, seen=seen)
 
 
 def wandering_within(seen):
-    """The same with what is left of the event, which shows a little more than the stretch before it."""
+    """The same with what is left of the event, which shows a little more than the stretch before
+    it.
+    """
     rng = np.random.default_rng(24)
-    left = rng.normal(size=(2, 1000)) + np.cumsum(rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1)
+    left = rng.normal(size=(2, 1000)) + np.cumsum(
+        rng.normal(size=(2, 1000)) * np.array([[0.012], [0.0]]), axis=1
+    )
     return wandering(seen, 73, [Rest(left, np.zeros((1, 2, 1000)), np.ones(1000))])
 
 
 def prior_of_skew(prior):
     """How far clocks are believed to be off [s]."""
     skew = candidate(get("effect", "time_skew")())
-    known = {"of_measurement": ("time_skew",), "members": (), "__getitem__": lambda self, name: skew}
+    known = {
+        "of_measurement": ("time_skew",),
+        "members": (),
+        "__getitem__": lambda self, name: skew,
+    }
     catalogue = type("One", (), known)()
     one = np.array([0.0])
     box = Box(one - 0.01, one + 0.01, ("skew",))
@@ -134,13 +163,17 @@ def prior_of_skew(prior):
 def swinging(swing=0.045):
     """Why an effect of the frequency cannot be tested where it swings by so much."""
     record = SimpleNamespace(channels={"f": np.linspace(50.0, 50.0 + swing, 10)})
-    return missing_channel(get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))])
+    return missing_channel(
+        get("effect", "frequency_dependence")(), [SimpleNamespace(record=record, channels=("f",))]
+    )
 
 
 def status():
     """Of an effect that would be seen with a probability of 0.75 at its smallest relevant size."""
     one = candidate(get("effect", "stator_resistance")())
-    score = Score("stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.01 / (1.6449 + 0.6745)}, {})
+    score = Score(
+        "stator_resistance", 0.0, 0.5, {"R_s": 0.0}, {"R_s": 0.01 / (1.6449 + 0.6745)}, {}
+    )
     return assessment(one, score, 0.05)[0]
 
 
@@ -153,7 +186,9 @@ def chosen_dip():
 
 
 def with_a_member(c, **assessment):
-    """An explanation of several effects that is shown, and what held-out events say of one of them."""
+    """An explanation of several effects that is shown, and what held-out events say of
+    one of them.
+    """
     return dataclasses.replace(judged_by(c), without={"one": measured_gap(c, **assessment)})
 
 
@@ -164,7 +199,11 @@ def proposed(c, explained=0.9, p=1e-6, whole=1000.0):
 
 
 def test_what_only_gets_worse_explains_nothing():
-    assert [measured_gap(Criteria(), gain=gain).explained for gain in (-5.0, 0.0, 5.0)] == [0.0, 0.0, 1.0]
+    assert [measured_gap(Criteria(), gain=gain).explained for gain in (-5.0, 0.0, 5.0)] == [
+        0.0,
+        0.0,
+        1.0,
+    ]
 
 
 CASES = {  # criterion: a looser value, the decision, what it is by default
@@ -178,15 +217,27 @@ CASES = {  # criterion: a looser value, the decision, what it is by default
 }
 FURTHER = [  # decisions by a criterion that has one above, too
     ("adequate_p", 0.0006, lambda c: holds(judged_by(c, p_left=0.0008), c), False),
-    ("adequate_p", 0.0006, lambda c: word_of(c, judged_by(c, gain=-99.0), base_p=0.0008), "unexplained"),
+    (
+        "adequate_p",
+        0.0006,
+        lambda c: word_of(c, judged_by(c, gain=-99.0), base_p=0.0008),
+        "unexplained",
+    ),
     ("shown", 9.0, lambda c: word_of(c, with_a_member(c, gain=10.0, expected=11.0)), "candidate"),
     ("ahead", 1.45, lambda c: proposed(c, explained=0.54).stands(c), False),
     ("ahead", 1.45, lambda c: closes_share(c, 0.54), False),
     ("shown", 9.0, lambda c: proposed(c, whole=11.0).stands(c), False),
 ]
-NUMBERS = [  # of one algorithm alone: where it stands, a looser value, what it decides, what that is by default
+# of one algorithm alone: where it stands, a looser value, what it decides, what that is by default
+NUMBERS = [
     (criteria, "NAMING_SHARE", 0.45, lambda: at_fit(Criteria(), 0.021).asks_for_more, False),
-    (disagreement, "BLURRED", 0.7, lambda: at_fit(Criteria(), 1.0, fault_p=1e-9, blur=0.6).faults, ()),
+    (
+        disagreement,
+        "BLURRED",
+        0.7,
+        lambda: at_fit(Criteria(), 1.0, fault_p=1e-9, blur=0.6).faults,
+        (),
+    ),
     (chance, "QUIET_WORTH", 100.0, lambda: is_known(120.0), False),
     (catalogue, "LEAST_SWING", 0.04, lambda: "moves by less than" in swinging(), True),
     (judgement, "TESTABLE", 0.7, status, "not testable"),
@@ -203,7 +254,9 @@ def is_known(worth):
 
 
 @pytest.mark.parametrize(("module", "name", "looser", "decide", "by_default"), NUMBERS)
-def test_a_looser_number_of_an_algorithm_decides_otherwise(monkeypatch, module, name, looser, decide, by_default):
+def test_a_looser_number_of_an_algorithm_decides_otherwise(
+    monkeypatch, module, name, looser, decide, by_default
+):
     assert decide() == by_default
     monkeypatch.setattr(module, name, looser)
     assert decide() != by_default
@@ -229,7 +282,8 @@ def test_every_criterion_has_a_case_and_an_origin():
 
 
 @pytest.mark.parametrize(
-    ("kept", "closed", "told"), [(1, 0.9, True), (2, 0.9, False), (1, 0.5, False), (1, np.nan, False)]
+    ("kept", "closed", "told"),
+    [(1, 0.9, True), (2, 0.9, False), (1, 0.5, False), (1, np.nan, False)],
 )
 def test_what_only_all_events_show_closes_a_share_of_the_error_and_has_no_rival(kept, closed, told):
     """A name closed 7 % of the gap once, because its deviance was beyond a hundred."""
@@ -243,7 +297,8 @@ def test_a_member_of_a_family_pays_as_a_second_name_does():
 
 
 @pytest.mark.parametrize(
-    ("name", "looser", "decide", "by_default"), [*((name, *case) for name, case in CASES.items()), *FURTHER]
+    ("name", "looser", "decide", "by_default"),
+    [*((name, *case) for name, case in CASES.items()), *FURTHER],
 )
 def test_a_looser_criterion_decides_otherwise(name, looser, decide, by_default):
     assert decide(Criteria()) == by_default
@@ -251,14 +306,21 @@ def test_a_looser_criterion_decides_otherwise(name, looser, decide, by_default):
 
 
 def test_a_criterion_that_is_unknown_or_out_of_range_is_refused():
-    with pytest.raises(UserError, match=r"criteria\.adequatep: there is no such criterion; did you mean 'adequate_p'"):
+    with pytest.raises(
+        UserError,
+        match=r"criteria\.adequatep: there is no such criterion; did you mean 'adequate_p'",
+    ):
         Criteria.of({"adequatep": 0.1})
-    with pytest.raises(UserError, match=r"task\.false_alarms=0\.7 is out of range: .* at most 0\.5"):
+    with pytest.raises(
+        UserError, match=r"task\.false_alarms=0\.7 is out of range: .* at most 0\.5"
+    ):
         Criteria(false_alarms=0.7)
 
 
 def test_loose_criteria_name_what_is_not_there():
-    """A step of the load is in no catalogue: by default that is said, by loose criteria something is named for it."""
+    """A step of the load is in no catalogue: by default that is said, by loose criteria something
+    is named for it.
+    """
     made = events("load_step", size=2.0, count=3)[:2]
     assert investigate(base(), made, only=FEW).verdict.word == "unexplained"
     loose = Criteria(adequate_p=0.0, further_name_p=0.5)

@@ -1,4 +1,6 @@
-"""The decision by itself: numbers in, a word out, as docs/missing-effects.md has it for a reader with a pencil."""
+"""The decision by itself: numbers in, a word out, as docs/missing-effects.md has it for a reader
+with a pencil.
+"""
 
 import re
 from dataclasses import replace
@@ -51,7 +53,8 @@ CONFIRMED, MILD, DENIED = held_out(50.0, 55.0), held_out(3.0, 6.0), held_out(-2.
         ([row("a", gap=CONFIRMED), row("b", behind=5.9, gap=MILD)], "tied"),
         ([row("a", gap=CONFIRMED), row("b", behind=6.1, gap=CONFIRMED)], "named"),
         ([row("a", gap=CONFIRMED), row("b", behind=3.0, gap=DENIED)], "named"),
-        ([row("a", p_left=1e-4), row("b", behind=3.0, gap=CONFIRMED)], "unexplained"),  # the best leaves something
+        # the best leaves something
+        ([row("a", p_left=1e-4), row("b", behind=3.0, gap=CONFIRMED)], "unexplained"),
     ],
 )
 def test_a_word_follows_from_the_numbers_of_the_sets(rows, told):
@@ -87,13 +90,24 @@ def test_what_held_out_events_chose_is_named_if_the_fitted_ones_put_it_first_too
 def test_the_page_s_own_numbers_give_the_verdict_that_it_tells():
     """The table of the shipped contactors: a column a set, to be checked by hand."""
     page = (Path(__file__).parents[2] / "docs" / "missing-effects.md").read_text(encoding="utf-8")
-    lines = re.findall(r"^\| (.+?) \|(?: .+?)? \| (.+?) \| (.+?) \|$", page.split("### The decision")[1], re.M)
+    lines = re.findall(
+        r"^\| (.+?) \|(?: .+?)? \| (.+?) \| (.+?) \|$", page.split("### The decision")[1], re.M
+    )
     cells = {what.replace("`", ""): values for what, *values in lines}
     rows = []
     for k, name in enumerate(cells["number"]):
         behind, p_left, gain, expected, p_of_all, behind_of_all = (
-            float(cells[what][k]) for what in ("behind", "p_left", "gain", "expected", "all p_left", "all behind")
+            float(cells[what][k])
+            for what in ("behind", "p_left", "gain", "expected", "all p_left", "all behind")
         )
         of_all = {"p_of_all": p_of_all, "behind_of_all": behind_of_all}
-        rows.append(row(name.strip("`"), behind=behind, p_left=p_left, gap=held_out(gain, expected), **of_all))
+        rows.append(
+            row(
+                name.strip("`"),
+                behind=behind,
+                p_left=p_left,
+                gap=held_out(gain, expected),
+                **of_all,
+            )
+        )
     assert word(*rows) == ("named", (("undervoltage_trip",),))

@@ -1,7 +1,9 @@
-"""The investigation: what is planted is named, what is not there is not, and the linear algebra behind it is right.
+"""The investigation: what is planted is named, what is not there is not, and the linear algebra
+behind it is right.
 
-Records come from the independent generator of `tests/oracle/hidden_effects`; only a few effects are tested against each
-other here, so that the tests stay short. The study over the whole catalogue is `benchmarks/hidden_effects_study.py`.
+Records come from the independent generator of `tests/oracle/hidden_effects`; only a few effects are
+tested against each other here, so that the tests stay short. The study over the whole catalogue is
+`benchmarks/hidden_effects_study.py`.
 """
 
 import json
@@ -67,8 +69,13 @@ def base():
 
 
 def events(effect=None, size=1.0, seed=3, count=2, noise=QUIET, recorder=SLOW, **settings):
-    records = make(Case(effect, size, events=count, noise=noise, recorder=recorder, **settings), seed)
-    return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
+    records = make(
+        Case(effect, size, events=count, noise=noise, recorder=recorder, **settings), seed
+    )
+    return [
+        detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check())
+        for k, r in enumerate(records)
+    ]
 
 
 def bench(model, made, only=FEW, bounds=None):
@@ -105,8 +112,12 @@ def test_stays_silent_when_nothing_is_missing(silent):
 
 
 def test_the_base_model_is_fitted_in_the_better_of_two_valleys(monkeypatch):
-    """Where the reactive static load may stand for a part of the motor's, the box alone led to the worse side."""
-    made = events("feeder_impedance", size=0.6377, seed=287367529, count=4, noise=LOUD, recorder=FAST)[:3]
+    """Where the reactive static load may stand for a part of the motor's, the box alone led to the
+    worse side.
+    """
+    made = events(
+        "feeder_impedance", size=0.6377, seed=287367529, count=4, noise=LOUD, recorder=FAST
+    )[:3]
     best = base_fit(bench(base(), made, ())).fit.deviance
     monkeypatch.setattr(multistart, "along_least_certain", lambda likelihood, unit: unit[None])
     assert base_fit(bench(base(), made, ())).fit.deviance > best + 100
@@ -122,17 +133,22 @@ def test_descents_on_several_cores_say_how_many_have_ended(monkeypatch):
     fit = base_fit(bench(base(), events(noise=LOUD)))
     monkeypatch.setattr(fit.context.effort, "parts", parts)
     starts = [((name,), fit.fit.unit) for name in FEW] * FITS_AT_ONCE
-    monkeypatch.setattr(store.DESCENTS, "read", lambda key: None)  # what was fitted before is read back at once
+    # what was fitted before is read back at once
+    monkeypatch.setattr(store.DESCENTS, "read", lambda key: None)
     refit(fit.context, fit.noise, starts)
     assert counted == [3, "ended", "ended", "ended"]
 
 
 @pytest.mark.parametrize("effect", ["speed_dependent_torque", "undervoltage_trip"])
 def test_others_are_named_as_well(effect):
-    found = investigate(base(), events(effect, size=2.0), (), {}, {}, only=("stator_resistance", effect))
+    found = investigate(
+        base(), events(effect, size=2.0), (), {}, {}, only=("stator_resistance", effect)
+    )
     assert (found.verdict.word, found.names) == ("candidate", (effect,))
     assert found.reason.endswith("; no event was held out to confirm it")
-    assert "record a further dip as deep as event" in recommendation(found) or "hold out event" in recommendation(found)
+    assert "record a further dip as deep as event" in recommendation(
+        found
+    ) or "hold out event" in recommendation(found)
 
 
 def test_what_explains_as_well_is_told_as_a_tie_with_the_dip_that_decides():
@@ -141,7 +157,9 @@ def test_what_explains_as_well_is_told_as_a_tie_with_the_dip_that_decides():
     found = investigate(base(), events("stator_resistance", noise=LOUD), (), {}, {}, only=alike)
     assert found.verdict.word == "tied"
     assert {*found.verdict.sets} == {(name,) for name in alike}
-    assert found.reason.endswith("either explains the disagreement, and these events cannot tell them apart")
+    assert found.reason.endswith(
+        "either explains the disagreement, and these events cannot tell them apart"
+    )
     assert found.next_event.probability > 0.9
     made = content(found)
     assert (made["verdict"], made["effects"]) == ("tied", [*found.names])
@@ -180,11 +198,18 @@ def test_the_contract_holds_what_machines_read(planted, tmp_path):
     assert made["name_sets"] == [["stator_resistance"]]
     assert {"event", "channel", "start", "end", "share"} == made["where"][0].keys()
     for role in ("train", "validate"):
-        assert {"model_error", "epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role]["before"].keys()
+        assert {"model_error", "epsilon_p", "epsilon_q", "chi2_per_sample"} == made["gap"][role][
+            "before"
+        ].keys()
     candidate = next(c for c in made["candidates"] if c["effects"] == ["stator_resistance"])
     assert {"status", "likelihood_ratio", "parameters"} <= candidate.keys()
     assert min(made["left"].values()) > 0.001
-    node = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
+    node = {
+        "motor": {"name": "electromechanical"},
+        "static": {"name": "exponential"},
+        "bounds": {},
+        "fixed": {},
+    }
     path = write_model(planted, node, tmp_path / "model" / "extended.yaml")
     assert "effects:\n- stator_resistance" in path.read_text()
 
@@ -211,7 +236,9 @@ def test_a_size_that_may_only_grow_has_half_of_its_chi_square():
 
 
 def test_noise_that_is_drawn_is_noise_that_is_found():
-    """Correlated channels, one of them colored: mix, level and color come back from a long stretch."""
+    """Correlated channels, one of them colored: mix, level and color come back from a
+    long stretch.
+    """
     mix = np.linalg.inv(np.array([[0.004, 0.0], [0.002, 0.003]]))
     color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
     noise = PowerNoise(((color, white_noise(1.0)),), mix)
@@ -223,7 +250,9 @@ def test_noise_that_is_drawn_is_noise_that_is_found():
 
 
 def test_a_recurrence_is_undone_by_its_own_whitening():
-    color = Autoregression(np.array([[0.0, 0.0], [0.6, 0.0], [0.9, -0.3]]), np.array([1.5, 1.2, 1.0]))
+    color = Autoregression(
+        np.array([[0.0, 0.0], [0.6, 0.0], [0.9, -0.3]]), np.array([1.5, 1.2, 1.0])
+    )
     shocks = np.random.default_rng(0).standard_normal((3, 50))
     made = color.recurring(shocks)
     assert made[:, 0] == pytest.approx(shocks[:, 0])
@@ -234,8 +263,11 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
     rng = np.random.default_rng(8)
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
     spoken = sum(find(calm(), 0.002, steady(250)) is not None for _ in range(150))
-    assert 0.03 < spoken / 150 < 0.1  # half a chi-square of one degree beyond 2, less what fast noise takes: 6 %
-    walks = [w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in calm()]
+    # half a chi-square of one degree beyond 2, less what fast noise takes: 6 %
+    assert 0.03 < spoken / 150 < 0.1
+    walks = [
+        w + np.cumsum(rng.normal(size=(2, 250)) * np.array([[0.05], [0.0]]), axis=1) for w in calm()
+    ]
     found = find(walks, 0.002, steady(250))
     assert 1.0 < found.intensity[0] / (0.05**2 / 0.002) < 2.0  # the larger end of its interval
     assert found.intensity[1] < found.intensity[0] / 2
@@ -243,15 +275,22 @@ def test_a_load_that_wanders_is_seen_before_the_events_and_steady_noise_is_not()
 
 def test_an_identification_asks_for_more_before_it_says_that_a_load_wanders():
     rng = np.random.default_rng(9)
-    seen = lambda before: wandering(before, 0.002, steady(250), seen=observed.LEAST_WANDERING) is not None  # noqa: E731
     calm = lambda: [rng.normal(size=(2, 250)) for _ in range(3)]  # noqa: E731
-    walk = lambda: [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]  # noqa: E731
+
+    def seen(before):
+        return wandering(before, 0.002, steady(250), seen=observed.LEAST_WANDERING) is not None
+
+    def walk():
+        return [b + np.cumsum(rng.normal(size=(2, 250)) * [[0.03], [0.0]], axis=1) for b in calm()]
+
     assert sum(seen(calm()) for _ in range(150)) <= 3  # 0.3 %; of an investigation 6 %
     assert 28 <= sum(seen(walk()) for _ in range(60)) <= 36  # of which an investigation sees 42
 
 
 def test_heavy_tails_are_drawn_beyond_what_the_quiet_samples_showed():
-    """Quantiles of the law stand for few samples of Student's t; normal and quantised samples stand for themselves."""
+    """Quantiles of the law stand for few samples of Student's t; normal and quantised samples stand
+    for themselves.
+    """
     rng = np.random.default_rng(8)
     whole = slice(0, 400)
     drawn = lambda rows: estimate(rows, np.ones((2, 400), dtype=bool), [whole]).shocks  # noqa: E731
@@ -264,13 +303,17 @@ def test_heavy_tails_are_drawn_beyond_what_the_quiet_samples_showed():
 
 @pytest.mark.parametrize(("shape", "p"), [(0.0, 0.01), (0.3, 0.01), (0.3, 0.001)])
 def test_the_largest_of_many_has_the_tail_of_its_own_law(shape, p):
-    """Draws from SciPy's extreme value distributions, light and heavy tails: the p of a known quantile comes out."""
+    """Draws from SciPy's extreme value distributions, light and heavy tails: the p of a known
+    quantile comes out.
+    """
     from scipy.stats import genextreme
 
     law = genextreme(-shape, 2.0, 3.0)
     rng = np.random.default_rng(5)
     unit = Scale(np.zeros(1), np.ones(1))
-    found = [tail(law.rvs((199, 1), random_state=rng), np.array([law.isf(p)]), unit) for _ in range(40)]
+    found = [
+        tail(law.rvs((199, 1), random_state=rng), np.array([law.isf(p)]), unit) for _ in range(40)
+    ]
     assert np.median(found) == pytest.approx(p, rel=0.3)
 
 
@@ -289,13 +332,19 @@ def test_noise_of_a_wandering_load_is_white_once_whitened():
 
 
 def test_noise_drawn_white_has_the_law_of_noise_that_is_whitened():
-    """Colored, mixed, wandering noise with heavy tails and a gap: variance in all directions, tails and gap alike."""
+    """Colored, mixed, wandering noise with heavy tails and a gap: variance in all directions, tails
+    and gap alike.
+    """
     n, rng = 600, np.random.default_rng(9)
     color = Autoregression(np.array([[0.0], [0.8]]), np.array([1.0, 0.6]))
-    wander = RandomWalk(np.array([2.0, 0.0]), 0.002, Load(np.tile([[1.0], [0.0]], n), np.array([[1.0, 0.0]])))
+    wander = RandomWalk(
+        np.array([2.0, 0.0]), 0.002, Load(np.tile([[1.0], [0.0]], n), np.array([[1.0, 0.0]]))
+    )
     heavy = rng.standard_t(5, (2, 4000))
     shocks = tuple(heavy / heavy.std(axis=1, keepdims=True))
-    noise = PowerNoise(((color, white_noise(1.0)),), np.array([[1.0, 0.0], [-0.5, 1.0]]), shocks, wander)
+    noise = PowerNoise(
+        ((color, white_noise(1.0)),), np.array([[1.0, 0.0], [-0.5, 1.0]]), shocks, wander
+    )
     drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
     valid = np.ones((2, n), dtype=bool)
     valid[1, 250:300] = False
@@ -333,20 +382,29 @@ def test_an_investigation_starts_anew_with_shorter_steps_where_its_fits_ask_for_
     found = investigate(base(), events(recorder=FAST), only=FEW, tell=said.append)
     own = found.context.kernels
     assert sum("again with shorter steps" in line for line in said) == 1
-    assert own.substeps == own.box_substeps > own.bare.with_steps_of(kernels.STEP_SHARE).step.substeps.max()
+    assert (
+        own.substeps
+        == own.box_substeps
+        > own.bare.with_steps_of(kernels.STEP_SHARE).step.substeps.max()
+    )
 
 
 def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_active_power():
-    """P and Q of one load wander together: where it takes thrice the reactive power, that wanders thrice as much."""
+    """P and Q of one load wander together: where it takes thrice the reactive power, that wanders
+    thrice as much.
+    """
     rng, n, count = np.random.default_rng(3), 600, 200
     clean = np.stack([np.ones(n), np.where(np.arange(n) < 300, 0.4, 1.2)])
     walk = np.cumsum(rng.normal(size=(count, 1, n)) * 0.01, axis=2)
     walk -= walk.mean(axis=2, keepdims=True)  # a load that is larger throughout is P0 and Q0
     recorded = clean * walk + 0.05 * rng.normal(size=(count, 2, n))
     load = Load.of(clean, np.array([[1.0, 0.4]]), np.array([0, n]))
-    mix = np.array([[20.0, 0.0], [-8.0, 20.0]])  # in which what goes together in P and Q before the dip is P's alone
+    # in which what goes together in P and Q before the dip is P's alone
+    mix = np.array([[20.0, 0.0], [-8.0, 20.0]])
     noise = PowerNoise(
-        PowerNoise.white(1.0, 1.1).pairs, mix, random_walk=RandomWalk(np.array([20.0, 0.0]), 0.002, load)
+        PowerNoise.white(1.0, 1.1).pairs,
+        mix,
+        random_walk=RandomWalk(np.array([20.0, 0.0]), 0.002, load),
     )
     drive = SimpleNamespace(events=1, samples=n, part=lambda e: slice(0, n))
     rows = noise.whiten(recorded, drive, np.ones((2, n), dtype=bool)).reshape(count, 2, n)
@@ -356,7 +414,9 @@ def test_what_the_reactive_power_of_customers_does_after_a_dip_follows_their_act
 
 
 def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
-    """What is left of the events adds evidence, as long as the stretches before do not speak against it."""
+    """What is left of the events adds evidence, as long as the stretches before do not speak
+    against it.
+    """
     rng = np.random.default_rng(11)
     white = lambda n: rng.normal(size=(2, n))  # noqa: E731
     walk = lambda n: np.cumsum(rng.normal(size=(2, n)) * np.array([[0.03], [0.0]]), axis=1)  # noqa: E731
@@ -365,7 +425,10 @@ def test_a_load_that_seems_steady_before_the_events_may_wander_within_them():
     calm = [white(250) for _ in range(3)]
     assert find(calm, 0.002, steady(1000)) is None
     assert find(calm, 0.002, steady(1000), [rest(white(1000)) for _ in range(3)]) is None
-    assert find(calm, 0.002, steady(1000), [rest(white(1000) + walk(1000)) for _ in range(3)]) is not None
+    assert (
+        find(calm, 0.002, steady(1000), [rest(white(1000) + walk(1000)) for _ in range(3)])
+        is not None
+    )
     explained = [rest(white(1000) + 5 * columns[0]) for _ in range(3)]
     assert find(calm, 0.002, steady(1000), explained) is None
 
@@ -379,17 +442,22 @@ def test_noise_of_the_voltage_is_taken_out_where_it_is_smooth():
     off = made.event.record.U - clean.record.U
     quiet = slice(0, clean.start - 20)
     assert off[quiet].std() < 0.3 * (noisy.record.U - clean.record.U)[quiet].std()
-    assert made.event.record.U[clean.start] == noisy.record.U[clean.start]  # at the edge as it was recorded
+    # at the edge as it was recorded
+    assert made.event.record.U[clean.start] == noisy.record.U[clean.start]
 
 
 def test_smoothing_stops_beside_an_edge(monkeypatch):
-    """A sample that is taken for an edge by chance does not take those beside it along, and they theirs."""
+    """A sample that is taken for an edge by chance does not take those beside it along, and they
+    theirs.
+    """
     rng, time = np.random.default_rng(12), np.arange(1000) * 0.002
     U = np.where(abs(time - 0.6) < 0.1, 0.6, 1.0)
 
     def as_recorded():
         """How many samples are left as recorded in all but one event of twenty."""
-        made = [smooth_voltage(_event(time, U + rng.normal(0, 0.005, 1000))).errors for _ in range(60)]
+        made = [
+            smooth_voltage(_event(time, U + rng.normal(0, 0.005, 1000))).errors for _ in range(60)
+        ]
         return np.quantile([(np.count_nonzero(errors, axis=1) == 1).sum() for errors in made], 0.95)
 
     assert as_recorded() < 200
@@ -402,7 +470,9 @@ def _event(t, U):
 
 
 def test_what_smoothing_leaves_of_the_voltages_noise_is_as_large_as_said():
-    """In the directions of its errors what is left has unit variance; outside of them there is hardly anything."""
+    """In the directions of its errors what is left has unit variance; outside of them there is
+    hardly anything.
+    """
     clean = events(noise=Noise(0.002), count=1)[0]
     rng = np.random.default_rng(3)
     sizes, outside = [], []
@@ -419,17 +489,21 @@ def test_what_smoothing_leaves_of_the_voltages_noise_is_as_large_as_said():
 
 
 def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
-    """Draws that hold what errors of the voltage do are white once whitened, and nothing is refused or named."""
+    """Draws that hold what errors of the voltage do are white once whitened, and nothing is refused
+    or named.
+    """
     model, made = base(), events(noise=Noise(0.002, voltage=0.005))
     made = bench(model, made)
     noise = QuietNoise.at(made, made.coordinates.null).of_fit(made.coordinates.null)
     drive = made.drive
     drawn = noise.draw(np.random.default_rng(4), 200, np.diff(drive.first).tolist())
     rows = made.whiten(noise, drawn)
-    ratio = drawn.std(axis=0) / noise.deviation(drive)  # also where errors of the voltage are most of it
+    # also where errors of the voltage are most of it
+    ratio = drawn.std(axis=0) / noise.deviation(drive)
     assert ratio.mean(axis=1) == pytest.approx([1.0, 1.0], abs=0.02)
     assert noise.loudest_input_mode > BLURRED
-    loud = drawn.var(axis=0) > 4 * np.median(drawn.var(axis=0), axis=1, keepdims=True)  # the edges of the dips
+    # the edges of the dips
+    loud = drawn.var(axis=0) > 4 * np.median(drawn.var(axis=0), axis=1, keepdims=True)
     assert loud.sum() > 20
     assert ratio[loud].mean() == pytest.approx(1.0, abs=0.02)
     assert rows.var() == pytest.approx(1.0, abs=0.02)
@@ -439,21 +513,33 @@ def test_the_voltages_noise_is_part_of_the_noise_of_the_power():
 @pytest.mark.parametrize(
     ("looked_for", "shape"),
     [
-        ("an oscillation", lambda t, event: 0.8 * np.sin(2 * np.pi * 31.0 * t) * (t >= event.t_start)),
-        ("a step or a pulse", lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1")),
+        (
+            "an oscillation",
+            lambda t, event: 0.8 * np.sin(2 * np.pi * 31.0 * t) * (t >= event.t_start),
+        ),
+        (
+            "a step or a pulse",
+            lambda t, event: 1.5 * (t >= event.t_end + 0.37) * (event.record.name == "event1"),
+        ),
         ("a step or a pulse", lambda t, event: 3.0 * (np.abs(t - event.t_end - 0.3) < 0.006)),
         (
             "an oscillation",
-            lambda t, event: 1.5 * np.sin(97.0 * (t - event.t_end)) * (np.abs(t - event.t_end - 0.4) < 0.1),
+            lambda t, event: (
+                1.5 * np.sin(97.0 * (t - event.t_end)) * (np.abs(t - event.t_end - 0.4) < 0.1)
+            ),
         ),
         (
             "the loudest window",
-            lambda t, event: 4.0 * (np.abs(t - event.t_start - 0.02) < 0.01) * (-1.0) ** (t // 0.004),
+            lambda t, event: (
+                4.0 * (np.abs(t - event.t_start - 0.02) < 0.01) * (-1.0) ** (t // 0.004)
+            ),
         ),
     ],
 )
 def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, looked_for, shape):
-    """Planted into what the base model leaves, in standard deviations of the noise; without it nothing is found."""
+    """Planted into what the base model leaves, in standard deviations of the noise; without it
+    nothing is found.
+    """
     first, at = silent.first, silent.context
     assert first.p_left > 0.01
     planted = first.tangent.residual.copy()
@@ -465,7 +551,9 @@ def test_what_no_effect_explains_is_found_by_the_test_that_looks_for_it(silent, 
 
 
 def test_the_largest_of_many_comes_about_by_chance_as_often_as_it_says():
-    """With thousands of columns a draw must not have a part in the mean and the spread that it is measured by."""
+    """With thousands of columns a draw must not have a part in the mean and the spread that it is
+    measured by.
+    """
     rng = np.random.default_rng(12)
     p = []
     for _ in range(6):
@@ -495,27 +583,40 @@ def test_only_a_decision_that_is_open_asks_for_exact_scales(silent):
     """p of the six tests together is moved to either side of what draws leave open."""
     first, level = silent.first, silent.context.criteria.adequate_p
     bare = replace(first, chance=replace(first.chance, scales={}))
-    for p, open_ in [(level / 30, False), (level / 10, True), (level * 10, True), (level * 30, False)]:
+    for p, open_ in [
+        (level / 30, False),
+        (level / 10, True),
+        (level * 10, True),
+        (level * 30, False),
+    ]:
         moved = replace(bare)
         moved.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": p})
         assert moved.undecided == open_
-    exact = replace(bare, chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)))
+    exact = replace(
+        bare,
+        chance=replace(bare.chance, scales=scales(first.tangent, first.projection, first.noise, 3)),
+    )
     exact.__dict__["goodness_of_fit"] = GoodnessOfFit({"one of six": level})
     assert not exact.undecided
     drawn = bare.chance.left
     for name, scale in exact.chance.scales.items():
         assert np.median(np.abs(scale.mean / drawn[name].mean(axis=0) - 1)) < 0.1
         assert np.median(np.abs(scale.spread / drawn[name].std(axis=0) - 1)) < 0.15
-    assert set(exact.chance.scales) == {name for name, values in drawn.items() if values[0].size > 1}
+    assert set(exact.chance.scales) == {
+        name for name, values in drawn.items() if values[0].size > 1
+    }
 
 
 @pytest.mark.parametrize(("events", "asked"), [(1, False), (2, True)])
 def test_parameters_of_each_event_are_asked_for_where_there_are_two(events, asked, monkeypatch):
     monkeypatch.setattr(goodness_of_fit, "statistics", lambda channels, problem: {})
     projection = SimpleNamespace(
-        variance_component=lambda: np.zeros(1), least_p=np.ones(1), channels=lambda layout: None, r=np.zeros((1, 3)),
+        variance_component=lambda: np.zeros(1),
+        least_p=np.ones(1),
+        channels=lambda layout: None,
+        r=np.zeros((1, 3)),
         split=np.ones((1, 3)),
-    )  # fmt: skip
+    )
     made = ScoreTest.statistics(projection, SimpleNamespace(events=("a dip",) * events))
     assert ("parameters of each event" in made) == asked
 
@@ -528,9 +629,18 @@ def test_an_effect_outside_the_catalogue_is_unexplained_and_what_is_left_is_writ
     near = content(found)["nearest"]
     assert near["effects"]
     assert 0 < near["gap"]["train"]["closed"] < 1
-    assert near["gap"]["train"]["after"]["chi2_per_sample"] < near["gap"]["train"]["before"]["chi2_per_sample"]
+    assert (
+        near["gap"]["train"]["after"]["chi2_per_sample"]
+        < near["gap"]["train"]["before"]["chi2_per_sample"]
+    )
     assert near["gap"]["validate"] is None
-    rows = np.genfromtxt(write_left(found, tmp_path / "left.csv"), delimiter=",", names=True, dtype=None, encoding=None)
+    rows = np.genfromtxt(
+        write_left(found, tmp_path / "left.csv"),
+        delimiter=",",
+        names=True,
+        dtype=None,
+        encoding=None,
+    )
     assert len(rows) == sum(e.record.samples for e in found.context.events)
     assert np.abs(rows["P"]).max() > 5 * 0.002  # the step stands out of the noise
 
@@ -546,7 +656,9 @@ def test_a_sets_own_kernel_gives_what_those_with_more_beside_it_give(beside):
 
 
 def test_what_changes_nothing_is_exactly_zero():
-    """Of two kernels the difference would be rounding, and a direction of its own once it is scaled to length one."""
+    """Of two kernels the difference would be rounding, and a direction of its own once it is scaled
+    to length one.
+    """
     made = bench(base(), events(), only=())
     at = made.coordinates
     unit, names = at.null.copy(), ("stator_resistance", "feeder_impedance", PUSHES)
@@ -557,7 +669,9 @@ def test_what_changes_nothing_is_exactly_zero():
 
 
 def test_coordinates_that_act_on_different_rows_share_one_difference():
-    """The normal equations are those of one difference for each coordinate, from fewer simulations."""
+    """The normal equations are those of one difference for each coordinate, from fewer
+    simulations.
+    """
     rng = np.random.default_rng(10)
     J = rng.normal(size=(40, 3))
     J[20:, 1], J[:20, 2] = 0, 0
@@ -577,11 +691,19 @@ def test_coordinates_that_act_on_different_rows_share_one_difference():
 
 
 def test_a_name_takes_held_out_events_that_show_it(planted):
-    """A true explanation gains about what both curves are apart; of little distance it is neither shown nor denied."""
+    """A true explanation gains about what both curves are apart; of little distance it is neither
+    shown nor denied.
+    """
     shown = planted.validate
     assert abs(shown.gain - shown.expected) < 6 * np.sqrt(shown.expected)
     assert shown.is_shown
-    cases = ((-1.0, 100.0, False), (5.0, 100.0, False), (5.0, 12.0, True), (-1.0, 6.0, True), (-np.inf, np.inf, False))
+    cases = (
+        (-1.0, 100.0, False),
+        (5.0, 100.0, False),
+        (5.0, 12.0, True),
+        (-1.0, 6.0, True),
+        (-np.inf, np.inf, False),
+    )
     for gain, expected, open_ in cases:
         there = replace(shown, gain=gain, expected=expected)
         assert not there.is_shown
@@ -593,12 +715,16 @@ def test_a_small_effect_that_the_held_out_dip_is_too_mild_to_show_is_a_candidate
     told = investigate(base(), [made[0], made[2]], [made[1]], {}, {}, only=FEW)
     assert (told.verdict.word, told.names) == ("candidate", ("stator_resistance",))
     assert told.reason.endswith("the held-out events are too mild to show it")
-    assert "hold it out" in recommendation(told) or recommendation(told).startswith("hold out event")
+    assert "hold it out" in recommendation(told) or recommendation(told).startswith(
+        "hold out event"
+    )
     assert not told.proposed.why
 
 
 def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
-    """An event with the effect adds to the evidence of the fitted ones, one without it takes from it."""
+    """An event with the effect adds to the evidence of the fitted ones, one without it takes from
+    it.
+    """
     trained, alone, criteria = planted.context, planted.extended, Criteria()
     known = planted.evidence
     both = lambda made: AllEvents(trained, made, known.noise, known.faults, known.base.fit)  # noqa: E731
@@ -617,7 +743,9 @@ def test_all_events_together_confirm_only_what_the_held_out_ones_show(planted):
 
 
 def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():
-    """A motor that would not run before it: nothing of it can be compared, and the noise is another fit's."""
+    """A motor that would not run before it: nothing of it can be compared, and the noise is another
+    fit's.
+    """
     made = bench(base(), events(count=3)[:2])
     at = made.coordinates
     runs = Refit((), at.null.copy(), 0.0, 0)
@@ -633,8 +761,12 @@ def test_what_has_no_steady_state_on_a_held_out_event_is_denied_there():
     assert judged[stalls.names].gain == -np.inf
 
 
-def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_a_fit_to_all_events(planted):
-    """A step of the load after the held-out dip is seen beside the effect; without it nobody asks for that fit."""
+def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_a_fit_to_all_events(
+    planted,
+):
+    """A step of the load after the held-out dip is seen beside the effect; without it nobody asks
+    for that fit.
+    """
 
     criteria = planted.context.criteria
 
@@ -651,17 +783,26 @@ def test_an_effect_that_closes_little_of_the_held_out_gap_must_leave_nothing_in_
     assert holds(judged_on([clean]), criteria)
     record = clean.record
     later = record.t > record.t[clean.end] + 0.2
-    stepped = judged_on([replace(clean, record=replace(record, P=record.P + 0.05 * clean.P0 * later))])
+    stepped = judged_on(
+        [replace(clean, record=replace(record, P=record.P + 0.05 * clean.P0 * later))]
+    )
     assert stepped.gap.is_shown
     assert not closes_enough(stepped)
     assert not holds(stepped, criteria)
 
 
 def test_an_effect_is_looked_for_from_all_over_the_base_model_s_box(monkeypatch):
-    """A large capacitor draws the base fit to another leakage and dispersion, where none of any size would help."""
+    """A large capacitor draws the base fit to another leakage and dispersion, where none of any
+    size would help.
+    """
     only = ("shunt_capacitor", "low_frequency_oscillation")
     found = investigate(
-        base(), events("shunt_capacitor", size=0.5 / 0.3, seed=2048740674, count=3), (), {}, {}, only=only
+        base(),
+        events("shunt_capacitor", size=0.5 / 0.3, seed=2048740674, count=3),
+        (),
+        {},
+        {},
+        only=only,
     )
     first, single = found.first, found.explanations.refits["shunt_capacitor",]
     assert beneath(first, single).fit.deviance > first.fit.deviance + 1000
@@ -669,11 +810,16 @@ def test_an_effect_is_looked_for_from_all_over_the_base_model_s_box(monkeypatch)
     assert found.names == ("shunt_capacitor",)
     monkeypatch.setattr(explanations, "in_the_box", lambda context, fit: [(fit.names, fit.unit)])
     from_base = search_effect_sets([first], {(): first.fit}, 1, lambda line: None)
-    assert min(f.deviance for f in from_base if f.names == ("shunt_capacitor",)) > first.fit.deviance - 1
+    assert (
+        min(f.deviance for f in from_base if f.names == ("shunt_capacitor",))
+        > first.fit.deviance - 1
+    )
 
 
 def test_a_relay_is_found_though_the_base_model_alone_fits_in_a_wrong_valley():
-    """There it left a deviance of 2550 of 2000 values, a member of its family was named, or nothing at all."""
+    """There it left a deviance of 2550 of 2000 values, a member of its family was named, or nothing
+    at all.
+    """
     made = events("undervoltage_trip", size=2.0, seed=5)
     found = investigate(base(), made, (), {}, {}, only=("stator_resistance", "undervoltage_trip"))
     assert found.names == ("undervoltage_trip",)
@@ -681,9 +827,13 @@ def test_a_relay_is_found_though_the_base_model_alone_fits_in_a_wrong_valley():
 
 
 def test_a_name_that_suffices_from_the_wrong_valley_does_not_hide_what_explains_more_from_another():
-    """There a compensator leaves nothing of a capacitor; the capacitor explains more by a single parameter."""
+    """There a compensator leaves nothing of a capacitor; the capacitor explains more by a single
+    parameter.
+    """
     made = events("shunt_capacitor", size=0.5 / 0.3, seed=716855646, count=4, noise=LOUD)
-    found = investigate(base(), made[:3], made[3:], {}, {}, only=("shunt_capacitor", "static_var_compensator"))
+    found = investigate(
+        base(), made[:3], made[3:], {}, {}, only=("shunt_capacitor", "static_var_compensator")
+    )
     first, refits = found.first, found.explanations.refits
     assert found.explanations.chosen.names == ("shunt_capacitor",)
     from_base = refit(found.context, first.noise, [(("shunt_capacitor",), first.fit.unit)])[0]
@@ -693,22 +843,29 @@ def test_a_name_that_suffices_from_the_wrong_valley_does_not_hide_what_explains_
 
 
 def test_an_effect_that_a_larger_set_does_not_need_is_left_out_again(planted):
-    """A pair may lead to the better place of one of its members: then that one alone is the explanation."""
+    """A pair may lead to the better place of one of its members: then that one alone is the
+    explanation.
+    """
     (name,), first = planted.names, planted.first
     other = next(n for n in FEW if n != name)
-    pair = refit(planted.context, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[0]
+    pair = refit(planted.context, first.noise, [((name, other), planted.verdict.chosen.fit.unit)])[
+        0
+    ]
     tests = examine_fit(planted.base.quiet, pair, first.noise, 0)
     astray = replace(planted.explanations.refits[name,], deviance=first.fit.deviance)
     refits = {**planted.explanations.refits, (name,): astray}
     fewer = without_needless(planted.base, tests, refits, 0)
     assert fewer.fit.names == (name,)
     assert refits[name,].deviance < first.fit.deviance - 100
-    needed = replace(tests, fit=replace(tests.fit, deviance=tests.fit.deviance - 30.0))  # p = 4e-8 of one parameter
+    # p = 4e-8 of one parameter
+    needed = replace(tests, fit=replace(tests.fit, deviance=tests.fit.deviance - 30.0))
     assert without_needless(planted.base, needed, refits, 0) is needed
 
 
 def test_candidates_at_their_null_leave_the_base_model(silent):
-    """All kernels by which they are tested, every one at its null, give the base model's residuals."""
+    """All kernels by which they are tested, every one at its null, give the base
+    model's residuals.
+    """
     made = bench(base(), events(), only=())
     alone, null = made.kernels.bare, made.coordinates.null
     values = alone.space.from_unit(null[made.coordinates.base])
@@ -719,7 +876,9 @@ def test_candidates_at_their_null_leave_the_base_model(silent):
 
 
 def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
-    """The best fit lies on a wall; a projection that lets the parameter leave the box would find nothing."""
+    """The best fit lies on a wall; a projection that lets the parameter leave the box would find
+    nothing.
+    """
     T = silent.context.coordinates.value("T_prime", silent.first.fit.unit)
     made = bench(base(), events(), bounds={"T_prime": [1.05 * T, 2 * T]})
     first = disagreement(base_fit(made), seed=0)
@@ -732,7 +891,9 @@ def test_what_only_a_parameter_beyond_its_bounds_explains_is_left(silent):
 
 
 def test_nuisance_columns_are_orthogonal_to_the_projected_residual(silent):
-    projection = tangent(silent.context, silent.first.fit, silent.first.noise).whitened(silent.first.noise)
+    projection = tangent(silent.context, silent.first.fit, silent.first.noise).whitened(
+        silent.first.noise
+    )
     assert np.abs(projection.r @ projection.Q).max() < 1e-8
     for block in projection.blocks:
         assert np.abs(block @ projection.Q).max() < 1e-6 * max(np.abs(block).max(), 1.0)
@@ -743,14 +904,24 @@ def test_events_that_do_not_belong_together_are_refused():
     with pytest.raises(UserError, match=r"made 1 is both in data\.train and in data\.validate"):
         check_events([one, two], [one])
     with_f = detect(
-        Record("f", one.record.t, one.record.U, one.record.P, one.record.Q, f=np.full(len(one.record.t), 50.0))
+        Record(
+            "f",
+            one.record.t,
+            one.record.U,
+            one.record.P,
+            one.record.Q,
+            f=np.full(len(one.record.t), 50.0),
+        )
     )
     with pytest.raises(UserError, match="has the channel f and made 1 has not"):
         check_events([one, with_f], [])
 
 
 def test_an_effect_that_does_not_exist_is_refused_with_the_nearest_name():
-    with pytest.raises(UserError, match=r"'stator_resistence', which is no effect; did you mean 'stator_resistance'\?"):
+    with pytest.raises(
+        UserError,
+        match=r"'stator_resistence', which is no effect; did you mean 'stator_resistance'\?",
+    ):
         investigate(base(), events(), (), {}, {}, only=("stator_resistence",))
 
 
@@ -758,10 +929,21 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     case = Case("stator_resistance", 2.0, events=2, noise=QUIET)
     write(case, 3, tmp_path)
     only = "task.effects=[stator_resistance,speed_dependent_torque]"
-    data = ["data=csv", "data.train=[event1.csv]", "data.validate=[event2.csv]", "tracking.enabled=false"]
+    data = [
+        "data=csv",
+        "data.train=[event1.csv]",
+        "data.validate=[event2.csv]",
+        "tracking.enabled=false",
+    ]
     done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    for part in ("noise:", "verdict: NAMED stator_resistance", "where:", "held out", "discrepancy.html"):
+    for part in (
+        "noise:",
+        "verdict: NAMED stator_resistance",
+        "where:",
+        "held out",
+        "discrepancy.html",
+    ):
         assert part in done.stdout, part
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert made["effects"] == ["stator_resistance"]
@@ -778,22 +960,36 @@ def test_the_command_tells_the_story_and_its_extended_model_runs_at_once(tmp_pat
     assert made["extended"] == "conf/model/extended.yaml"
     lines = [line for line in done.stdout.splitlines() if line.strip()]
     first = next(k for k, line in enumerate(lines) if line.startswith("verdict: "))
-    assert all(line.startswith(("fit: ", "hold out: ", "  ")) for line in lines[:first])  # records and steps only
-    assert lines[first + 1].startswith("  stator_resistance explains the disagreement, and none of the 4 other")
+    # records and steps only
+    assert all(line.startswith(("fit: ", "hold out: ", "  ")) for line in lines[:first])
+    assert lines[first + 1].startswith(
+        "  stator_resistance explains the disagreement, and none of the 4 other"
+    )
     assert lines[first + 2].startswith("  R_s = 0.0")
     assert not list((tmp_path / "run").glob("*.svg"))
     quick = ["optimizer=multistart_least_squares", "optimizer.starts=2", "hydra.run.dir=again"]
-    done = run_command("--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path)
+    done = run_command(
+        "--config-dir", str(Path("run") / "conf"), "model=extended", *data, *quick, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     assert "R_s" in json.loads((tmp_path / "again" / "result.json").read_text())["parameters"]
 
 
 @pytest.mark.usefixtures("no_proposal")
 def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
-    """Two dips of a fault recorder: the base model does not fit, an effect helps on both dips and is not adequate."""
+    """Two dips of a fault recorder: the base model does not fit, an effect helps on both dips and
+    is not adequate.
+    """
     record = shared_data / "dfr220kv-shandong" / "xtz.cfg"
-    data = ["data=comtrade", f"data.path={record}", "data.voltages=[4,5,6]", "data.currents=[8,9,10]", "data.train=[1]",
-            "data.validate=[2]", "tracking.enabled=false"]  # fmt: skip
+    data = [
+        "data=comtrade",
+        f"data.path={record}",
+        "data.voltages=[4,5,6]",
+        "data.currents=[8,9,10]",
+        "data.train=[1]",
+        "data.validate=[2]",
+        "tracking.enabled=false",
+    ]
     only = "task.effects=[exponential_recovery]"
     done = run_command("task=discrepancy", only, *data, "hydra.run.dir=run", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -803,7 +999,10 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
     assert made["gap"]["train"]["before"]["chi2_per_sample"] > 10
     near = made["nearest"]["gap"]
     assert 0.2 < near["train"]["closed"] < 1
-    assert near["validate"]["after"]["model_error"]["value"] > near["validate"]["before"]["model_error"]["value"] / 2.25
+    assert (
+        near["validate"]["after"]["model_error"]["value"]
+        > near["validate"]["before"]["model_error"]["value"] / 2.25
+    )
     assert all(len(at["interval"]) == 2 for at in made["nearest"]["parameters"].values())
     assert made["extended"] is None
     assert not (tmp_path / "run" / "conf").exists()
@@ -813,7 +1012,9 @@ def test_on_a_real_record_it_says_that_it_does_not_know(shared_data, tmp_path):
 
 
 def test_fits_and_what_they_spend_do_not_depend_on_the_number_of_cores(planted, monkeypatch):
-    """Products of matrices round by how many rows they have: the same descents go together on any machine."""
+    """Products of matrices round by how many rows they have: the same descents go together on any
+    machine.
+    """
     from tractexp.inference import cores, fitting
 
     bench = planted.context

@@ -1,4 +1,6 @@
-"""The page of an investigation: what one sees first, what explains it, and no sentence against another."""
+"""The page of an investigation: what one sees first, what explains it, and no sentence against
+another.
+"""
 
 import base64
 import html
@@ -47,22 +49,28 @@ def unexplained():
 
 def page(found, folder):
     """The words of the page, and what its charts draw."""
-    path = discrepancy.report(found, content(found), [Identity.at(e.record) for e in found.context.events]).save(
-        folder / "discrepancy.html"
-    )
+    path = discrepancy.report(
+        found, content(found), [Identity.at(e.record) for e in found.context.events]
+    ).save(folder / "discrepancy.html")
     return words_of(path), charts(path.read_text(encoding="utf-8"))
 
 
 def words_of(path):
     """The words of a page that is valid and whole, one space between them."""
     read(path)
-    bare = re.sub(r"<(script|style)[^>]*>.*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL)
+    bare = re.sub(
+        r"<(script|style)[^>]*>.*?</\1>", "", path.read_text(encoding="utf-8"), flags=re.DOTALL
+    )
     return " ".join(html.unescape(re.sub(r"<[^>]+>", " ", bare)).split())
 
 
 def curve(chart, name, axis):
     """One curve of a chart."""
-    (trace,) = (t for t in chart["data"] if (t["name"], t["yaxis"]) == (name, axis) and t.get("mode") == "lines")
+    (trace,) = (
+        t
+        for t in chart["data"]
+        if (t["name"], t["yaxis"]) == (name, axis) and t.get("mode") == "lines"
+    )
     return np.frombuffer(base64.b64decode(trace["y"]["bdata"]), dtype="<f4")
 
 
@@ -73,11 +81,21 @@ def names(chart):
 def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
     words, charts = page(named, tmp_path)
     assert [e.record.name for e in named.context.events] == ["event1", "event2"]
-    assert words.index("Measured, before, after") < words.index("event1, fitted") < words.index("event3, held out")
+    assert (
+        words.index("Measured, before, after")
+        < words.index("event1, fitted")
+        < words.index("event3, held out")
+    )
     assert words.index("event3, held out") < words.index("How much smaller the gap is")
     first, _, held, bars = charts
     band = "± 2 σ of the noise"
-    assert names(first) == {"measured", "base model", "extended model", "more than chance leaves", band}
+    assert names(first) == {
+        "measured",
+        "base model",
+        "extended model",
+        "more than chance leaves",
+        band,
+    }
     assert names(held) == {"measured", "base model", "extended model", band}
     event = named.context.records.recorded[0]
     part = named.context.drive.part(0)
@@ -86,13 +104,18 @@ def test_measured_before_and_after_of_every_event_come_first(named, tmp_path):
         measured = getattr(event.record, channel)
         np.testing.assert_allclose(curve(first, "measured", axis), measured, rtol=1e-6)
         np.testing.assert_allclose(curve(first, "extended model", axis), calculated[c], rtol=1e-6)
-        np.testing.assert_allclose(curve(first, "extended model", below), measured - calculated[c], atol=1e-6)
-        assert np.std(curve(first, "base model", below)) > 1.5 * np.std(curve(first, "extended model", below))
+        np.testing.assert_allclose(
+            curve(first, "extended model", below), measured - calculated[c], atol=1e-6
+        )
+        assert np.std(curve(first, "base model", below)) > 1.5 * np.std(
+            curve(first, "extended model", below)
+        )
     edges = [s["x0"] for s in first["layout"]["shapes"] if s["type"] == "line"]
     assert edges == [event.t_start, event.t_end]
     shaded = sorted((s["x0"], s["x1"]) for s in first["layout"]["shapes"] if s["type"] == "rect")
     here = [p for p in named.places if p.event == "event1"]
-    assert shaded == sorted(2 * [(p.start, p.end) for p in here])  # in the power's panel and in that below it
+    # in the power's panel and in that below it
+    assert shaded == sorted(2 * [(p.start, p.end) for p in here])
     assert bars["data"][0]["type"] == "bar"
 
 
@@ -112,7 +135,10 @@ def test_many_events_are_folded_and_none_is_left_out(named, tmp_path):
     assert len(re.findall(r"event[12], fitted event[12]: dip of", words)) == 6
     assert "2 more events, fitted" in words
     text = path.read_text(encoding="utf-8")
-    assert text.index("<details>") > [m.start() for m in re.finditer('class="chart"', text)][overlay.MOST_OPEN_OVERLAYS - 1]
+    assert (
+        text.index("<details>")
+        > [m.start() for m in re.finditer('class="chart"', text)][overlay.MOST_OPEN_OVERLAYS - 1]
+    )
 
 
 def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
@@ -122,10 +148,17 @@ def test_candidates_are_sorted_by_evidence_the_chosen_first(named, tmp_path):
     assert rows[0].drop == pytest.approx(named.evidence.rows[0].lowered)
     (size,) = rows[0].sizes
     assert size.parameter.name == "R_s"
-    assert size.error == pytest.approx(next(e for e in named.after if e.parameter.name == "R_s").error)
+    assert size.error == pytest.approx(
+        next(e for e in named.after if e.parameter.name == "R_s").error
+    )
     drops = [row.drop for row in rows[1:] if np.isfinite(row.drop)]
     assert drops == sorted(drops, reverse=True)
-    assert {row.names[0] for row in rows} >= {*FEW, "time_skew", "measurement_window", "load_change"}
+    assert {row.names[0] for row in rows} >= {
+        *FEW,
+        "time_skew",
+        "measurement_window",
+        "load_change",
+    }
     words, charts = page(named, tmp_path)
     bars = charts[-1]["data"][0]
     assert bars["y"] == [row.names[0] for row in rows if np.isfinite(row.drop)]
@@ -146,7 +179,9 @@ def test_where_a_linear_step_favours_another_effect_one_sentence_says_why(named)
     other = next(s for s in named.first.scores if s.name == "speed_dependent_torque")
     favoured = replace(other, drop=1e6, p=0.0)
     told = why_not_the_most_helpful(promising(named, favoured))
-    assert told.startswith("speed_dependent_torque promises most in one linear step from the base model")
+    assert told.startswith(
+        "speed_dependent_torque promises most in one linear step from the base model"
+    )
     assert "yet the verdict is stator_resistance, which lowers the deviance by" in told
     assert "speed_dependent_torque" in told
     assert why_not_the_most_helpful(promising(named, replace(favoured, drop=1.0))) == ""
@@ -168,7 +203,10 @@ def test_parameters_stand_before_and_after_with_meaning_unit_interval_and_verdic
 
 
 def test_the_model_recommended_is_graded_in_the_verdict(named, unexplained, tmp_path):
-    for found, whose in ((named, "The extended model is graded "), (unexplained, "The base model is graded ")):
+    for found, whose in (
+        (named, "The extended model is graded "),
+        (unexplained, "The base model is graded "),
+    ):
         words, _ = page(found, tmp_path)
         grade = found.final_grade.adequacy
         told = f"{whose}{grade.grade.replace('_', ' ')}: {grade.sentence}."
@@ -195,7 +233,9 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
     words, _ = page(unexplained, tmp_path)
     shapes = unexplained.remainder_of_base
     assert {(s.channel, s.kind) for s in shapes} >= {("P", "step")}
-    assert unexplained.headline.startswith(("the base model misses this: ", "the nearest candidates miss this: "))
+    assert unexplained.headline.startswith(
+        ("the base model misses this: ", "the nearest candidates miss this: ")
+    )
     assert unexplained.headline[1:] in words[: words.index("Measured and calculated")]
     assert "Missed by the base model" in words
     made = content(unexplained)
@@ -211,7 +251,11 @@ def test_what_is_left_is_told_with_channel_start_and_size(unexplained, tmp_path)
             ("load_change",),
             "dc_link_lag and inrush beside load_change, the nearest, close 66% of the gap",
         ),
-        (("dc_link_lag",), ("load_change",), "dc_link_lag beside load_change, the nearest, closes 66%"),
+        (
+            ("dc_link_lag",),
+            ("load_change",),
+            "dc_link_lag beside load_change, the nearest, closes 66%",
+        ),
         ((), ("load_change", "time_skew"), "load_change and time_skew, the nearest, close 66%"),
         (("dc_link_lag",), (), "dc_link_lag, the nearest, closes 66%"),
     ],
@@ -236,11 +280,18 @@ def test_an_unexplained_verdict_does_not_contradict_itself(unexplained, tmp_path
     assert not re.search(r"e-\d\d", reason)
     near = unexplained.nearest
     assert near is not None
-    before, after = (in_percent(unexplained.evidence.row_of(names).prediction.error) for names in ((), near.names))
-    assert re.search(
-        rf"the nearest, miss(es)? {after} of the response there, where the base model misses {before}", reason
+    before, after = (
+        in_percent(unexplained.evidence.row_of(names).prediction.error)
+        for names in ((), near.names)
     )
-    assert join_words(near.names) in reason, "the sentence and what is told of the nearest name the same effects"
+    assert re.search(
+        rf"the nearest, miss(es)? {after} of the response there, where the base model misses"
+        rf" {before}",
+        reason,
+    )
+    assert join_words(near.names) in reason, (
+        "the sentence and what is told of the nearest name the same effects"
+    )
     told = content(unexplained)["nearest"]["parameters"]
     assert {"value", "standard_error", "interval"} == next(iter(told.values())).keys()
     words, _ = page(unexplained, tmp_path)

@@ -31,14 +31,18 @@ def test_the_examples_of_the_python_page_run(resistive_dips, tmp_path, monkeypat
 
 
 def test_the_notebook_runs_and_ends_well():
-    """Executed anew, its kernel in a process of its own; what its cells show is checked against what it says."""
+    """Executed anew, its kernel in a process of its own; what its cells show is checked against
+    what it says.
+    """
     nbformat = pytest.importorskip("nbformat", reason="the extra [test] is not installed")
     nbclient = pytest.importorskip("nbclient", reason="the extra [test] is not installed")
     path = ROOT / "docs" / "from-record-to-extended-model.ipynb"
     kept = nbformat.read(path, as_version=4)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of the kernel's transport, which is not ours
-        run = nbclient.NotebookClient(nbformat.read(path, as_version=4), timeout=300, kernel_name="python3").execute()
+        run = nbclient.NotebookClient(
+            nbformat.read(path, as_version=4), timeout=300, kernel_name="python3"
+        ).execute()
 
     def shown(notebook):
         return [
@@ -48,9 +52,17 @@ def test_the_notebook_runs_and_ends_well():
         ]
 
     texts = shown(run)
-    assert len(texts) == len(shown(kept)), "executed with all outputs: execute docs/*.ipynb again and save them"
+    assert len(texts) == len(shown(kept)), (
+        "executed with all outputs: execute docs/*.ipynb again and save them"
+    )
     assert any("NAMED stator_resistance" in text for text in texts)
     assert "('named', ('stator_resistance',)" in "".join(texts)
-    errors = {line.split()[0]: re.findall(r"([\d.]+)%", line) for text in texts for line in text.splitlines()
-              if line.startswith(("before:", "after:"))}  # fmt: skip
-    assert all(float(b) > 2 * float(a) for b, a in zip(errors["before:"], errors["after:"], strict=True))
+    errors = {
+        line.split()[0]: re.findall(r"([\d.]+)%", line)
+        for text in texts
+        for line in text.splitlines()
+        if line.startswith(("before:", "after:"))
+    }
+    assert all(
+        float(b) > 2 * float(a) for b, a in zip(errors["before:"], errors["after:"], strict=True)
+    )

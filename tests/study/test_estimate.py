@@ -1,4 +1,6 @@
-"""The estimate and its grade: one answer whatever was searched with, silent on noise, outspoken on what is missing."""
+"""The estimate and its grade: one answer whatever was searched with, silent on noise, outspoken on
+what is missing.
+"""
 
 import json
 from dataclasses import replace
@@ -26,12 +28,16 @@ TRUTH = study.TYPICAL
 
 
 def recorded(deviation=0.004, seed=5, correlation=0.0, depth=0.5, spoil=None, name="dip"):
-    """An event of the printed equations with noise; `spoil` changes the clean power (2, N) at times t."""
+    """An event of the printed equations with noise; `spoil` changes the clean power (2, N) at times
+    t.
+    """
     t, U = study.Shape(depth).voltage()
     power = study.printed(TRUTH, t, U, 0.35)
     if spoil is not None:
         power = spoil(t, power)
-    return study.event(t, U, power + study.noise(np.random.default_rng(seed), len(t), deviation, correlation), name)
+    return study.event(
+        t, U, power + study.noise(np.random.default_rng(seed), len(t), deviation, correlation), name
+    )
 
 
 def stepped(size):
@@ -44,7 +50,12 @@ def stepped(size):
 
 
 def identified(event, **settings):
-    chosen = {"model": "third_order_exponential", "optimizer": "pso", "budget": 3000, "progress": False}
+    chosen = {
+        "model": "third_order_exponential",
+        "optimizer": "pso",
+        "budget": 3000,
+        "progress": False,
+    }
     return tractexp.identify(event, **chosen | settings)
 
 
@@ -54,7 +65,10 @@ def fit():
 
 
 def test_the_estimate_does_not_depend_on_the_search(fit):
-    others = [identified(recorded(), optimizer=name, seed=seed) for name, seed in (("ssa", 3), ("random_search", 1))]
+    others = [
+        identified(recorded(), optimizer=name, seed=seed)
+        for name, seed in (("ssa", 3), ("random_search", 1))
+    ]
     for other in others:
         assert other.result.search["parameters"] != fit.result.search["parameters"]
         assert other.result.parameters == fit.result.parameters
@@ -72,7 +86,9 @@ def test_the_estimate_fits_no_worse_than_any_search_by_its_own_likelihood(fit):
 def test_result_json_tells_estimate_search_and_origin(fit, tmp_path):
     fit.write_results(tmp_path)
     told = json.loads((tmp_path / "result.json").read_text())
-    assert told["parameters"].keys() == told["intervals"].keys() == told["search"]["parameters"].keys()
+    assert (
+        told["parameters"].keys() == told["intervals"].keys() == told["search"]["parameters"].keys()
+    )
     assert set(told["search"]) >= {"objective", "epsilon_p", "epsilon_q", "simulations", "seconds"}
     assert told["search"]["objective"] == fit.end.objective
     assert told["adequacy"]["grade"] == "adequate"
@@ -96,7 +112,9 @@ def test_result_and_page_hold_correlations_and_the_number_of_samples(fit, tmp_pa
     assert (known["samples"], known["parameters"]) == (compared, d)
     assert compared - d - 2 <= known["freedom"] <= compared - d  # P0 and Q0 may be estimated, too
     assert f"{compared} samples compared, {d} parameters searched" in repr(fit)
-    table = next(b for b in fit.report().blocks if isinstance(b, Table) and b.columns[:1] == ["correlation"])
+    table = next(
+        b for b in fit.report().blocks if isinstance(b, Table) and b.columns[:1] == ["correlation"]
+    )
     assert table.rows[1][1] == f"{matrix[1, 0]:+.3f}"
 
 
@@ -105,8 +123,14 @@ def test_the_end_of_a_search_and_the_estimate_stand_in_one_table_with_a_word_whe
     by_name = {row[0]: row for row in table.rows}
     assert by_name["objective"][1:3] == [fit.result.search["objective"], fit.result.objective]
     assert {n for n in fit.result.verdicts if by_name[n][4]} == {*fit.astray}
-    far = replace(fit.result, search=fit.result.search | {"objective": 2 * fit.result.objective, "parameters": {
-        **fit.result.search["parameters"], "T_m": 10.0}})  # fmt: skip
+    far = replace(
+        fit.result,
+        search=fit.result.search
+        | {
+            "objective": 2 * fit.result.objective,
+            "parameters": {**fit.result.search["parameters"], "T_m": 10.0},
+        },
+    )
     away = replace(fit, result=far, behind=fit.behind)
     assert {row[0] for row in tabulate_search_end(away).rows if row[4]} >= {"T_m"}
     assert "T_m" in away.end_of_search
@@ -154,14 +178,18 @@ def test_a_model_that_is_off_by_more_than_eq_20_allows_is_the_wrong_one():
 
 
 def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
-    """Two dips of one load whose shaft torque was 15 % higher the second time, and twice of the same load."""
+    """Two dips of one load whose shaft torque was 15 % higher the second time, and twice of the
+    same load.
+    """
     t, U = study.Shape(0.5).voltage()
     changed = TRUTH * np.where(np.array(study.model().names) == "T_m", 1.15, 1.0)
     pushed = []
     for second in (changed, TRUTH):
         rng = np.random.default_rng(4)
         events = [
-            study.event(t, U, study.printed(truth, t, U, 0.35) + study.noise(rng, len(t), 0.002, 0.0), name)
+            study.event(
+                t, U, study.printed(truth, t, U, 0.35) + study.noise(rng, len(t), 0.002, 0.0), name
+            )
             for truth, name in ((TRUTH, "first"), (second, "second"))
         ]
         pushed.append(estimate_without_search(Problem(study.model(), events)).surprise)
@@ -171,7 +199,9 @@ def test_two_dips_whose_loads_differ_are_told_by_parameters_of_each_event():
 
 def test_what_is_judged_is_the_estimate_against_all_draws(fit, monkeypatch):
     known, judged = fit.details.uncertainty, []
-    monkeypatch.setattr(adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0)
+    monkeypatch.setattr(
+        adequacy, "tail", lambda draws, value: judged.append((len(draws), len(value))) or 1.0
+    )
     adequacy.surprise(Observed.of(known.likelihood.problem), known.likelihood, known.unit)
     assert {*judged} == {(adequacy.FIT_DRAWS, 1)}
 
@@ -203,17 +233,24 @@ def test_the_thresholds_of_the_grades_are_where_they_are_said_to_be():
     assert grade_errors(Surprise(None, "", None, ""), small).grade is Grade.EFFECT_MISSING
     # where noise leaves as much, a held-out dip must be off by more than chance
     assert grade_errors(unseen, small, large).grade is Grade.ADEQUATE
-    assert grade_errors(unseen, small, ModelError(0.3, (0.21, 0.4), 0.03)).grade is Grade.WRONG_MODEL
+    assert (
+        grade_errors(unseen, small, ModelError(0.3, (0.21, 0.4), 0.03)).grade is Grade.WRONG_MODEL
+    )
 
 
 def test_a_headline_tells_the_size_and_the_bounds_that_hold_a_parameter():
     error = ModelError(0.0567, (0.05, 0.06), 0.0078)
     told = grade_errors(
-        Surprise(0.0009, "", 2.0, "P of dip"), error, ModelError(0.074, (0.07, 0.08), 0.011), ["T_m at 1"]
+        Surprise(0.0009, "", 2.0, "P of dip"),
+        error,
+        ModelError(0.074, (0.07, 0.08), 0.011),
+        ["T_m at 1"],
     )
     assert told.sentence == (
-        "the model describes this load within 5.7 % of its response (0.78 % of S), the held-out dips within 7.4 % of"
-        " its response (1.1 % of S); an effect is missing, P of dip is 2 times as loud as the noise; a bound holds"
+        "the model describes this load within 5.7 % of its response (0.78 % of S), the held-out"
+        " dips within 7.4 % of"
+        " its response (1.1 % of S); an effect is missing, P of dip is 2 times as loud as the"
+        " noise; a bound holds"
         " T_m at 1"
     )
 
@@ -238,7 +275,9 @@ def test_noise_of_the_voltage_widens_the_intervals():
     rng = np.random.default_rng(8)
     noisy = clean.record.U + 0.003 * rng.standard_normal(clean.record.samples)
     spoiled = study.event(clean.record.t, noisy, np.array([clean.record.P, clean.record.Q]))
-    quiet, loud = (estimate_without_search(Problem(study.model(), [e])).uncertainty for e in (clean, spoiled))
+    quiet, loud = (
+        estimate_without_search(Problem(study.model(), [e])).uncertainty for e in (clean, spoiled)
+    )
     assert quiet.noise[0]["of_the_voltage"] == 0.0
     assert loud.noise[0]["of_the_voltage"] > 0.5
     assert (loud.half > quiet.half).all()
@@ -273,7 +312,9 @@ def test_a_search_that_found_a_better_valley_leads_to_the_estimate(monkeypatch):
 
 
 def test_a_model_that_takes_its_error_for_slow_noise_is_found_out_by_least_squares():
-    """Had least squares left half as much, the likelihood would give up far more of Eq. (8) than it does on draws."""
+    """Had least squares left half as much, the likelihood would give up far more of Eq. (8) than it
+    does on draws.
+    """
     fit = estimate_without_search(Problem(study.model(), [recorded()]))
     known, likelihood = fit.uncertainty, fit.uncertainty.of_noise
     squares = Likelihood.of_squares(likelihood.problem, 0.004)
@@ -293,6 +334,11 @@ def test_a_quiet_start_of_a_record_tells_the_noise_of_one_whose_end_is_louder():
     calm, same, loud = 0.001 * rng.standard_normal((3, 200))
     assert not louder([same], [calm])
     assert louder([2 * loud], [calm])
-    slow = study.noise(rng, 4000, 0.001, 0.95)  # colored alike: few samples tell, and ends may differ by chance
-    wrong = [louder([row[a : a + 200]], [row[a + 400 : a + 600]]) for row in slow for a in range(0, 3200, 200)]
+    # colored alike: few samples tell, and ends may differ by chance
+    slow = study.noise(rng, 4000, 0.001, 0.95)
+    wrong = [
+        louder([row[a : a + 200]], [row[a + 400 : a + 600]])
+        for row in slow
+        for a in range(0, 3200, 200)
+    ]
     assert np.mean(wrong) < 0.1

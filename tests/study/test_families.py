@@ -1,4 +1,6 @@
-"""Families of effects: another place or another law is named where the catalogue's leaves something, and only there."""
+"""Families of effects: another place or another law is named where the catalogue's leaves
+something, and only there.
+"""
 
 import dataclasses
 from dataclasses import replace
@@ -38,7 +40,12 @@ pytestmark = pytest.mark.usefixtures("registry_as_it_was")
 
 TRIPS = ("undervoltage_trip", "exponential_recovery")
 CORE = ("magnetic_saturation", "stator_resistance")
-NODE = {"motor": {"name": "electromechanical"}, "static": {"name": "exponential"}, "bounds": {}, "fixed": {}}
+NODE = {
+    "motor": {"name": "electromechanical"},
+    "static": {"name": "exponential"},
+    "bounds": {},
+    "fixed": {},
+}
 MEMBERS = sorted(name for name, cls in discover()["effect"].items() if cls.family)
 
 
@@ -52,7 +59,8 @@ def test_the_catalogues_own_trip_keeps_its_name_beside_its_members():
     assert made.names == ("undervoltage_trip",)
     (form,) = forms(made)
     assert form.law == "catalogue"
-    assert ("two_stage_trip",) in made.explanations.refits  # the others are far behind after a few iterations
+    # the others are far behind after a few iterations
+    assert ("two_stage_trip",) in made.explanations.refits
 
 
 def test_nothing_is_tried_where_nothing_is_missing(monkeypatch):
@@ -72,14 +80,18 @@ class Narrow(Family):
                 raise Refused("m", "the model has a state 'x' already")
 
         def acceptance(effect):
-            return SimpleNamespace(refusal="the model has a state 'x' already" if clashes([effect.name]) else None)
+            return SimpleNamespace(
+                refusal="the model has a state 'x' already" if clashes([effect.name]) else None
+            )
 
         return SimpleNamespace(names=names, compile=compiled, acceptance=acceptance)
 
 
 def narrow():
     some = type("", (dict,), {"of_load": ("a", "b", "c", "i"), "of_measurement": ()})
-    effects = {n: SimpleNamespace(effect=SimpleNamespace(name=n, iterates=n == "i")) for n in "abcim"}
+    effects = {
+        n: SimpleNamespace(effect=SimpleNamespace(name=n, iterates=n == "i")) for n in "abcim"
+    }
     return Narrow(None, some(effects))
 
 
@@ -96,7 +108,8 @@ def test_an_effect_that_iterates_and_the_pushes_are_simulated_by_themselves():
     here = narrow()
     assert here.key(("a",), beside="i") == ({"a"}, {"i"})
     assert here.key(("a", "i"), beside=PUSHES) == ({"a", "i"}, {PUSHES})
-    assert here.key(("a", "i"), beside="b") == ({"i"}, {"a", "b", "c"})  # the same for all sets of cheap effects
+    # the same for all sets of cheap effects
+    assert here.key(("a", "i"), beside="b") == ({"i"}, {"a", "b", "c"})
 
 
 def fit(deviance, parameters, *names):
@@ -112,7 +125,9 @@ def test_a_member_pays_for_its_further_parameters():
 
 
 def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
-    """The relay's times have hardly a slope: a descent from the coarse grid alone ends far from what was hidden."""
+    """The relay's times have hardly a slope: a descent from the coarse grid alone ends far from
+    what was hidden.
+    """
     made = found("static_part_trip", 2.0, 820001, TRIPS[:1])
     assert made.verdict.word == "named"
     assert made.catalogue.textbook(made.names) == ("undervoltage_trip",)
@@ -121,8 +136,10 @@ def test_a_trip_of_the_static_load_alone_is_told_by_its_family_and_its_place():
     at = made.context.coordinates
     assert at.value("static_tripped", made.extended.unit) == pytest.approx(0.2, abs=0.01)
     assert made.validate.explained > 0.9
-    there = tangent(made.context, made.extended, made.evidence.noise)  # its instants are no parameters of each event:
-    assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)  # of the relay the share alone
+    # its instants are no parameters of each event:
+    there = tangent(made.context, made.extended, made.evidence.noise)
+    # of the relay the share alone
+    assert len(there.split) == 2 * (len(at.base) - len(there.held) + 1)
 
 
 @pytest.mark.parametrize(
@@ -144,7 +161,9 @@ def test_a_law_that_the_textbook_has_not_is_told_by_its_family(hidden, size, see
 
 
 def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
-    """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.9 here."""
+    """How well one held-out event is met by a curve drawn beyond the fitted ones is chance: 0.9
+    here.
+    """
     made = events("froelich_saturation", size=1.8, seed=820081, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("magnetic_saturation",))
     (form,) = forms(told)
@@ -154,7 +173,9 @@ def test_a_bounded_flux_is_a_saturation_with_a_round_corner():
 
 
 @pytest.mark.parametrize(("better", "named"), [(60.0, True), (99.0, False)])
-def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(monkeypatch, better, named):
+def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leaves_nothing(
+    monkeypatch, better, named
+):
     """Where it does not, the member is held against it: both may explain what is there."""
     at = bench(base(), events(), ("magnetic_saturation", "static_var_compensator"))
     refits = {f.names: f for f in (fit(1000.0, 0), fit(100.0, 4, "static_var_compensator"))}
@@ -163,7 +184,9 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
     member = fit(better, 4, "saturation_curve")
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
-    monkeypatch.setattr(families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True))
+    monkeypatch.setattr(
+        families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=True)
+    )
     tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == [member]
@@ -179,42 +202,62 @@ def test_a_name_that_suffices_gives_way_to_a_member_that_explains_more_and_leave
         (60.0, False, False, False),
     ],
 )
-def test_a_member_that_leaves_nothing_is_taken_where_a_textbook_effect_that_fits_alike_leaves_something(
+def test_a_member_that_leaves_nothing_is_taken_where_a_textbook_effect_that_fits_alike_does_not(
     monkeypatch, deviance, textbook_suffices, member_suffices, named
 ):
     at = bench(base(), events(), ("magnetic_saturation",))
     refits = {f.names: f for f in (fit(1000.0, 0), fit(400.0, 1, "magnetic_saturation"))}
     member = fit(deviance, 4, "saturation_curve")
-    told = SimpleNamespace(fit=refits["magnetic_saturation",], noise=None, suffices=textbook_suffices)
+    told = SimpleNamespace(
+        fit=refits["magnetic_saturation",], noise=None, suffices=textbook_suffices
+    )
     monkeypatch.setattr(families, "starts", lambda *_: [])
     monkeypatch.setattr(families, "wide_refits", lambda *_: [member])
-    monkeypatch.setattr(families, "examine_fit", lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=member_suffices))
+    monkeypatch.setattr(
+        families,
+        "examine_fit",
+        lambda quiet, fit, *_: SimpleNamespace(fit=fit, suffices=member_suffices),
+    )
     tests, held_against = against_members(SimpleNamespace(context=at, quiet=None), told, refits, 0)
     assert tests.fit is (member if named else told.fit)
     assert held_against == ([member] if named or textbook_suffices else [])
 
 
 def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_better(monkeypatch):
-    """Of two that fit alike the one that asks for no further effect is chosen, and its tests are not the other's."""
+    """Of two that fit alike the one that asks for no further effect is chosen, and its tests are
+    not the other's.
+    """
     chosen, better, far = fit(104.0, 1, "chosen"), fit(100.0, 1, "better"), fit(300.0, 1, "far")
     bare = fit(1000.0, 0)
     rows = np.array([[0.0, 0.0], [2.0, 0.0], [14.0, 0.0]])
     at = SimpleNamespace(
-        criteria=Criteria(), catalogue=SimpleNamespace(textbook=lambda names: names),
+        criteria=Criteria(),
+        catalogue=SimpleNamespace(textbook=lambda names: names),
         effort=Effort(),
-        coordinates=SimpleNamespace(parameters=lambda names: []), rows=lambda *_: rows,
-    )  # fmt: skip
-    monkeypatch.setattr(
-        rival_sets, "refit", lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far]
+        coordinates=SimpleNamespace(parameters=lambda names: []),
+        rows=lambda *_: rows,
     )
-    monkeypatch.setattr(rival_sets, "examine_fit", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0))
+    monkeypatch.setattr(
+        rival_sets,
+        "refit",
+        lambda bench, noise, wanted: [bare] if wanted[0][0] == () else [better, chosen, far],
+    )
+    monkeypatch.setattr(
+        rival_sets, "examine_fit", lambda quiet, fit, *_, **__: SimpleNamespace(fit=fit, p_left=0.0)
+    )
     last = SimpleNamespace(fit=chosen, noise=None, p_left=1.0)
     explained = SimpleNamespace(
-        base=SimpleNamespace(context=at, quiet=None), last=last, chosen=chosen, faults=(),
-        steps=[SimpleNamespace(fit=bare, p_left=0.0)], refits={f.names: f for f in (bare, better, chosen, far)},
-    )  # fmt: skip
+        base=SimpleNamespace(context=at, quiet=None),
+        last=last,
+        chosen=chosen,
+        faults=(),
+        steps=[SimpleNamespace(fit=bare, p_left=0.0)],
+        refits={f.names: f for f in (bare, better, chosen, far)},
+    )
     evidence = rival_sets.compare_rivals(explained, 0)
-    assert [(row.fit.names, row.behind, row.tests and row.tests.fit.names) for row in evidence.rows] == [
+    assert [
+        (row.fit.names, row.behind, row.tests and row.tests.fit.names) for row in evidence.rows
+    ] == [
         (("chosen",), 0.0, ("chosen",)),
         (("better",), -4.0, ("better",)),
         (("far",), 196.0, None),
@@ -222,8 +265,9 @@ def test_the_chosen_set_comes_first_with_its_own_tests_though_another_fits_bette
     assert [row.fit.names for row in find_adequate(evidence, Criteria())] == [("chosen",)]
 
 
-def test_a_saturation_with_a_knee_is_named_by_its_family_though_the_textbooks_law_is_far_behind_a_compensator():
-    made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD, recorder=FAST)  # 4 detection limits
+def test_a_knee_saturation_is_named_by_its_family_though_the_textbook_is_far_behind_a_compensator():
+    # 4 detection limits
+    made = events("knee_saturation", 0.46, 312360453, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=("static_var_compensator", *CORE))
     refits = told.explanations.refits
     assert refits["magnetic_saturation",].deviance > refits["static_var_compensator",].deviance + 50
@@ -231,22 +275,40 @@ def test_a_saturation_with_a_knee_is_named_by_its_family_though_the_textbooks_la
 
 
 def test_a_place_that_the_textbooks_trip_imitates_is_named_where_the_held_out_dip_denies_that():
-    """That of the whole load leaves nothing of the fitted dips; of the held-out one only that of the motors does."""
+    """That of the whole load leaves nothing of the fitted dips; of the held-out one only that of
+    the motors does.
+    """
     made = events("motor_share_trip", 0.269, 762707680, count=4, noise=LOUD, recorder=FAST)
     told = investigate(base(), made[:3], made[3:], {}, {}, only=TRIPS[:1])
-    assert told.explanations.refits["undervoltage_trip",].deviance > told.explanations.refits["motor_trip",].deviance
+    assert (
+        told.explanations.refits["undervoltage_trip",].deviance
+        > told.explanations.refits["motor_trip",].deviance
+    )
     assert told.names == ("motor_trip",)
 
 
 def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
-    """What becomes of two explanations that cost so much in a fit to all events, the base model 500."""
-    at = SimpleNamespace(criteria=Criteria(), events=(), catalogue=SimpleNamespace(textbook=lambda names: names))
+    """What becomes of two explanations that cost so much in a fit to all events, the base model
+    500.
+    """
+    at = SimpleNamespace(
+        criteria=Criteria(), events=(), catalogue=SimpleNamespace(textbook=lambda names: names)
+    )
     fits = [fit(0.0, 1, name) for name in ("one", "other")]
-    joint = [JointFit(replace(f, deviance=cost - 2), 10.0, p) for f, cost, p in zip(fits, costs, p_left, strict=True)]
+    joint = [
+        JointFit(replace(f, deviance=cost - 2), 10.0, p)
+        for f, cost, p in zip(fits, costs, p_left, strict=True)
+    ]
     both = SimpleNamespace(
-        fitted=at, events=(), bare=fit(500.0, 0), plain=SimpleNamespace(cost=500.0), compare=lambda *_: joint,
-        is_undoubted=lambda fits: False, without_each=lambda fit: {}, fit_to_all=lambda fits: fits,
-    )  # fmt: skip
+        fitted=at,
+        events=(),
+        bare=fit(500.0, 0),
+        plain=SimpleNamespace(cost=500.0),
+        compare=lambda *_: joint,
+        is_undoubted=lambda fits: False,
+        without_each=lambda fit: {},
+        fit_to_all=lambda fits: fits,
+    )
     gains = {f.names: 100.0 if good else -100.0 for f, good in zip(fits, helps, strict=True)}
     judged = lambda context, events, bare, fits: {  # noqa: E731
         f.names: GapTest(None, None, gains[f.names], 10.0, 100.0, 10.8, None) for f in fits
@@ -258,12 +320,16 @@ def compared(costs, p_left=(1.0, 1.0), helps=(True, True)):
     ("costs", "p_left", "helps", "standing", "again"),
     [
         ((100.0, 105.0), (1.0, 1.0), (True, True), ["one", "other"], []),
-        ((100.0, 107.0), (1.0, 1.0), (True, True), ["one"], []),  # the other is too far behind on all events
-        ((107.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),  # what was open of it, all events tell
+        # the other is too far behind on all events
+        ((100.0, 107.0), (1.0, 1.0), (True, True), ["one"], []),
+        # what was open of it, all events tell
+        ((107.0, 100.0), (1.0, 1.0), (True, False), [], ["other"]),
         ((100.0, 105.0), (1.0, 0.04), (False, False), [], ["one", "other"]),  # no other is there
     ],
 )
-def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, helps, standing, again):
+def test_explanations_are_compared_on_all_events(
+    monkeypatch, costs, p_left, helps, standing, again
+):
     both, rows, judged = compared(costs, p_left, helps)
     monkeypatch.setattr(held_out, "compare_on", judged)
     assessed = assess(both, rows, 0)
@@ -280,12 +346,19 @@ def test_explanations_are_compared_on_all_events(monkeypatch, costs, p_left, hel
         (-5.0, 100.0, 130.0, ["other"]),
     ],
 )
-def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, expected, alone, needless):
+def test_of_two_effects_each_is_shown_over_the_other_alone(
+    monkeypatch, gain, expected, alone, needless
+):
     """The pair gains 200 over the base model, and as much over the other one of them."""
     both, _, _ = compared((100.0, 100.0))
-    pair, fewer = fit(0.0, 2, "one", "other"), {"one": fit(200.0, 1, "other"), "other": fit(alone, 1, "one")}
+    pair, fewer = (
+        fit(0.0, 2, "one", "other"),
+        {"one": fit(200.0, 1, "other"), "other": fit(alone, 1, "one")},
+    )
     joint = SimpleNamespace(fit=pair, p_left=1.0, is_confirmed=lambda criteria: False)
-    both = SimpleNamespace(**{**vars(both), "without_each": lambda fit: fewer, "compare": lambda *_: [joint]})
+    both = SimpleNamespace(
+        **{**vars(both), "without_each": lambda fit: fewer, "compare": lambda *_: [joint]}
+    )
 
     def judged(context, events, bare, fits):
         gap = (gain, 0.0, expected) if bare.names == ("one",) else (200.0, 0.0, 200.0)
@@ -297,7 +370,10 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, ex
     assert [name for name, gap in row.without.items() if gap.is_denied] == needless
     assert holds(row, Criteria()) == (not needless)
     verdict = decide(
-        Evidence(SetEvidence(fit(0.0, 0), (), (), p_left=0.0), (replace(row, behind=0.0, p_left=1.0),)), Criteria()
+        Evidence(
+            SetEvidence(fit(0.0, 0), (), (), p_left=0.0), (replace(row, behind=0.0, p_left=1.0),)
+        ),
+        Criteria(),
     )
     assert verdict.word == ("unexplained" if needless else "named" if gain >= 10.8 else "candidate")
 
@@ -314,10 +390,14 @@ def test_of_two_effects_each_is_shown_over_the_other_alone(monkeypatch, gain, ex
 def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, kept):
     gap = GapTest(None, None, 100.0, 5.0, 100.0, 10.8, None)
     rows = [
-        SetEvidence(fit(0.0, 1, name), (name,), (name,), behind=0.0, p_left=1.0, gap=gap, p_of_all=p)
+        SetEvidence(
+            fit(0.0, 1, name), (name,), (name,), behind=0.0, p_left=1.0, gap=gap, p_of_all=p
+        )
         for name, p in (("chosen", chosen), ("rival", rival))
     ]
-    verdict = decide(Evidence(SetEvidence(fit(0.0, 0), (), (), p_left=0.0), tuple(rows)), Criteria())
+    verdict = decide(
+        Evidence(SetEvidence(fit(0.0, 0), (), (), p_left=0.0), tuple(rows)), Criteria()
+    )
     assert [row.names[0] for row in verdict.kept] == kept
 
 
@@ -327,12 +407,16 @@ def test_an_explanation_is_kept_by_what_it_leaves_of_all_events(chosen, rival, k
         (((),), True),
         (((), ("a",)), True),
         (((), ("a",), ("a", "b")), False),
-        (((), ("a",), ("a",)), False),  # the pair led back to the same one: what follows would be the same search
+        # the pair led back to the same one: what follows would be the same search
+        (((), ("a",), ("a",)), False),
         (((), ("a",), ("b",)), True),
     ],
 )
 def test_a_second_effect_is_tried_and_no_third(sets, another):
-    assert worth_another([SimpleNamespace(fit=fit(0.0, len(names), *names)) for names in sets]) == another
+    assert (
+        worth_another([SimpleNamespace(fit=fit(0.0, len(names), *names)) for names in sets])
+        == another
+    )
 
 
 def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
@@ -348,13 +432,17 @@ def test_a_start_that_may_overtake_the_best_is_searched_on(monkeypatch):
     monkeypatch.setattr(fitting, "_run_descents", descended)
     monkeypatch.setattr(fitting, "_begun", descended)
     monkeypatch.setattr(fitting, "moved_across", lambda bench, noise, fit, faults: fit.unit)
-    ended = fitting._in_turns(at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None)
+    ended = fitting._in_turns(
+        at, None, [(("still",), np.zeros(1)), (("falls",), np.zeros(1))], None
+    )
     assert (ended[0].names, ended[0].deviance) == (("falls",), 60.0)
     assert len(turns) == 1 + fit_effort.MOST_TURNS
 
 
 @pytest.mark.usefixtures("no_proposal")
-def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt(monkeypatch):
+def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leaves_no_doubt(
+    monkeypatch,
+):
     """The relay trips there alone, and no event is left that the name would predict."""
     made = events("trip_in_two_stages", 0.09768, 1865577783, count=4, noise=LOUD, recorder=FAST)
     investigations, findings_of = [], investigating._findings
@@ -369,13 +457,19 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
     assert told.names == of_all.names == ("undervoltage_trip",)
     assert told.verdict.word == "candidate"
     assert told.closes_share
-    assert "only all events together show it, so all were fitted, and none is left to confirm it" in told.reason
+    assert (
+        "only all events together show it, so all were fitted, and none is left to confirm it"
+        in told.reason
+    )
     assert told.fitted_to_both
     assert not of_all.fitted_to_both
     assert (len(told.context.events), told.withheld, told.validate) == (4, (), None)
     assert doubtful.first.adequate
     assert doubtful.verdict.word == "unexplained"
-    assert "the fitted events alone show no disagreement, but all events together do" in doubtful.reason
+    assert (
+        "the fitted events alone show no disagreement, but all events together do"
+        in doubtful.reason
+    )
     assert recommendation(doubtful) == "fit the held-out events, too (data.train)"
     assert (
         doubtful.final_grade.adequacy.grade == "adequate"
@@ -387,17 +481,30 @@ def test_what_only_the_held_out_dip_shows_is_named_by_a_fit_of_all_if_that_leave
 
 @pytest.mark.parametrize(
     ("word", "closes", "chosen"),
-    [("unexplained", True, "of all"), ("unexplained", False, "as asked"), ("named", True, "as asked")],
+    [
+        ("unexplained", True, "of all"),
+        ("unexplained", False, "as asked"),
+        ("named", True, "as asked"),
+    ],
 )
-def test_all_events_are_fitted_where_nothing_is_named_and_their_name_closes_a_share(monkeypatch, word, closes, chosen):
+def test_all_events_are_fitted_where_nothing_is_named_and_their_name_closes_a_share(
+    monkeypatch, word, closes, chosen
+):
     """A name that predicts the held-out events is kept: that of all events predicts none."""
-    mild = SetEvidence(None, (), (), gap=GapTest(None, None, 1.0, 0.0, 1.0, 10.8, None))  # so that no term is sought
+    # so that no term is sought
+    mild = SetEvidence(None, (), (), gap=GapTest(None, None, 1.0, 0.0, 1.0, 10.8, None))
     held = Evidence(SetEvidence(None, (), (), p_of_all=0.0), (mild,))
     empty = dict.fromkeys(item.name for item in dataclasses.fields(investigating.Findings))
 
     def findings_of(base, validate, seed, grader):
-        found = {"evidence": held, "by_likelihood": held, "verdict": Verdict(word, (), complete=False)}
-        return investigating.Findings(**empty | found | {"withheld": "as asked" if validate else "of all"})
+        found = {
+            "evidence": held,
+            "by_likelihood": held,
+            "verdict": Verdict(word, (), complete=False),
+        }
+        return investigating.Findings(
+            **empty | found | {"withheld": "as asked" if validate else "of all"}
+        )
 
     monkeypatch.setattr(investigating.Findings, "closes_share", closes)
     monkeypatch.setattr(investigating.Findings, "base_values", None)
@@ -426,7 +533,10 @@ def test_members_belong_to_the_effects_that_are_asked_for():
 def test_a_member_is_no_candidate_of_the_first_search():
     missing = catalogue(base(), events(count=1))
     assert not {c.name for c in missing.candidates} & set(MEMBERS)
-    assert missing.textbook(("saturation_curve", "load_change")) == ("magnetic_saturation", "load_change")
+    assert missing.textbook(("saturation_curve", "load_change")) == (
+        "magnetic_saturation",
+        "load_change",
+    )
 
 
 def test_a_member_that_nests_the_textbook_starts_from_its_fit():
@@ -434,12 +544,17 @@ def test_a_member_that_nests_the_textbook_starts_from_its_fit():
     at = bench(base(), events(), CORE)
     unit = at.coordinates.null.copy()
     unit[at.coordinates.column["saturation"]] = at.coordinates.to_unit("saturation", 0.5)
-    refits = {(): Refit((), at.coordinates.null, 0.0, 0), ("magnetic_saturation",): Refit(CORE[:1], unit, 0.0, 1)}
+    refits = {
+        (): Refit((), at.coordinates.null, 0.0, 0),
+        ("magnetic_saturation",): Refit(CORE[:1], unit, 0.0, 1),
+    }
     member = at.catalogue["saturation_curve"]
     begun = [point for _, point in starts(at, member, refits)]
     assert len(begun) == len(open_settings(member, ("curve_saturation",)))
     textbook = at.residuals(unit[None], CORE[:1])[0]
-    apart = [np.abs(at.residuals(point[None], (member.name,))[0] - textbook).max() for point in begun]
+    apart = [
+        np.abs(at.residuals(point[None], (member.name,))[0] - textbook).max() for point in begun
+    ]
     assert min(apart) < 1e-12
     assert max(apart) > 1e-4
 
@@ -448,13 +563,19 @@ def two_stages(share):
     """A bench with the trip in two stages, and the textbook's fit of such a share."""
     at = bench(base(), events(), TRIPS[:1])
     unit = at.coordinates.placed(at.coordinates.null, {"tripped_share": share, "trip_level": 0.8})
-    return at, {(): Refit((), at.coordinates.null, 0.0, 0), TRIPS[:1]: Refit(TRIPS[:1], unit, 0.0, 6)}
+    return at, {
+        (): Refit((), at.coordinates.null, 0.0, 0),
+        TRIPS[:1]: Refit(TRIPS[:1], unit, 0.0, 6),
+    }
 
 
 def test_two_stages_begin_with_the_whole_of_one_or_with_halves():
     at, refits = two_stages(0.2)
     begun = [unit for _, unit in starts(at, at.catalogue["two_stage_trip"], refits)]
-    shares = {tuple(round(at.coordinates.value(f"stage_{k}_tripped", u), 6) for k in (1, 2)) for u in begun}
+    shares = {
+        tuple(round(at.coordinates.value(f"stage_{k}_tripped", u), 6) for k in (1, 2))
+        for u in begun
+    }
     assert shares == {(0.2, 0.02), (0.1, 0.1)}
 
 
@@ -476,17 +597,28 @@ def test_what_is_scattered_moves_all_times_and_no_size():
 
 
 def test_a_place_or_a_kind_that_there_is_not_is_refused_with_the_nearest():
-    about = {"__doc__": "a = b. Source: here.", "__module__": "elsewhere.stranger", "__annotations__": {}}
-    for told, sentence in (({"places": ("statc P",)}, "did you mean 'static P'"), ({"kind": "lags"}, "mean 'lag'")):
+    about = {
+        "__doc__": "a = b. Source: here.",
+        "__module__": "elsewhere.stranger",
+        "__annotations__": {},
+    }
+    for told, sentence in (
+        ({"places": ("statc P",)}, "did you mean 'static P'"),
+        ({"kind": "lags"}, "mean 'lag'"),
+    ):
         size = {"a": Parameter(0.0, (0.0, 1.0), "1", "size", "here", null=0.0)}
         made = type("Stranger", (Effect,), about | size | {"edit": lambda self, eq, a: None} | told)
         with pytest.raises(UserError, match=sentence):
             plugin(made)
 
 
-@pytest.mark.parametrize(("rounding", "least", "most"), [((0.01, 0.6), 0.0, 0.001), ((0.03, 0.0301), 0.005, 0.01)])
+@pytest.mark.parametrize(
+    ("rounding", "least", "most"), [((0.01, 0.6), 0.0, 0.001), ((0.03, 0.0301), 0.005, 0.01)]
+)
 def test_a_well_rounded_corner_follows_a_bounded_flux(rounding, least, most):
-    """Froelich's psi = a i / (b + i) with 0.7 of a before the dip; a sharp corner is ten times as far from it."""
+    """Froelich's psi = a i / (b + i) with 0.7 of a before the dip; a sharp corner is ten times as
+    far from it.
+    """
     names = ("curve_saturation", "saturation_bend", "saturation_corner", "saturation_rounding")
     effect = get("effect", "saturation_curve")()
 
@@ -494,13 +626,22 @@ def test_a_well_rounded_corner_follows_a_bounded_flux(rounding, least, most):
         law = effect.curve(flux_depth=1.0, **dict(zip(names, values, strict=True)))
         return law.y - ((1 - 0.7) / (1 - 0.7 * np.sqrt(1 - law.x)) - 1)
 
-    bounds = np.array([*({p.name: p.bounds for p in effect.parameters}[n] for n in names[:3]), rounding]).T
+    bounds = np.array(
+        [*({p.name: p.bounds for p in effect.parameters}[n] for n in names[:3]), rounding]
+    ).T
     found = least_squares(off, [1.0, -1.0, 0.2, np.mean(rounding)], bounds=bounds)
     assert least < np.abs(found.fun).max() < most
 
 
-@pytest.mark.parametrize("name", [n for n in MEMBERS if get("effect", n)().curve(**{
-    p.name: p.default for p in get("effect", n)().parameters}) is not None])  # fmt: skip
+@pytest.mark.parametrize(
+    "name",
+    [
+        n
+        for n in MEMBERS
+        if get("effect", n)().curve(**{p.name: p.default for p in get("effect", n)().parameters})
+        is not None
+    ],
+)
 def test_every_curve_is_monotone_whatever_its_bends(name):
     effect, rng = get("effect", name)(), np.random.default_rng(1)
     for _ in range(20):

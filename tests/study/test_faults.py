@@ -1,4 +1,6 @@
-"""Injected faults, a short run of `benchmarks/faults.py`, and that the stored long one lost nothing."""
+"""Injected faults, a short run of `benchmarks/faults.py`, and that the stored long one lost
+nothing.
+"""
 
 import json
 import os
@@ -23,7 +25,9 @@ def test_the_stored_run_lost_nothing():
 
 @pytest.fixture(scope="module")
 def some(tmp_path_factory):
-    """Faults of a search at its result and after it, and the first of its logging, other ones than are stored."""
+    """Faults of a search at its result and after it, and the first of its logging, other ones than
+    are stored.
+    """
     faults.ready()
     work, chance = tmp_path_factory.mktemp("faults"), random.Random(7)
     of_search = faults.jobs(faults.made(work / "jobs"), chance, (faults.RESULT, faults.RESULT + 1))
@@ -32,15 +36,20 @@ def some(tmp_path_factory):
 
 
 def test_a_search_loses_no_result_that_it_had_and_a_log_no_run(some):
-    assert {part: [f for f in found if f["lost"]] for part, found in some.items()} == {"jobs": [], "logging": []}
+    assert {part: [f for f in found if f["lost"]] for part, found in some.items()} == {
+        "jobs": [],
+        "logging": [],
+    }
     assert ["kill -9" in fault["fault"] for fault in some["jobs"]] == [True, True, False, False]
     assert len(some["logging"]) == 2
 
 
 def test_a_loss_would_be_seen(tmp_path):
     assert faults.told("a fault", "as it should be", "", "") == {
-        "fault": "a fault", "observed": "as it should be", "lost": False,
-    }  # fmt: skip
+        "fault": "a fault",
+        "observed": "as it should be",
+        "lost": False,
+    }
     assert faults.told("a fault", "x", "", "ANOTHER RESULT")["lost"]
     (tmp_path / "a.json").write_text('{"a"')
     assert faults.halves(tmp_path) == "NOT WHOLE: a.json"

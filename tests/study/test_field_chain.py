@@ -1,4 +1,6 @@
-"""From a recorder to parameters: the window that a record was seen through, and the shipped dips as COMTRADE."""
+"""From a recorder to parameters: the window that a record was seen through, and the shipped dips as
+COMTRADE.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,7 +21,9 @@ NAMES = ("tibet_30pct", "tibet_50pct", "tibet_65pct")
 
 
 def test_a_model_is_looked_at_through_the_window_where_it_follows_what_happens_within():
-    """Simulate, a problem and its least squares alike; the third order and a record without window are left alone."""
+    """Simulate, a problem and its least squares alike; the third order and a record without window
+    are left alone.
+    """
     [event] = tractexp.read("tibet_50pct_comtrade")
     bare = replace(event, record=replace(event.record, window=None))
     for name, looked in (("third_order_exponential", False), ("fifth_order_stator_flux", True)):
@@ -42,13 +46,19 @@ def test_the_voltage_reckoned_back_has_the_recorded_average():
 
 def test_the_script_makes_the_shipped_comtrade_bit_for_bit(tmp_path):
     made = make_tibet_comtrade.make(tmp_path)
-    assert sorted(path.name for path in made) == sorted(f"{name}{end}" for name in NAMES for end in (".cfg", ".dat"))
+    assert sorted(path.name for path in made) == sorted(
+        f"{name}{end}" for name in NAMES for end in (".cfg", ".dat")
+    )
     for path in made:
         there = DATA / path.name
         if path.suffix == ".cfg":
             assert path.read_bytes() == there.read_bytes()
-        else:  # the last bits of an integration differ by platform, and a step of the converter with them
-            raw = [np.frombuffer(p.read_bytes(), np.uint8).reshape(-1, 18)[:, 8:16].view("<i2") for p in (path, there)]
+        # the last bits of an integration differ by platform, and a step of the converter with them
+        else:
+            raw = [
+                np.frombuffer(p.read_bytes(), np.uint8).reshape(-1, 18)[:, 8:16].view("<i2")
+                for p in (path, there)
+            ]
             assert np.abs(raw[0].astype(int) - raw[1]).max() <= 1
         assert there.stat().st_size < 300_000
 
@@ -57,7 +67,11 @@ def test_the_script_makes_the_shipped_comtrade_bit_for_bit(tmp_path):
 def test_a_dip_as_comtrade_is_the_dip_as_csv(name):
     """The same load, dip and time; only the noise is another."""
     [csv], [event] = tractexp.read(name), tractexp.read(f"{name}_comtrade")
-    record, power, voltage = event.record, event.record.base.power / 10.0, event.record.base.voltage / 27.5
+    record, power, voltage = (
+        event.record,
+        event.record.base.power / 10.0,
+        event.record.base.voltage / 27.5,
+    )
     assert record.window.name == "one_cycle"
     assert voltage == pytest.approx(1, abs=1e-3)
     for mine, theirs, scale in (("U", "U", voltage), ("P", "P", power), ("Q", "Q", power)):

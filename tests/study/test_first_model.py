@@ -1,4 +1,6 @@
-"""The first model of a record in waveforms: what the record shows beside the load is in it, and nothing else."""
+"""The first model of a record in waveforms: what the record shows beside the load is in it, and
+nothing else.
+"""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,8 +15,13 @@ from tractexp.api.compose import model_of
 STATION = Path(__file__).parents[3] / "shared" / "data" / "dfr220kv-shandong" / "xtz.cfg"
 FIRST = {"voltages": [0, 1, 2], "currents": [16, 17, 18]}  # neutral earthed
 SECOND = {"voltages": [4, 5, 6], "currents": [8, 9, 10]}  # neutral isolated
-QUICK = {"domain": "waves", "optimizer": "multistart_least_squares", "budget": 600, "check_intervals": False,
-         "progress": False}  # fmt: skip
+QUICK = {
+    "domain": "waves",
+    "optimizer": "multistart_least_squares",
+    "budget": 600,
+    "check_intervals": False,
+    "progress": False,
+}
 
 
 def shown(events):
@@ -22,7 +29,9 @@ def shown(events):
 
 
 def beside(seed, *devices, delta=False):
-    """Events of a load that is drawn by lot, with more devices beside it, in phase-to-earth faults."""
+    """Events of a load that is drawn by lot, with more devices beside it, in
+    phase-to-earth faults.
+    """
     case = waves.case(seed, kind="phase to earth")
     faults = tuple(replace(fault, delta=delta) for fault in case.faults)
     return waves.events(replace(case, faults=faults, site=replace(case.site, more=devices)), seed)
@@ -31,7 +40,8 @@ def beside(seed, *devices, delta=False):
 def test_a_path_to_earth_is_in_the_model_where_the_neutral_is_earthed():
     assert shown(beside([2, 7])) == set()  # the voltage has zero sequence, and nothing is earthed
     assert shown(beside([2, 7], Earthed(0.2, 1.0))) == {"zero_sequence_path"}
-    assert shown(beside([2, 7], Earthed(0.2, 1.0), delta=True)) == set()  # earthed, and no zero sequence comes in
+    # earthed, and no zero sequence comes in
+    assert shown(beside([2, 7], Earthed(0.2, 1.0), delta=True)) == set()
 
 
 def test_harmonics_that_the_load_draws_are_in_the_model():
@@ -43,7 +53,8 @@ def test_a_capacitor_is_in_the_model_of_a_load_that_supplies_reactive_power():
     case = waves.case([2, 7], kind="two phases")
     rich = replace(case, site=replace(case.site, shunt=replace(case.site.shunt, B=1.2)))
     assert shown(waves.events(case, [2, 7])) == set()
-    assert "shunt_capacitor" in shown(waves.events(rich, [2, 7]))  # and harmonics, which it draws of the voltage's
+    # and harmonics, which it draws of the voltage's
+    assert "shunt_capacitor" in shown(waves.events(rich, [2, 7]))
 
 
 @pytest.mark.parametrize("data", ["tibet_50pct_comtrade", "tibet_65pct_comtrade"])
@@ -53,8 +64,11 @@ def test_the_shipped_records_show_nothing_beside_the_load(data):
 
 def test_a_model_that_is_asked_for_stays_as_it_is():
     events = beside([2, 7], Earthed(0.2, 1.0))
-    for model in (model_of("fifth_order_branch", "waves"), model_of(None, "waves").with_(shown_effects=False),
-                  model_of(None)):  # fmt: skip
+    for model in (
+        model_of("fifth_order_branch", "waves"),
+        model_of(None, "waves").with_(shown_effects=False),
+        model_of(None),
+    ):
         assert model.fitting(events) is model
 
 
@@ -70,7 +84,9 @@ def test_what_carries_the_network_alone_is_told_in_a_line_and_not_in_the_table()
     fit = tractexp.identify(beside([2, 7], Earthed(0.2, 1.0)), **QUICK)
     result = fit.result
     assert set(result.shown_effects) == {"zero_sequence_path"}
-    assert result.nuisances == {n: result.parameters[n] for n in ("zero_susceptance", "zero_resistance")}
+    assert result.nuisances == {
+        n: result.parameters[n] for n in ("zero_susceptance", "zero_resistance")
+    }
     one = result.base.ratio  # the generator's base is the file's
     assert result.nuisances["zero_resistance"] == pytest.approx(0.2, rel=0.05)
     assert result.nuisances["zero_susceptance"] * one == pytest.approx(1.0, rel=0.05)
@@ -91,7 +107,9 @@ def test_a_load_with_a_path_to_earth_has_an_operating_point_and_an_export():
 
 @pytest.mark.skipif(not STATION.is_file(), reason="../shared/data is not here")
 def test_a_real_station_is_fitted_by_its_default_model():
-    """Before the first transformer's path to earth was in it, 219 and 253 % of the current were left."""
+    """Before the first transformer's path to earth was in it, 219 and 253 % of the current were
+    left.
+    """
     first, second = (tractexp.read(str(STATION), **channels) for channels in (FIRST, SECOND))
     assert shown(first[:1]) == {"zero_sequence_path", "harmonics_source", "shunt_capacitor"}
     assert shown(second[:1]) == set()

@@ -1,4 +1,6 @@
-"""The judgement set: seeds that nobody chose, tables that hold what is stored, and what others would pick."""
+"""The judgement set: seeds that nobody chose, tables that hold what is stored, and what others
+would pick.
+"""
 
 import itertools
 import json
@@ -27,11 +29,15 @@ def test_the_docs_hold_what_the_stored_rows_hold():
 
 
 def test_seeds_follow_from_the_commit_that_froze_product_and_generator():
-    """Nobody chose them: of each row they are the first ones of the series that the hash starts, none left out."""
+    """Nobody chose them: of each row they are the first ones of the series that the hash starts,
+    none left out.
+    """
     (frozen,) = {row["frozen"] for row in ROWS}
     seen: dict[tuple[str, str], list[int]] = {}
     for row in ROWS:
-        seen.setdefault((row["group"], series_of(row["group"], row["label"])), []).append(row["seed"])
+        seen.setdefault((row["group"], series_of(row["group"], row["label"])), []).append(
+            row["seed"]
+        )
     for (group, label), seeds in seen.items():
         series = study.cases.seeds(label, int(frozen[:12], 16))
         assert sorted(seeds) == sorted(itertools.islice(series, len(seeds))), (group, label)
@@ -41,15 +47,21 @@ def series_of(group: str, label: str) -> str:
     """Of which series of seeds a row's is: one for all pairs, all inexact loads."""
     shared = {"pairs": "pairs", "null, error": "inexact"}
     own = {"null, ": f"null {label}", "field": f"field {label}", "loud": f"loud {label}"}
-    return next((series for start, series in (shared | own).items() if group.startswith(start)), label)
+    return next(
+        (series for start, series in (shared | own).items() if group.startswith(start)), label
+    )
 
 
 def test_what_naming_may_spend_is_calibrated_on_development_seeds():
-    """All false alarms are within `false_alarms`, which twice the level would exceed; no data set is left out."""
+    """All false alarms are within `false_alarms`, which twice the level would exceed; no data set
+    is left out.
+    """
     rows = json.loads(false_alarms.RESULTS.read_text())
     for noise in study.cases.NOISES:
         own = [row["seed"] for row in rows if row["noise"] == noise]
-        assert own == [p.seed for p in itertools.islice(study.cases.nulls(noise, events=4), len(own))]
+        assert own == [
+            p.seed for p in itertools.islice(study.cases.nulls(noise, events=4), len(own))
+        ]
     assert len(rows) >= 300
     found, level = false_alarms.shares(rows), Criteria().naming
     assert found[round(level, 6)] < Criteria().false_alarms < found[round(2 * level, 6)]
@@ -65,7 +77,9 @@ def test_plugins_of_another_copy_are_refused(monkeypatch, tmp_path):
     """An editable installation gives its own plugins to whatever copy of the package is run."""
     import tractexp_plugins
 
-    monkeypatch.setattr(study.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=0, stdout="0" * 40))
+    monkeypatch.setattr(
+        study.subprocess, "run", lambda *_, **__: SimpleNamespace(returncode=0, stdout="0" * 40)
+    )
     monkeypatch.setattr(tractexp_plugins, "__file__", str(tmp_path / "plugins" / "__init__.py"))
     with pytest.raises(SystemExit, match=f"tractexp_plugins is that of {tmp_path}, not of"):
         study.commit_of("HEAD")
@@ -75,14 +89,19 @@ def test_what_is_called_a_right_proposal_is_of_the_library_and_of_strangers():
     from tractexp.discrepancy.proposal import library
 
     assert evidence.RIGHT.keys() == OUTSIDE.keys() - study.KNOWN.keys()
-    known = {"balances": {b.name for b in library.BALANCES}, "signals": {s.name for s in library.SIGNALS}}
+    known = {
+        "balances": {b.name for b in library.BALANCES},
+        "signals": {s.name for s in library.SIGNALS},
+    }
     for balances, signals in evidence.RIGHT.values():
         assert balances <= known["balances"]
         assert signals <= known["signals"]
 
 
 def investigated(seed: int, sizes: dict[str, float]) -> SimpleNamespace:
-    """What `sparse` reads of an investigation: 12 candidates in white noise, those of `sizes` hidden."""
+    """What `sparse` reads of an investigation: 12 candidates in white noise, those of `sizes`
+    hidden.
+    """
     rng = np.random.default_rng(seed)
     names = [f"effect{k}" for k in range(12)]
     blocks = [rng.standard_normal((1, 400)) for _ in names]
@@ -92,12 +111,16 @@ def investigated(seed: int, sizes: dict[str, float]) -> SimpleNamespace:
     columns = [SimpleNamespace(candidate=SimpleNamespace(name=n), setting={}) for n in names]
     scores = [SimpleNamespace(name=n, setting={}) for n in names]
     return SimpleNamespace(
-        first=SimpleNamespace(projection=SimpleNamespace(columns=columns, blocks=blocks, r=r[None]), scores=scores)
+        first=SimpleNamespace(
+            projection=SimpleNamespace(columns=columns, blocks=blocks, r=r[None]), scores=scores
+        )
     )
 
 
 def test_sparse_regression_keeps_what_is_there_and_little_else():
-    pytest.importorskip("pysindy", reason="PySINDy is not installed: pip install 'tractexp[crosscheck]'")
+    pytest.importorskip(
+        "pysindy", reason="PySINDy is not installed: pip install 'tractexp[crosscheck]'"
+    )
     assert sparse(investigated(0, {"effect3": 12.0, "effect7": -9.0})) == ["effect3", "effect7"]
     alarms = sum(bool(sparse(investigated(seed, {}))) for seed in range(200))
     assert 2 <= alarms <= 22, "one in twenty of 200, and three standard deviations to either side"
@@ -105,12 +128,28 @@ def test_sparse_regression_keeps_what_is_there_and_little_else():
 
 def row(**changes) -> dict:
     return {
-        "group": "4 x", "label": "load_change", "truth": ["load_change"], "seed": 1, "held": 1, "events": 4,
-        "multiples": [4.0], "verdict": "named", "names": ["load_change"], "sets": [["load_change"]], "untestable": [],
-        "sparse": ["load_change"], "samples": 6000, "proposal": None, "seconds": 1.0,
-        "refits": [[["load_change"], 20.0, 1], [["time_skew"], 3.0, 1], [["load_change", "time_skew"], 22.5, 2]],
+        "group": "4 x",
+        "label": "load_change",
+        "truth": ["load_change"],
+        "seed": 1,
+        "held": 1,
+        "events": 4,
+        "multiples": [4.0],
+        "verdict": "named",
+        "names": ["load_change"],
+        "sets": [["load_change"]],
+        "untestable": [],
+        "sparse": ["load_change"],
+        "samples": 6000,
+        "proposal": None,
+        "seconds": 1.0,
+        "refits": [
+            [["load_change"], 20.0, 1],
+            [["time_skew"], 3.0, 1],
+            [["load_change", "time_skew"], 22.5, 2],
+        ],
         "imperfect": False,
-    } | changes  # fmt: skip
+    } | changes
 
 
 @pytest.mark.parametrize(
@@ -122,8 +161,14 @@ def row(**changes) -> dict:
     ],
 )
 def test_names_are_counted_by_law(changes, named, right):
-    table = evidence.tables([row(**changes), row(group="law 4 x", label="drift_of_active_power", **changes)])
-    lines = [line for line in table.splitlines() if line.startswith(("| 4 x, the catalogue's", "| 4 x, another law"))]
+    table = evidence.tables(
+        [row(**changes), row(group="law 4 x", label="drift_of_active_power", **changes)]
+    )
+    lines = [
+        line
+        for line in table.splitlines()
+        if line.startswith(("| 4 x, the catalogue's", "| 4 x, another law"))
+    ]
     for line in lines:
         assert line.split(" | ")[2:4] == [named, right]
     assert len(lines) == 2
@@ -138,15 +183,30 @@ def test_criteria_choose_among_all_sets_that_were_fitted():
 
 
 @pytest.mark.parametrize(
-    ("balance", "signal", "right"), [("power", "step", 1), ("static", "step", 0), ("power", "ramp", 0)]
+    ("balance", "signal", "right"),
+    [("power", "step", 1), ("static", "step", 0), ("power", "ramp", 0)],
 )
 def test_proposals_are_right_by_balance_and_signal(balance, signal, right):
-    made = {"balance": balance, "signal": signal, "clock": "of_return", "closed": {"train": 1.0, "validate": 0.9}}
+    made = {
+        "balance": balance,
+        "signal": signal,
+        "clock": "of_return",
+        "closed": {"train": 1.0, "validate": 0.9},
+    }
     stranger = row(
-        group="outside 4 x", label="two_load_steps", truth=["two_load_steps"], verdict="unexplained", names=[], sets=[]
+        group="outside 4 x",
+        label="two_load_steps",
+        truth=["two_load_steps"],
+        verdict="unexplained",
+        names=[],
+        sets=[],
     )
     table = evidence.tables([stranger | {"proposal": made, "lambda_left": 100.0}])
-    (line,) = [line for line in table.splitlines() if line.startswith("| outside the catalogue, above 80 |")]
+    (line,) = [
+        line
+        for line in table.splitlines()
+        if line.startswith("| outside the catalogue, above 80 |")
+    ]
     assert line.strip("| ").split(" | ")[-2:] == ["1", str(right)]
 
 

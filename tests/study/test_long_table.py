@@ -20,7 +20,14 @@ def test_a_million_rows_take_about_a_second_and_memory_like_the_file(tmp_path, m
     n = 1_000_000
     t = np.arange(n) * 1e-3
     U = np.where((t > 500) & (t < 500.2), 0.6, 1.0)
-    np.savetxt("big.csv", np.column_stack([t, U, 0.8 * U, 0.6 * U]), "%.6g", ",", header="t,U,P,Q", comments="")
+    np.savetxt(
+        "big.csv",
+        np.column_stack([t, U, 0.8 * U, 0.6 * U]),
+        "%.6g",
+        ",",
+        header="t,U,P,Q",
+        comments="",
+    )
     reader = build("data", {"name": "csv", "train": ["big.csv"]})
     begin = time.process_time()
     assert reader.read().train[0].samples == n
@@ -42,12 +49,18 @@ def hour(rows: int) -> Record:
 def test_an_event_of_a_long_table_is_the_part_about_its_dip(rows):
     whole = detect(hour(rows))
     part = around(whole)
-    assert part.record.samples == 6_009  # whatever the table holds: a minute before, the dip, a minute after
+    # whatever the table holds: a minute before, the dip, a minute after
+    assert part.record.samples == 6_009
     assert (part.t_start, part.depth, part.P0, part.noise_P) == (
-        whole.t_start, whole.depth, pytest.approx(whole.P0), pytest.approx(whole.noise_P, abs=1e-12),
-    )  # fmt: skip
+        whole.t_start,
+        whole.depth,
+        pytest.approx(whole.P0),
+        pytest.approx(whole.noise_P, abs=1e-12),
+    )
     assert digest(part.record) == digest(whole.record)
-    assert part.record.notes == (f"of {rows / 50:.0f} s those from 90 to 210 s are used, about the first dip",)
+    assert part.record.notes == (
+        f"of {rows / 50:.0f} s those from 90 to 210 s are used, about the first dip",
+    )
 
 
 def test_shorter_records_are_as_they_are():
@@ -56,7 +69,9 @@ def test_shorter_records_are_as_they_are():
 
 
 def test_the_step_of_a_long_record_is_that_of_its_dip():
-    """A motor that stalled runs away ever faster: an hour of that would ask for the finest step there is."""
+    """A motor that stalled runs away ever faster: an hour of that would ask for the finest step
+    there is.
+    """
     load = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     steps = [Problem(load, [swung(length)]).step.substeps.tolist() for length in (20.0, 120.0)]
     assert steps == [[32], [32]]

@@ -1,4 +1,6 @@
-"""The size of a model's error: known answers, noise and drift told from it, the headline, `result.json` and MLflow."""
+"""The size of a model's error: known answers, noise and drift told from it, the headline,
+`result.json` and MLflow.
+"""
 
 import functools
 import json
@@ -11,7 +13,13 @@ from scipy import stats
 
 import tractexp
 from tractexp.identification.result import Fit
-from tractexp.inference.model_error import ModelError, block_sums, in_percent, model_error, noise_variance
+from tractexp.inference.model_error import (
+    ModelError,
+    block_sums,
+    in_percent,
+    model_error,
+    noise_variance,
+)
 from tractexp.noise.random_walk import WANDERING_COSINES
 
 
@@ -23,10 +31,16 @@ def shaped(depth):
 
 
 def played(off_P=0.0, off_Q=0.0, noise=0.0, drift=0.0, seed=0, depth=0.5, name="dip", base=1.0):
-    """An event of the printed equations, and a model that is off by a share of the response in P and in Q."""
+    """An event of the printed equations, and a model that is off by a share of the response in P
+    and in Q.
+    """
     t, U, clean = shaped(depth)
     rng = np.random.default_rng(seed)
-    power = clean + noise * rng.standard_normal(clean.shape) + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
+    power = (
+        clean
+        + noise * rng.standard_normal(clean.shape)
+        + drift * np.array([[1.0], [0.0]]) * (t - 0.15)
+    )
     event = study.event(t, U, base * power, name)
     response = clean - clean[:, :1]
     P, Q = base * (clean[0] + off_P * response[0]), base * (clean[1] + off_Q * response[1])
@@ -40,7 +54,9 @@ def test_a_model_that_follows_nine_tenths_of_the_response_is_off_by_a_tenth():
     fit = played()
     S = (fit.P + 1j * fit.Q)[fit.event.start :]
     response = np.abs(S - S_before(fit))
-    assert error.of_S == pytest.approx(0.1 * np.sqrt(np.mean(response**2) / np.mean(np.abs(S) ** 2)), rel=1e-3)
+    assert error.of_S == pytest.approx(
+        0.1 * np.sqrt(np.mean(response**2) / np.mean(np.abs(S) ** 2)), rel=1e-3
+    )
 
 
 def S_before(fit):
@@ -67,26 +83,39 @@ def test_a_drift_before_the_dip_is_no_noise():
 
 
 def test_a_short_record_has_as_many_blocks_as_one_of_a_second():
-    """0.24 s of it has ten blocks of 24 ms; together with a long one it has blocks of a tenth of a second."""
+    """0.24 s of it has ten blocks of 24 ms; together with a long one it has blocks of a tenth of a
+    second.
+    """
     long = played(-0.1, -0.1)
     end = long.event.start + 120
     record = long.event.record
     cut = {name: getattr(record, name)[:end] for name in ("t", "U", "P", "Q")}
-    short = replace(long, event=replace(long.event, record=replace(record, **cut)), P=long.P[:end], Q=long.Q[:end])
+    short = replace(
+        long,
+        event=replace(long.event, record=replace(record, **cut)),
+        P=long.P[:end],
+        Q=long.Q[:end],
+    )
     assert [len(sums) for sums in block_sums([short])] == [10]
     assert [len(sums) for sums in block_sums([short, long])] == [3, len(block_sums([long])[0])]
 
 
 def test_blocks_are_shortened_until_so_many_share_the_response():
-    """A dip of a tenth of a second is one block in seventeen; ten share it at a cycle, which is the shortest."""
+    """A dip of a tenth of a second is one block in seventeen; ten share it at a cycle, which is the
+    shortest.
+    """
     fit = played(-0.1, -0.1)
     record, start = fit.event.record, fit.event.start
-    response = np.abs((record.P + 1j * record.Q)[start:] - S_before(fit)) ** 2 - noise_variance(fit.event)
+    response = np.abs((record.P + 1j * record.Q)[start:] - S_before(fit)) ** 2 - noise_variance(
+        fit.event
+    )
 
     def sharing(sums):
         return sums[0][:, 1].sum() ** 2 / np.sum(sums[0][:, 1] ** 2)
 
-    whole, some, cycles = (block_sums([fit], blocks) for blocks in (0.0, 1.5 * sharing(block_sums([fit])), 1e9))
+    whole, some, cycles = (
+        block_sums([fit], blocks) for blocks in (0.0, 1.5 * sharing(block_sums([fit])), 1e9)
+    )
     assert sharing(some) >= 1.5 * sharing(whole)
     assert len(whole[0]) < len(some[0]) < len(cycles[0]) == -(-len(response) // 10)
     assert cycles[0][:, 1].sum() == pytest.approx(response.sum())
@@ -115,7 +144,10 @@ def test_what_is_missing_of_the_record_counts_nowhere_and_what_diverged_counts_w
     P[300:320] = np.nan
     gaps = replace(fit, event=replace(fit.event, record=replace(fit.event.record, P=P)))
     assert model_error([gaps]).value == pytest.approx(0.1, rel=1e-3)
-    assert model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value == np.inf
+    assert (
+        model_error([replace(fit, P=np.where(fit.event.record.t > 1, np.nan, fit.P))]).value
+        == np.inf
+    )
 
 
 def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
@@ -128,7 +160,9 @@ def test_the_interval_is_that_of_leaving_out_each_block_in_turn():
     block = np.arange(len(S)) // 50
     squares = [left[block != b].sum() / response[block != b].sum() for b in range(block[-1] + 1)]
     whole, count = left.sum() / response.sum(), len(squares)
-    reach = stats.t.ppf(0.975, count - 1) * np.sqrt((count - 1) / count * np.sum((squares - whole) ** 2))
+    reach = stats.t.ppf(0.975, count - 1) * np.sqrt(
+        (count - 1) / count * np.sum((squares - whole) ** 2)
+    )
     error = model_error([fit])
     assert error.square == pytest.approx(whole)
     assert error.interval == pytest.approx((np.sqrt(max(whole - reach, 0)), np.sqrt(whole + reach)))
@@ -145,7 +179,10 @@ def test_an_error_depends_on_no_base_and_comes_back_as_it_was_stored():
 
 def test_too_few_samples_before_a_dip_show_no_noise():
     event = played(noise=4e-3).event
-    shorter = [replace(event, steady=slice(0, n)) for n in (4 * WANDERING_COSINES, 4 * WANDERING_COSINES + 1)]
+    shorter = [
+        replace(event, steady=slice(0, n))
+        for n in (4 * WANDERING_COSINES, 4 * WANDERING_COSINES + 1)
+    ]
     assert noise_variance(shorter[0]) == 0.0 < noise_variance(shorter[1])
 
 
@@ -167,16 +204,28 @@ def fit():
     dips = []
     for k, depth in enumerate((0.5, 0.3)):
         t, U = study.Shape(depth).voltage()
-        power = study.printed(study.TYPICAL, t, U, 0.35) + 0.02 * (t > 0.85) * np.array([[1.0], [0.0]])
-        dips.append(study.event(t, U, power + 0.002 * rng.standard_normal(power.shape), f"dip {k + 1}"))
-    small = {"model": "third_order_exponential", "optimizer": "pso", "budget": 2000, "progress": False}
+        power = study.printed(study.TYPICAL, t, U, 0.35) + 0.02 * (t > 0.85) * np.array(
+            [[1.0], [0.0]]
+        )
+        dips.append(
+            study.event(t, U, power + 0.002 * rng.standard_normal(power.shape), f"dip {k + 1}")
+        )
+    small = {
+        "model": "third_order_exponential",
+        "optimizer": "pso",
+        "budget": 2000,
+        "progress": False,
+    }
     return tractexp.identify(dips[:1], validate=dips[1:], **small, check_intervals=False)
 
 
 def test_result_json_and_the_headline_tell_it(fit, tmp_path):
     fit.write_results(tmp_path)
     told = json.loads((tmp_path / "result.json").read_text())["model_error"]
-    assert [(e["name"], e["role"]) for e in told["events"]] == [("dip 1", "train"), ("dip 2", "validate")]
+    assert [(e["name"], e["role"]) for e in told["events"]] == [
+        ("dip 1", "train"),
+        ("dip 2", "validate"),
+    ]
     assert told["value"] == told["events"][0]["value"] == fit.model_error.value
     assert told["held_out"]["value"] == told["events"][1]["value"] == fit.model_error_held_out.value
     low, high = told["interval"]
@@ -199,7 +248,11 @@ def test_a_rival_structure_is_told_of_the_parameters_that_it_moves_by_more_than_
     error, value = fit.result.standard_errors, fit.result.parameters
     near, far = value["M"] + 1.9 * error["M"], value["T_m"] - 2.1 * error["T_m"]
     rivals = [
-        {"name": "zip", "objective_ratio": 1.0, "parameters": {"M": near, "T_m": value["T_m"] - 2.05 * error["T_m"]}},
+        {
+            "name": "zip",
+            "objective_ratio": 1.0,
+            "parameters": {"M": near, "T_m": value["T_m"] - 2.05 * error["T_m"]},
+        },
         {"name": "second_cage", "objective_ratio": 0.9, "parameters": {"M": near, "T_m": far}},
     ]
     told = replace(fit, result=replace(fit.result, rival_structures=rivals))

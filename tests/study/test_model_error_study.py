@@ -1,4 +1,6 @@
-"""What judges the estimate is right itself: truths of ANDES's motors on a record's base, and the rule of chance."""
+"""What judges the estimate is right itself: truths of ANDES's motors on a record's base, and the
+rule of chance.
+"""
 
 import json
 from pathlib import Path
@@ -30,19 +32,33 @@ def test_the_shares_of_a_zip_load_count_from_the_voltage_before():
     terms = {"P": (0.2, 0.3 / 0.9, 0.5 / 0.9**2), "Q": (0.0, 0.0, 1.0)}
     at_flow, lower = (andes_loads.composition(terms, U0) for U0 in (0.9, 0.8))
     assert (at_flow["a_Z"], at_flow["a_I"], at_flow["p_v"]) == pytest.approx((0.5, 0.3, 1.3))
-    slope = 0.8 * (0.3 / 0.9 + 2 * 0.5 / 0.9**2 * 0.8) / (0.2 + 0.3 * 0.8 / 0.9 + 0.5 * (0.8 / 0.9) ** 2)
+    slope = (
+        0.8
+        * (0.3 / 0.9 + 2 * 0.5 / 0.9**2 * 0.8)
+        / (0.2 + 0.3 * 0.8 / 0.9 + 0.5 * (0.8 / 0.9) ** 2)
+    )
     assert lower["p_v"] == pytest.approx(slope)
     assert (lower["b_Z"], lower["q_v"]) == (1.0, 2.0)
 
 
 def test_series_never_share_a_seed():
-    draws = {(s, k): andes_loads.generator(s, k).random() for s in ("calibration", "final") for k in range(100)}
+    draws = {
+        (s, k): andes_loads.generator(s, k).random()
+        for s in ("calibration", "final")
+        for k in range(100)
+    }
     assert len(set(draws.values())) == len(draws)
 
 
 def test_a_jump_lies_between_samples_and_the_frequency_holds_the_angle_s():
-    """A record of a series of two steps: levels before, in and after the fault, and the area under the frequency."""
-    t = np.sort(np.concatenate([np.arange(0, andes_loads.AT + andes_loads.LENGTH, 1 / 480), [0.0201, 0.12, 0.1201]]))
+    """A record of a series of two steps: levels before, in and after the fault, and the area under
+    the frequency.
+    """
+    t = np.sort(
+        np.concatenate(
+            [np.arange(0, andes_loads.AT + andes_loads.LENGTH, 1 / 480), [0.0201, 0.12, 0.1201]]
+        )
+    )
     inside = (t > andes_loads.AT + 1e-9) & (t <= 0.12 + 1e-9)
     level, angle = np.where(inside, 0.6, 1.0), np.where(inside, 0.1, 0.0)
     rows = {"t": t, "U": level, "P": 2 * level, "Q": level, "angle": angle}
@@ -71,7 +87,9 @@ def test_an_error_of_the_same_size_is_chance_and_one_of_twice_the_square_is_not(
 
 
 def test_few_alarms_where_a_short_record_s_error_is_correlated_and_fades():
-    """Two dips of 0.2 s at 1067 Hz, as those of station xtz: errors of one size, correlated over 20 ms."""
+    """Two dips of 0.2 s at 1067 Hz, as those of station xtz: errors of one size, correlated over 20
+    ms.
+    """
     from scipy.signal import lfilter
 
     rng, t = np.random.default_rng(3), np.arange(213) / 1067
@@ -79,7 +97,9 @@ def test_few_alarms_where_a_short_record_s_error_is_correlated_and_fades():
 
     def error() -> Compared:
         white = rng.normal(size=(2, len(t) + 500))
-        colored = lfilter([np.sqrt(1 - memory**2)], [1, -memory], white)[:, 500:] * np.exp(-t / 0.05)
+        colored = lfilter([np.sqrt(1 - memory**2)], [1, -memory], white)[:, 500:] * np.exp(
+            -t / 0.05
+        )
         return Compared(t, (colored**2).sum(axis=0), np.ones_like(t))
 
     alarms = [worse_than_chance([error(), error()], [error(), error()]) for _ in range(400)]

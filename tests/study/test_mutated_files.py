@@ -1,4 +1,6 @@
-"""Damaged files of every format: a reading, or one sentence (a short run of `benchmarks/mutated_files.py`)."""
+"""Damaged files of every format: a reading, or one sentence (a short run of
+`benchmarks/mutated_files.py`).
+"""
 
 import json
 from pathlib import Path
@@ -48,19 +50,25 @@ def test_a_file_of_a_damaged_structure_is_read_or_refused_with_a_sentence(sound,
         assert words.strip() or kind == "read"
 
 
-@pytest.mark.parametrize("words", ["invalid literal for int() with base 10: '7A'", "month must be in 1..12"])
+@pytest.mark.parametrize(
+    "words", ["invalid literal for int() with base 10: '7A'", "month must be in 1..12"]
+)
 def test_words_of_python_are_found(words):
     assert LEAKS.search(words)
 
 
 def test_the_page_tells_what_the_stored_run_of_ten_thousand_gave():
     stored = json.loads((BENCHMARKS / "mutated_files.json").read_text(encoding="utf-8"))
-    told = {key: sum(c.get(key, 0) for c in stored["counts"].values()) for key in next(iter(stored["counts"].values()))}
+    told = {
+        key: sum(c.get(key, 0) for c in stored["counts"].values())
+        for key in next(iter(stored["counts"].values()))
+    }
     page = " ".join((BENCHMARKS.parent / "docs" / "records.md").read_text(encoding="utf-8").split())
     assert stored["files"] == sum(told.values()) == 10_000
     assert stored["bad"] == []
     assert (
-        f"{told['refused']:,} were refused with a sentence, {told['read as undamaged']:,} read as if undamaged and "
+        f"{told['refused']:,} were refused with a sentence, {told['read as undamaged']:,} read as"
+        " if undamaged and "
         f"{told['read as it now stands']:,} as they then stood"
     ) in page
     assert f"the slowest took {stored['worst']['seconds']:.1f} s" in page

@@ -1,7 +1,8 @@
-"""What to record next: the chances are those of the product's own decision, and what is recommended ends a tie.
+"""What to record next: the chances are those of the product's own decision, and what is recommended
+ends a tie.
 
-The events come from the independent generator of `tests/oracle/hidden_effects`. The study over many ties, which counts
-how often the predicted chances come true, is `benchmarks/next_event.py`.
+The events come from the independent generator of `tests/oracle/hidden_effects`. The study over many
+ties, which counts how often the predicted chances come true, is `benchmarks/next_event.py`.
 """
 
 import json
@@ -50,10 +51,14 @@ NOISE, SEED = Noise(0.004), 931034
 
 
 class LeakageLoss(Effect):
-    """The stator's resistance told as a share of the leakage reactance: the same equation in another parameter."""
+    """The stator's resistance told as a share of the leakage reactance: the same equation in
+    another parameter.
+    """
 
     name = "leakage_loss"
-    loss = Parameter(0.0, (-0.2, 1.5), "1", "resistance over reactance of the stator", "a test", null=0.0)
+    loss = Parameter(
+        0.0, (-0.2, 1.5), "1", "resistance over reactance of the stator", "a test", null=0.0
+    )
     parameters = (loss,)
     places, kind = ("stator impedance",), "law"
 
@@ -68,8 +73,12 @@ def hidden(*dips, effect="speed_dependent_torque", size=0.9):
 
 
 def recorded(made):
-    noisy = [NOISE.add(r, np.random.default_rng([SEED, 2, k])) for k, r in enumerate(made.records())]
-    return [detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)]
+    noisy = [
+        NOISE.add(r, np.random.default_rng([SEED, 2, k])) for k, r in enumerate(made.records())
+    ]
+    return [
+        detect(Record(f"event{k}", **r, source=f"made {k}").check()) for k, r in enumerate(noisy, 1)
+    ]
 
 
 def judged(events):
@@ -87,9 +96,14 @@ def alike():
     events, model = recorded(hidden(*MILD, effect="stator_resistance", size=1.0)), base()
     known = catalogue(model, events, ("stator_resistance", "speed_dependent_torque"))
     bench = Context.of(
-        model, Catalogue((*known.candidates, candidate(LeakageLoss())), {}), Records.of(events), {}, {}, Criteria(),
+        model,
+        Catalogue((*known.candidates, candidate(LeakageLoss())), {}),
+        Records.of(events),
+        {},
+        {},
+        Criteria(),
         Effort(),
-    )  # fmt: skip
+    )
     found, at = base_fit(bench), bench.coordinates
     starts = []
     for name, label, value in (
@@ -111,7 +125,13 @@ def test_two_rivals_tie_and_the_recommended_event_ends_the_tie(tied):
     assert chosen.probability >= DECIDED
     assert chosen.sentence().startswith(f"record {chosen.best.event.words}: it tells ")
     event = chosen.best.event
-    dip = Dip(depth=event.depth, start=0.5, duration=event.duration, fall=PHASORS.dips.edge, rise=PHASORS.dips.edge)
+    dip = Dip(
+        depth=event.depth,
+        start=0.5,
+        duration=event.duration,
+        fall=PHASORS.dips.edge,
+        rise=PHASORS.dips.edge,
+    )
     made = hidden(*MILD)
     more = replace(made, dips=(*made.dips, dip), static=(*made.static, made.static[0]))
     after = judged(recorded(more))
@@ -136,7 +156,9 @@ def test_an_equation_in_another_parameter_is_proved_to_be_the_same(alike):
     assert proof.rank == len(bench.coordinates.base) + 1
     chosen = next_event(bench, noise, bare, pair, ["copper", "loss"])
     assert [(a, b) for a, b, _ in chosen.same] == [(0, 1)]
-    assert chosen.sentence().startswith("copper and loss cannot be told apart by any dip at this bus: over ")
+    assert chosen.sentence().startswith(
+        "copper and loss cannot be told apart by any dip at this bus: over "
+    )
     assert chosen.probability < 0.05
 
 
@@ -148,9 +170,15 @@ def test_effects_that_only_look_alike_are_not_called_the_same(alike, tied):
 
 
 def test_a_rival_is_linearised_as_its_refit_moves(alike):
-    """What a rival gains and loses by one mild event more is, linearised, what a refit of all parameters finds."""
+    """What a rival gains and loses by one mild event more is, linearised, what a refit of all
+    parameters finds.
+    """
     bench, noise, bare, fits = alike
-    truth, rival, event = fits["stator_resistance"], fits["speed_dependent_torque"], ImaginedDip(0.1, 0.2)
+    truth, rival, event = (
+        fits["stator_resistance"],
+        fits["speed_dependent_torque"],
+        ImaginedDip(0.1, 0.2),
+    )
     sides = [linearize_side(bench, noise, fit) for fit in (bare, truth, rival)]
     views = [seen(bench, noise, side, [event])[0] for side in sides]
     separation = Separation(sides, bench.criteria)
@@ -189,7 +217,10 @@ def test_a_set_is_not_told_from_itself_whatever_the_recorder_did(alike):
 
 def test_what_a_model_does_not_survive_tells_nothing(alike):
     bench, noise, bare, fits = alike
-    sides = [linearize_side(bench, noise, f) for f in (bare, fits["stator_resistance"], fits["leakage_loss"])]
+    sides = [
+        linearize_side(bench, noise, f)
+        for f in (bare, fits["stator_resistance"], fits["leakage_loss"])
+    ]
     lost = EventView(np.full(10, np.nan), np.zeros((3, 10)))
     assert not Separation(sides, bench.criteria).denied([lost] * 3, 1).any()
 
@@ -218,7 +249,10 @@ def test_the_smallest_switching_is_an_event_that_can_be_read(alike):
     ("rivals", "sentence"),
     [
         (["stator_resistance"], "to tell two explanations or more apart"),
-        (["stator_resistance", "negative_sequence_braking"], "cannot be tested here: it is seen through U2"),
+        (
+            ["stator_resistance", "negative_sequence_braking"],
+            "cannot be tested here: it is seen through U2",
+        ),
         (["stator_resistance", "time_skew"], "a fault of the measurement"),
         ("nowhere.json", "there is no such file"),
     ],
@@ -229,16 +263,24 @@ def test_rivals_that_cannot_be_planned_for_are_refused_in_a_sentence(rivals, sen
 
 
 def test_a_rival_is_an_effect_of_the_load_that_the_events_can_show():
-    missing = SimpleNamespace(untestable={"negative_sequence_braking": "no U2"}, of_load=("stator_resistance",))
+    missing = SimpleNamespace(
+        untestable={"negative_sequence_braking": "no U2"}, of_load=("stator_resistance",)
+    )
     assert rivals._check(missing, ["stator_resistance"]) is None
-    for name, why in (("negative_sequence_braking", "cannot be tested here: no U2"), ("time_skew", "by the catalogue")):
+    for name, why in (
+        ("negative_sequence_braking", "cannot be tested here: no U2"),
+        ("time_skew", "by the catalogue"),
+    ):
         with pytest.raises(UserError, match=why):
             rivals._check(missing, ["stator_resistance", name])
 
 
 def test_a_plan_for_rivals_says_what_an_investigation_says(tied, tmp_path):
     made = tractexp.plan(
-        list(tied.context.records.recorded), model="third_order_exponential", rivals=TIE, progress=False
+        list(tied.context.records.recorded),
+        model="third_order_exponential",
+        rivals=TIE,
+        progress=False,
     )
     assert made.probability == pytest.approx(tied.next_event.probability, abs=0.05)
     assert made.sentence.startswith("record a dip of")

@@ -1,11 +1,14 @@
-"""Least squares and standard errors against certified answers: the 27 nonlinear problems of NIST StRD, both starts.
+"""Least squares and standard errors against certified answers: the 27 nonlinear problems of NIST
+StRD, both starts.
 
-`descend`, `central_differences` and `Information` are what an estimate and its uncertainty are computed by; here their
-rows are the Institute's problems instead of a simulated load. As in an estimate, a descent is repeated in units of what
-the last one left, and the box is then drawn about its end, as a user does by `model.bounds`.
+`descend`, `central_differences` and `Information` are what an estimate and its uncertainty are
+computed by; here their rows are the Institute's problems instead of a simulated load. As in an
+estimate, a descent is repeated in units of what the last one left, and the box is then drawn about
+its end, as a user does by `model.bounds`.
 
-Rows are computed in extended precision, where the machine has it, and rounded. Lanczos1 leaves 1e-13 of 1: its own
-rounding in double precision leaves three digits of the residual, so that no method has more of its deviations.
+Rows are computed in extended precision, where the machine has it, and rounded. Lanczos1 leaves
+1e-13 of 1: its own rounding in double precision leaves three digits of the residual, so that no
+method has more of its deviations.
 
 `python tests/study/test_nist.py` prints the table.
 """
@@ -27,7 +30,8 @@ Real = np.longdouble
 PI = Real("3.141592653589793238462643383279")
 EXTENDED = np.finfo(Real).eps < 1e-18  # not on every machine
 VALUES, DEVIATIONS = 6, 4  # digits asked for
-WIDER, LOWER = 3, 50  # the box: up to so many times the larger start, down to such a part of the smaller
+# the box: up to so many times the larger start, down to such a part of the smaller
+WIDER, LOWER = 3, 50
 PASSES = 2  # in each box
 STEPS, GAIN = 2000, 1e-12  # of a descent: at most, and the gain in mean squares that ends it
 
@@ -41,7 +45,11 @@ def decay_over_line(x, b1, b2, b3):
 
 
 def two_peaks(x, b1, b2, b3, b4, b5, b6, b7, b8):
-    return b1 * np.exp(-b2 * x) + b3 * np.exp(-((x - b4) ** 2) / b5**2) + b6 * np.exp(-((x - b7) ** 2) / b8**2)
+    return (
+        b1 * np.exp(-b2 * x)
+        + b3 * np.exp(-((x - b4) ** 2) / b5**2)
+        + b6 * np.exp(-((x - b7) ** 2) / b8**2)
+    )
 
 
 def cubic_over_cubic(x, b1, b2, b3, b4, b5, b6, b7):
@@ -55,7 +63,9 @@ def three_decays(x, b1, b2, b3, b4, b5, b6):
 def harmonics(x, b1, b2, b3, b4, b5, b6, b7, b8, b9):
     year, first, second = (2 * PI * x / period for period in (12, b4, b7))
     yearly = b1 + b2 * np.cos(year) + b3 * np.sin(year)
-    return yearly + b5 * np.cos(first) + b6 * np.sin(first) + b8 * np.cos(second) + b9 * np.sin(second)
+    return (
+        yearly + b5 * np.cos(first) + b6 * np.sin(first) + b8 * np.cos(second) + b9 * np.sin(second)
+    )
 
 
 MODELS: dict[str, Callable] = {
@@ -87,12 +97,15 @@ MODELS: dict[str, Callable] = {
     "Roszman1": lambda x, b1, b2, b3, b4: b1 - b2 * x - np.arctan(b3 / (x - b4)) / PI,
     "Thurber": cubic_over_cubic,
 }
-EITHER_SIGN = {"ENSO": [1, 2, 4, 5, 7, 8]}  # amplitudes of sines and cosines: the starts do not know their phases
+# amplitudes of sines and cosines: the starts do not know their phases
+EITHER_SIGN = {"ENSO": [1, 2, 4, 5, 7, 8]}
 
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """One problem: `x` (N,) or (2, N), `y` (N,), `starts` (2, d), and the certified values and deviations (d,)."""
+    """One problem: `x` (N,) or (2, N), `y` (N,), `starts` (2, d), and the certified values and
+    deviations (d,).
+    """
 
     name: str
     x: np.ndarray
@@ -106,11 +119,26 @@ class Regression:
     def read(cls, name: str) -> "Regression":
         """Lines 41 to 60 hold the starts and the certified answers, and the data follow."""
         lines = (FILES / f"{name}.dat").read_text(encoding="ascii").splitlines()
-        answers = np.array([line.split("=")[1].split() for line in lines[40:60] if "=" in line], dtype=float)
-        (left,) = [float(line.split(":")[1]) for line in lines[40:60] if line.startswith("Residual Sum of Squares")]
-        data = np.array([[Real(word) for word in line.split()] for line in lines[60:] if line.strip()]).T
+        answers = np.array(
+            [line.split("=")[1].split() for line in lines[40:60] if "=" in line], dtype=float
+        )
+        (left,) = [
+            float(line.split(":")[1])
+            for line in lines[40:60]
+            if line.startswith("Residual Sum of Squares")
+        ]
+        data = np.array(
+            [[Real(word) for word in line.split()] for line in lines[60:] if line.strip()]
+        ).T
         y = np.log(data[0]) if name == "Nelson" else data[0]
-        return cls(name, data[1] if len(data) == 2 else data[1:], y, answers[:, :2].T, *answers[:, 2:].T, left)
+        return cls(
+            name,
+            data[1] if len(data) == 2 else data[1:],
+            y,
+            answers[:, :2].T,
+            *answers[:, 2:].T,
+            left,
+        )
 
     @property
     def box(self) -> Box:
@@ -124,13 +152,17 @@ class Regression:
     def residuals(self, values: np.ndarray) -> np.ndarray:
         """Calculated minus measured (n, N) at values (n, d), nan where they are no numbers."""
         with np.errstate(all="ignore"):
-            rows = (MODELS[self.name](self.x, *values.astype(Real).T[:, :, None]) - self.y).astype(float)
+            rows = (MODELS[self.name](self.x, *values.astype(Real).T[:, :, None]) - self.y).astype(
+                float
+            )
         return np.where(np.isfinite(rows).all(axis=1, keepdims=True), rows, np.nan)
 
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What a fit found: values and deviations (d,), the sum of squares, and how many residuals it computed."""
+    """What a fit found: values and deviations (d,), the sum of squares, and how many residuals it
+    computed.
+    """
 
     values: np.ndarray
     deviations: np.ndarray
@@ -148,14 +180,20 @@ def fitted(problem: Regression, start: np.ndarray) -> Answer:
             def rows(unit, lanes, box=box, left=left):
                 return problem.residuals(box.from_unit(unit)) / np.sqrt(left)
 
-            end = descend(rows, box.to_unit(values)[None], iterations=STEPS, tolerance=GAIN, central=True)
+            end = descend(
+                rows, box.to_unit(values)[None], iterations=STEPS, tolerance=GAIN, central=True
+            )
             values, spent = box.from_unit(end.unit[0]), spent + end.simulations
         box = Box(np.minimum(0, 2 * values), np.maximum(0, 2 * values))
-    return Answer(values, standard_errors(problem, box, values), float(end.deviance[0] * left), spent)
+    return Answer(
+        values, standard_errors(problem, box, values), float(end.deviance[0] * left), spent
+    )
 
 
 def standard_errors(problem: Regression, box: Box, values: np.ndarray) -> np.ndarray:
-    """Those of independent residuals (d,), whose variance is what is left over the degrees of freedom."""
+    """Those of independent residuals (d,), whose variance is what is left over the degrees of
+    freedom.
+    """
 
     def rows(unit, lanes):
         return problem.residuals(box.from_unit(unit))
@@ -163,11 +201,14 @@ def standard_errors(problem: Regression, box: Box, values: np.ndarray) -> np.nda
     (residual,), (J,) = central_differences(rows, box.to_unit(values)[None], np.zeros(1, dtype=int))
     deviation = np.sqrt(residual @ residual / (len(residual) - len(values)))
     names = [f"b{k}" for k in range(1, len(values) + 1)]
-    return Information.of(names, values, box.width, J.T / deviation, np.empty((len(residual), 0))).standard_errors
+    return Information.of(
+        names, values, box.width, J.T / deviation, np.empty((len(residual), 0))
+    ).standard_errors
 
 
 def digits(number: np.ndarray, certified: np.ndarray) -> float:
-    """Significant digits that the worst of several numbers has, as the Institute counts: at most the eleven it gives.
+    """Significant digits that the worst of several numbers has, as the Institute counts: at most
+    the eleven it gives.
 
     Source: McCullough 1998, the logarithm of the relative error.
     """
@@ -183,7 +224,9 @@ def test_least_squares_have_the_certified_values_and_deviations(name, start):
     limit = DEVIATIONS if EXTENDED or name != "Lanczos1" else 2.5
     assert digits(answer.values, problem.values) >= VALUES
     assert digits(answer.deviations, problem.deviations) >= limit
-    assert answer.left == pytest.approx(problem.left, rel=1e-6 if EXTENDED or name != "Lanczos1" else 1e-2)
+    assert answer.left == pytest.approx(
+        problem.left, rel=1e-6 if EXTENDED or name != "Lanczos1" else 1e-2
+    )
 
 
 def test_every_problem_of_the_institute_is_there():
@@ -203,5 +246,10 @@ if __name__ == "__main__":
     for problem in map(Regression.read, MODELS):
         for k, start in enumerate(problem.starts, 1):
             answer = fitted(problem, start)
-            found = digits(answer.values, problem.values), digits(answer.deviations, problem.deviations)
-            print(f"{problem.name:10} {k:5} {found[0]:7.1f} {found[1]:11.1f} {answer.simulations:10}")
+            found = (
+                digits(answer.values, problem.values),
+                digits(answer.deviations, problem.deviations),
+            )
+            print(
+                f"{problem.name:10} {k:5} {found[0]:7.1f} {found[1]:11.1f} {answer.simulations:10}"
+            )

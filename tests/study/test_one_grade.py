@@ -1,4 +1,6 @@
-"""The same model and records have the same error, grade and sentence in an identification and in an investigation."""
+"""The same model and records have the same error, grade and sentence in an identification and in an
+investigation.
+"""
 
 import os
 from collections.abc import Sequence
@@ -33,7 +35,9 @@ def andes() -> list[Any]:
     events = []
     for letter in "abc":
         t, U, P, Q, f = np.loadtxt(folder / f"dip_{letter}.csv", delimiter=",", skiprows=1).T
-        events += tractexp.read(t=t, U=U, P=P / 5.05, Q=Q / 5.05, f=f, name=f"dip_{letter}", frequency=60.0)
+        events += tractexp.read(
+            t=t, U=U, P=P / 5.05, Q=Q / 5.05, f=f, name=f"dip_{letter}", frequency=60.0
+        )
     return events
 
 
@@ -41,9 +45,15 @@ RECORDS = {
     "contactors": lambda: (shipped("contactors")[:2], shipped("contactors")[2:]),
     "tibet": lambda: (shipped("tibet")[:2], shipped("tibet")[2:]),
     "xtz T1": lambda: (station([0, 1, 2], [16, 17, 18])[:1], station([0, 1, 2], [16, 17, 18])[1:]),
-    "xtz T1, second dip first": lambda: (station([0, 1, 2], [16, 17, 18])[1:], station([0, 1, 2], [16, 17, 18])[:1]),
+    "xtz T1, second dip first": lambda: (
+        station([0, 1, 2], [16, 17, 18])[1:],
+        station([0, 1, 2], [16, 17, 18])[:1],
+    ),
     "xtz T2": lambda: (station([4, 5, 6], [8, 9, 10])[:1], station([4, 5, 6], [8, 9, 10])[1:]),
-    "xtz T2, second dip first": lambda: (station([4, 5, 6], [8, 9, 10])[1:], station([4, 5, 6], [8, 9, 10])[:1]),
+    "xtz T2, second dip first": lambda: (
+        station([4, 5, 6], [8, 9, 10])[1:],
+        station([4, 5, 6], [8, 9, 10])[:1],
+    ),
     "andes": lambda: (andes()[:2], andes()[2:]),
 }
 
@@ -63,7 +73,9 @@ def test_the_base_model_has_one_error_one_grade_and_one_sentence(name):
 
 def test_what_is_printed_stored_loaded_and_logged_of_the_extended_model_is_one_grade(tmp_path):
     train, validate = RECORDS["contactors"]()
-    found = tractexp.investigate(train, validate=validate, effects=["undervoltage_trip"], progress=False)
+    found = tractexp.investigate(
+        train, validate=validate, effects=["undervoltage_trip"], progress=False
+    )
     found.save(tmp_path / "found")
     found.write_results(tmp_path)
     again = tractexp.load(tmp_path / "result.json")

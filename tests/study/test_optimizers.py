@@ -1,4 +1,6 @@
-"""Every optimizer plugin behind the search loop: known minima, one seed one history, bad settings, variants."""
+"""Every optimizer plugin behind the search loop: known minima, one seed one history, bad settings,
+variants.
+"""
 
 import builtins
 from pathlib import Path
@@ -13,7 +15,9 @@ from tractexp.identification.search import Limits, search
 from tractexp.plugin import build, discover, schema
 
 CONF = Path(__file__).parents[2] / "conf"
-NAMES = sorted(n for n, cls in discover()["optimizer"].items() if cls.__module__.startswith(folder.__name__))
+NAMES = sorted(
+    n for n, cls in discover()["optimizer"].items() if cls.__module__.startswith(folder.__name__)
+)
 VARIANTS = sorted(path.stem for path in (CONF / "optimizer").glob("*.yaml"))
 
 
@@ -48,7 +52,9 @@ def name(request):
 
 
 def run(problem, seed=0, simulations=None, **chosen):
-    """15,000 simulations where nothing else is said; fewer for those that need fewer and take their time for each."""
+    """15,000 simulations where nothing else is said; fewer for those that need fewer and take their
+    time for each.
+    """
     simulations = simulations or {"cobyqa": 600, "cmaes": 5000}.get(chosen["name"], 15000)
     return search(problem, build("optimizer", chosen), seed, Limits(simulations=simulations))
 
@@ -81,7 +87,9 @@ def test_finds_the_end_of_rosenbrocks_valley(name):
 
 
 def test_one_seed_is_one_history_and_another_is_another(name):
-    first, again, other = (run(Rosenbrock(), seed, few(name), name=name).history for seed in (4, 4, 5))
+    first, again, other = (
+        run(Rosenbrock(), seed, few(name), name=name).history for seed in (4, 4, 5)
+    )
     assert first.values.tobytes() == again.values.tobytes()
     assert first.objective.tobytes() == again.objective.tobytes()
     assert first.simulations.tolist() == again.simulations.tolist()
@@ -100,7 +108,9 @@ def test_global_random_state_is_neither_used_nor_touched(name):
 
 def test_an_optimizer_keeps_no_state_between_searches(name):
     optimizer = build("optimizer", {"name": name})
-    first, again = (search(Sphere(), optimizer, 1, Limits(simulations=min(700, few(name)))) for _ in range(2))
+    first, again = (
+        search(Sphere(), optimizer, 1, Limits(simulations=min(700, few(name)))) for _ in range(2)
+    )
     assert first.history.values.tobytes() == again.history.values.tobytes()
 
 
@@ -113,14 +123,22 @@ def test_stops_exactly_at_the_budget(name, budget):
 
 @pytest.mark.parametrize("polish", [False, True])
 def test_ends_by_itself_after_its_iterations(name, polish):
-    settings = {"multistart_least_squares": {"starts": 3}, "cobyqa": {"iterations": 2}}.get(name, {"iterations": 4})
-    found = search(Rosenbrock(), build("optimizer", {"name": name, "polish": polish, **settings}), 0)
+    settings = {"multistart_least_squares": {"starts": 3}, "cobyqa": {"iterations": 2}}.get(
+        name, {"iterations": 4}
+    )
+    found = search(
+        Rosenbrock(), build("optimizer", {"name": name, "polish": polish, **settings}), 0
+    )
     assert found.status.startswith("finished its ")
-    assert found.objective == pytest.approx(Rosenbrock().objective(found.values[None])[0], rel=1e-12)
+    assert found.objective == pytest.approx(
+        Rosenbrock().objective(found.values[None])[0], rel=1e-12
+    )
 
 
 class HalfRefused(Cube):
-    """Solvable only where the coordinates sum to less than 1: a twenty-fourth of the cube, the minimum inside."""
+    """Solvable only where the coordinates sum to less than 1: a twenty-fourth of the cube, the
+    minimum inside.
+    """
 
     truth = np.array([0.3, 0.1, 0.15, 0.2])
 
@@ -172,7 +190,9 @@ class Decay:
     t = np.linspace(0, 5e-3, 200)
 
     def __init__(self):
-        self.y = self.curve(self.t, 2.0, 900.0, 0.3) + 0.02 * np.random.default_rng(8).standard_normal(self.t.size)
+        self.y = self.curve(self.t, 2.0, 900.0, 0.3) + 0.02 * np.random.default_rng(
+            8
+        ).standard_normal(self.t.size)
 
     @staticmethod
     def curve(t, a, b, c):
@@ -185,14 +205,18 @@ class Decay:
         return (self.residuals(values) ** 2).sum(axis=1)
 
 
-@pytest.mark.parametrize("settings", [{"name": "multistart_least_squares"}, {"name": "pso", "polish": True}])
+@pytest.mark.parametrize(
+    "settings", [{"name": "multistart_least_squares"}, {"name": "pso", "polish": True}]
+)
 @pytest.mark.parametrize("space", ["unit", "raw"])
 def test_least_squares_agrees_with_scipys_curve_fit(settings, space):
     from scipy.optimize import curve_fit
 
     problem = Decay()
     p0 = [1.0, 500.0, 0.0]
-    expected, _ = curve_fit(problem.curve, problem.t, problem.y, p0, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    expected, _ = curve_fit(
+        problem.curve, problem.t, problem.y, p0, xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
     found = run(problem, 0, 3000, space=space, **settings)
     np.testing.assert_allclose(found.values, expected, rtol=1e-5)
     assert found.objective == pytest.approx(problem.objective(expected[None])[0], rel=1e-9)
@@ -202,13 +226,18 @@ def test_latin_hypercube_has_one_point_in_every_slice():
     from tractexp_plugins.optimizers.multistart_least_squares import latin_hypercube
 
     unit = latin_hypercube(17, 5, np.random.default_rng(0))
-    np.testing.assert_array_equal(np.sort(np.floor(unit * 17), axis=0), np.tile(np.arange(17)[:, None], (1, 5)))
+    np.testing.assert_array_equal(
+        np.sort(np.floor(unit * 17), axis=0), np.tile(np.arange(17)[:, None], (1, 5))
+    )
 
 
 def test_particles_move_as_computed_by_hand():
-    """Two particles, six steps: velocities, the limit and the wall, written out coordinate by coordinate."""
+    """Two particles, six steps: velocities, the limit and the wall, written out coordinate by
+    coordinate.
+    """
     start = np.array([[0.2, 0.3], [0.6, 0.98]])
-    draws = [np.array([[[0.5, 0.1], [0.3, 0.8]], [[0.2, 0.7], [0.9, 0.4]]])] * 6  # r1, r2 of each step
+    # r1, r2 of each step
+    draws = [np.array([[[0.5, 0.1], [0.3, 0.8]], [[0.2, 0.7], [0.9, 0.4]]])] * 6
 
     class Drawn:
         def random(self, shape):
@@ -223,7 +252,13 @@ def test_particles_move_as_computed_by_hand():
             self.seen.append(x)
             return x, ((x - [0.9, 1.0]) ** 2).sum(axis=1)
 
-    settings = {"population": 2, "inertia": 0.8, "cognitive": 0.5, "social": 1.0, "velocity_limit": 0.25}
+    settings = {
+        "population": 2,
+        "inertia": 0.8,
+        "cognitive": 0.5,
+        "social": 1.0,
+        "velocity_limit": 0.25,
+    }
     evaluate = Evaluate()
     steps = build("optimizer", {"name": "pso", **settings}).search(evaluate, Box.unit(2), Drawn())
     r = draws[0]
@@ -237,7 +272,11 @@ def test_particles_move_as_computed_by_hand():
         swarm = list(own[0] if value[0] <= value[1] else own[1])
         for i in range(2):
             for j in range(2):
-                v[i][j] = 0.8 * v[i][j] + 0.5 * r[0, i, j] * (own[i][j] - x[i][j]) + r[1, i, j] * (swarm[j] - x[i][j])
+                v[i][j] = (
+                    0.8 * v[i][j]
+                    + 0.5 * r[0, i, j] * (own[i][j] - x[i][j])
+                    + r[1, i, j] * (swarm[j] - x[i][j])
+                )
                 v[i][j] = min(max(v[i][j], -0.25), 0.25)
                 x[i][j] += v[i][j]
                 if not 0 <= x[i][j] <= 1:
@@ -262,7 +301,9 @@ class Noted(HalfRefused):
 
 
 def test_cobyqa_starts_only_where_the_scatter_could_be_simulated_and_ends_where_scipy_does():
-    """Its first descent is SciPy's own from the best point of the scatter, simulation by simulation."""
+    """Its first descent is SciPy's own from the best point of the scatter, simulation by
+    simulation.
+    """
     from scipy.optimize import minimize
 
     problem = Noted()
@@ -277,12 +318,15 @@ def test_cobyqa_starts_only_where_the_scatter_could_be_simulated_and_ends_where_
         return min(float(HalfRefused.objective(problem, x[None])[0]), worst)
 
     options = {"initial_tr_radius": 0.1, "final_tr_radius": 1e-7}
-    found = minimize(lowered, scatter[f.argmin()], method="COBYQA", bounds=[(0, 1)] * 4, options=options)
+    found = minimize(
+        lowered, scatter[f.argmin()], method="COBYQA", bounds=[(0, 1)] * 4, options=options
+    )
     assert found.fun < 1e-12
     assert len(scatter) == 100
     np.testing.assert_array_equal(alone[: len(seen)], seen)
     assert 0 < able.sum() < 50
-    following = np.abs(scatter[able] - alone[len(seen)]).max(axis=1)  # SciPy moves a start off a near wall
+    # SciPy moves a start off a near wall
+    following = np.abs(scatter[able] - alone[len(seen)]).max(axis=1)
     assert following.min() <= options["initial_tr_radius"]
 
 
@@ -302,8 +346,14 @@ def test_cmaes_without_its_package_names_the_pip_line(monkeypatch):
 @pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
-        ({"name": "ssa", "population": 1}, "optimizer.population=1 is out of range: it must be at least 2"),
-        ({"name": "ssa", "step": "elementwis"}, "optimizer.step=elementwis is not one of .*mean 'elementwise'"),
+        (
+            {"name": "ssa", "population": 1},
+            "optimizer.population=1 is out of range: it must be at least 2",
+        ),
+        (
+            {"name": "ssa", "step": "elementwis"},
+            "optimizer.step=elementwis is not one of .*mean 'elementwise'",
+        ),
         ({"name": "ssa", "space": "cube"}, "optimizer.space=cube is not one of unit, raw"),
         ({"name": "issa", "safety_threshold": 1.2}, "optimizer.safety_threshold=1.2 .* at most 1"),
         ({"name": "issa", "tent_alpha": 1.0}, "optimizer.tent_alpha=1.0 .* at most 0.99"),
@@ -311,14 +361,23 @@ def test_cmaes_without_its_package_names_the_pip_line(monkeypatch):
         ({"name": "pso", "inertia": float("nan")}, "optimizer.inertia=nan is out of range"),
         ({"name": "pso", "population": 0}, "optimizer.population=0"),
         ({"name": "random_search", "iterations": 0}, "optimizer.iterations=0"),
-        ({"name": "differential_evolution", "strategy": "rand1bim"}, "optimizer.strategy=rand1bim .*mean 'rand1bin'"),
-        ({"name": "differential_evolution", "mutation_low": 1.5}, "optimizer.mutation_low=1.5 .* at most 1"),
+        (
+            {"name": "differential_evolution", "strategy": "rand1bim"},
+            "optimizer.strategy=rand1bim .*mean 'rand1bin'",
+        ),
+        (
+            {"name": "differential_evolution", "mutation_low": 1.5},
+            "optimizer.mutation_low=1.5 .* at most 1",
+        ),
         ({"name": "cmaes", "population": 2}, "optimizer.population=2"),
         ({"name": "cobyqa", "radius": 0.7}, "optimizer.radius=0.7 .* at most 0.5"),
         ({"name": "cobyqa", "precision": 0.2}, "optimizer.precision=0.2 .* at most 0.1"),
         ({"name": "covariant_sparrow", "population": 3}, "optimizer.population=3 .* at least 4"),
         ({"name": "covariant_sparrow", "mixing": 1.5}, "optimizer.mixing=1.5 .* at most 1"),
-        ({"name": "multistart_least_squares", "starts": 101}, "optimizer.starts=101 .* at most 100"),
+        (
+            {"name": "multistart_least_squares", "starts": 101},
+            "optimizer.starts=101 .* at most 100",
+        ),
     ],
 )
 def test_a_setting_out_of_range_is_refused_in_one_sentence(chosen, sentence):
@@ -359,4 +418,5 @@ def test_bias_audit_finds_printed_ssa_drawn_to_zero_and_particle_swarm_not():
     for settings, biased in (({"name": "ssa", **LITERAL}, True), ({"name": "pso"}, False)):
         centered, shifted = (error(settings, "sphere", shift, 5000, 3) for shift in (0.0, 1.0))
         assert (shifted > 1e20 * centered) == biased
-        assert (0.1 < shifted / centered < 10) == (not biased)  # Kudela 2023: a ratio beyond ten is a bias
+        # Kudela 2023: a ratio beyond ten is a bias
+        assert (0.1 < shifted / centered < 10) == (not biased)

@@ -1,4 +1,6 @@
-"""The orders of a motor as effects: nested in the base model, equal to the higher order at the other end, named."""
+"""The orders of a motor as effects: nested in the base model, equal to the higher order at the
+other end, named.
+"""
 
 import json
 
@@ -17,22 +19,52 @@ from tractexp.plugin import discover, get
 from tractexp.record import Record, detect
 from tractexp.record.window import average, averaged_power
 
-TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+TRUTH = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 ORDERS = ("rotor_flux", "rotor_speed", "second_cage", "stator_transients")
 FEW = ("second_cage", "stator_resistance", "stator_transients")
 EXACT = 1e-11  # pu: rounding over 800 samples
-# effects beside a base motor, what makes them the motor of higher order, and that motor's own parameters
+# effects beside a base motor, what makes them the motor of higher order, and that motor's own
+# parameters
 ENDS = [
-    ("electromechanical", ("stator_transients",), {"stator_share": 1, "offset_decay": 0}, "stator_flux", {"R_s": 0}),
-    ("electromechanical", ("stator_transients", "stator_resistance"),
-     {"stator_share": 1, "offset_decay": 0, "R_s": 0.03}, "stator_flux", {"R_s": 0.03}),
-    ("electromechanical", ("second_cage",), {"cage_share": 0.3, "cage_time": 0.004}, "double_cage",
-     {"X_second": 0.7 * 0.25, "T_second": 0.004}),
-    ("electromechanical", ("second_cage",), {"cage_share": 0.7, "cage_time": 0.03}, "double_cage",
-     {"X_second": 0.3 * 0.25, "T_second": 0.03}),
+    (
+        "electromechanical",
+        ("stator_transients",),
+        {"stator_share": 1, "offset_decay": 0},
+        "stator_flux",
+        {"R_s": 0},
+    ),
+    (
+        "electromechanical",
+        ("stator_transients", "stator_resistance"),
+        {"stator_share": 1, "offset_decay": 0, "R_s": 0.03},
+        "stator_flux",
+        {"R_s": 0.03},
+    ),
+    (
+        "electromechanical",
+        ("second_cage",),
+        {"cage_share": 0.3, "cage_time": 0.004},
+        "double_cage",
+        {"X_second": 0.7 * 0.25, "T_second": 0.004},
+    ),
+    (
+        "electromechanical",
+        ("second_cage",),
+        {"cage_share": 0.7, "cage_time": 0.03},
+        "double_cage",
+        {"X_second": 0.3 * 0.25, "T_second": 0.03},
+    ),
     ("mechanical", ("rotor_flux",), {"flux_share": 1}, "electromechanical", {}),
     ("voltage", ("rotor_speed",), {"swing": 1 / 0.006}, "electromechanical", {}),
-]  # fmt: skip
+]
 
 
 def model(motor, *names):
@@ -43,12 +75,16 @@ def model(motor, *names):
 def dip(depth=0.5, step=1e-3, U0=1.0):
     t = np.arange(800) * step
     shape = np.clip((t - 0.1) / 0.02, 0, 1) - np.clip((t - 0.25) / 0.02, 0, 1)
-    return Drive.of([Excitation(step, U0 - depth * shape, np.ones(800), np.full(800, 0.6), U0, 1.0, 0.6)])
+    return Drive.of(
+        [Excitation(step, U0 - depth * shape, np.ones(800), np.full(800, 0.6), U0, 1.0, 0.6)]
+    )
 
 
 def response(of, drive, **values):
     known = TRUTH | values
-    row = np.array([known.get(p.name, p.default if p.null is None else p.null) for p in of.parameters])
+    row = np.array(
+        [known.get(p.name, p.default if p.null is None else p.null) for p in of.parameters]
+    )
     got = of.simulate(drive, row, 8)
     assert (got.miss == 0).all(), of.refusal(row, drive)
     return got.outputs[:, 0]
@@ -60,7 +96,14 @@ def drawn(motor, depths=(0.5, 0.3, 0.65), **values):
     for k, depth in enumerate(depths):
         drive = dip(depth)
         P, Q = response(model(motor), drive, **values) + 0.001 * rng.standard_normal((2, 800))
-        record = Record(f"dip{k + 1}", t=np.arange(800) * 1e-3, U=drive.inputs[0], P=P, Q=Q, source=f"made {k + 1}")
+        record = Record(
+            f"dip{k + 1}",
+            t=np.arange(800) * 1e-3,
+            U=drive.inputs[0],
+            P=P,
+            Q=Q,
+            source=f"made {k + 1}",
+        )
         found.append(detect(record.check()))
     return found
 
@@ -70,21 +113,32 @@ def test_at_their_nulls_they_are_the_base_model_whatever_their_other_parameters(
     for name in ORDERS:
         if model(motor).acceptance(get("effect", name)()).refusal is None:
             with_it, drive = model(motor, name), dip()
-            others = {p.name: p.bounds[1] for p in get("effect", name)().parameters if p.null is None}
-            assert np.abs(response(with_it, drive, **others) - response(model(motor), drive)).max() < 1e-12, name
+            others = {
+                p.name: p.bounds[1] for p in get("effect", name)().parameters if p.null is None
+            }
+            assert (
+                np.abs(response(with_it, drive, **others) - response(model(motor), drive)).max()
+                < 1e-12
+            ), name
 
 
 @pytest.mark.parametrize(("motor", "names", "there", "higher", "own"), ENDS)
 def test_at_their_other_end_they_are_the_motor_of_higher_order(motor, names, there, higher, own):
     drive = dip()
-    with_it, motor_itself = response(model(motor, *names), drive, **there), response(model(higher), drive, **own)
+    with_it, motor_itself = (
+        response(model(motor, *names), drive, **there),
+        response(model(higher), drive, **own),
+    )
     assert np.abs(with_it - motor_itself).max() < EXACT
     assert np.abs(with_it - response(model(motor), drive)).max() > 0.01
 
 
 def test_the_stator_s_offset_rings_at_the_supply_frequency_and_decays_as_told():
     drive, of = dip(), model("electromechanical", "stator_transients")
-    ring = response(of, drive, stator_share=1, offset_decay=20)[0] - response(model("electromechanical"), drive)[0]
+    ring = (
+        response(of, drive, stator_share=1, offset_decay=20)[0]
+        - response(model("electromechanical"), drive)[0]
+    )
     after = ring[300:700] - average(ring[None], np.r_[0.5, np.ones(19), 0.5] / 20)[0, 300:700]
     power = np.abs(np.fft.rfft(after * np.hanning(400)))
     assert np.argmax(power) * 2.5 == pytest.approx(50, abs=2.6)
@@ -115,7 +169,9 @@ def test_a_motor_that_has_the_balance_or_lacks_what_it_needs_refuses(motor, name
 @pytest.mark.parametrize("name", ["rotor_flux", "second_cage", "stator_transients"])
 def test_of_waveforms_they_refuse_and_say_what_to_take(name):
     parts = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
-    assert "of waveforms" in compose(*parts, domain="waves").acceptance(get("effect", name)()).refusal
+    assert (
+        "of waveforms" in compose(*parts, domain="waves").acceptance(get("effect", name)()).refusal
+    )
 
 
 @pytest.mark.parametrize(
@@ -147,7 +203,9 @@ def test_the_windowed_ring_of_whole_cycles_averages_out_up_to_the_ends_of_the_re
     weights = np.r_[0.5, np.ones(9), 0.5] / 10
     assert np.abs(average(np.cos(2 * np.pi * 50 * t + 0.4)[None], weights)).max() < 1e-12
     assert np.abs(average((0.3 * t)[None], weights) - 0.3 * t).max() < 1e-12  # and a trend goes on
-    assert np.abs(averaged_power(np.ones((1, 1, 400)), np.full(400, 0.8), weights) - 1).max() < 1e-12
+    assert (
+        np.abs(averaged_power(np.ones((1, 1, 400)), np.full(400, 0.8), weights) - 1).max() < 1e-12
+    )
 
 
 @pytest.mark.parametrize("name", ["tibet", "contactors"])
@@ -174,8 +232,12 @@ def test_the_script_makes_the_shipped_contactors(tmp_path):
         if path.suffix == ".json":
             assert json.loads(path.read_text())["effects"] == json.loads(there)["effects"]
             continue
-        new, old = (np.loadtxt(text.splitlines(), delimiter=",", skiprows=1) for text in (path.read_text(), there))
-        assert np.abs(new - old).max() < 1.5e-5  # the last of five decimals may round otherwise elsewhere
+        new, old = (
+            np.loadtxt(text.splitlines(), delimiter=",", skiprows=1)
+            for text in (path.read_text(), there)
+        )
+        # the last of five decimals may round otherwise elsewhere
+        assert np.abs(new - old).max() < 1.5e-5
 
 
 def test_what_it_does_comes_from_another_simulator_s_law():
@@ -188,18 +250,29 @@ def test_what_it_does_comes_from_another_simulator_s_law():
 def test_a_table_says_the_window_that_is_stated_of_it():
     """An investigation then tries no other (test_recorder_window)."""
     [event] = tractexp.read("tibet_50pct", estimator="one_cycle")
-    assert (event.record.window.name, event.record.window.length) == ("one_cycle", pytest.approx(0.02))
+    assert (event.record.window.name, event.record.window.length) == (
+        "one_cycle",
+        pytest.approx(0.02),
+    )
 
 
-def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(tmp_path):
+def test_the_line_of_the_readme_names_the_stator_transients_and_closes_the_gap_on_the_deep_dip(
+    tmp_path,
+):
     only = "task.effects=[stator_transients,stator_resistance,dc_link_lag]"
     done = run_command(
-        "data=tibet", "task=discrepancy", only, "tracking.enabled=false", "hydra.run.dir=run", cwd=tmp_path
+        "data=tibet",
+        "task=discrepancy",
+        only,
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
     assert made["verdict"] == "named", done.stdout
-    assert made["effects"] == ["stator_transients"]  # and no skew that the recorder's window looks like
+    # and no skew that the recorder's window looks like
+    assert made["effects"] == ["stator_transients"]
     assert (made["complete"], made["remainder"]) == (True, None)
     assert made["phasor_window"] == pytest.approx(0.02)
     truth = json.loads((DATA / "tibet_50pct.json").read_text())["truth"]

@@ -1,4 +1,6 @@
-"""Comparisons on several problems: planted effects and ranks, on records and on BBOB; the end of a sweep."""
+"""Comparisons on several problems: planted effects and ranks, on records and on BBOB; the end of a
+sweep.
+"""
 
 import json
 from dataclasses import replace
@@ -7,7 +9,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from test_compare import SEEDS, SWITCHES, TARGETS, ablation_runs, compare_command, samples, subsets, write_sweep
+from test_compare import (
+    SEEDS,
+    SWITCHES,
+    TARGETS,
+    ablation_runs,
+    compare_command,
+    samples,
+    subsets,
+    write_sweep,
+)
 
 from tractexp.errors import UserError
 from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
@@ -28,18 +39,26 @@ def _plain(monkeypatch):
 
 
 def moved(runs, data, factors=None, budget=None):
-    """The same runs on other data, under another budget, the objective multiplied by a factor for each switch on."""
+    """The same runs on other data, under another budget, the objective multiplied by a factor for
+    each switch on.
+    """
     made = []
     for run in runs:
-        factor = np.prod([f for switch, f in (factors or {}).items() if run.config[f"optimizer.{switch}"]])
+        factor = np.prod(
+            [f for switch, f in (factors or {}).items() if run.config[f"optimizer.{switch}"]]
+        )
         config = run.config | {"budget": budget}
         made.append(replace(run, data=data, config=config, objective=run.objective * factor))
     return made
 
 
 def several(runs, **more):
-    return judging.several(part_runs(runs, ["budget"]), "the test", JUDGING, **{
-        "folder": None, "bbob": 0, "cores": 1, "progress": False, **more})  # fmt: skip
+    return judging.several(
+        part_runs(runs, ["budget"]),
+        "the test",
+        JUDGING,
+        **{"folder": None, "bbob": 0, "cores": 1, "progress": False, **more},
+    )
 
 
 def test_effects_over_records_are_the_mean_of_those_on_each():
@@ -47,8 +66,13 @@ def test_effects_over_records_are_the_mean_of_those_on_each():
     made = several([*runs, *moved(runs, "b", {"levy": 4.0})])
     (overall,) = made.overall
     assert overall.columns == ("tibet_50pct", "b")
-    levy = [next(e for e in a.effects if e.switches == ("levy",)) for a in (*overall.each.values(), overall.ablation)]
-    assert [e.factor for e in levy] == pytest.approx([10**-0.3, 4 * 10**-0.3, 2 * 10**-0.3], rel=0.01)
+    levy = [
+        next(e for e in a.effects if e.switches == ("levy",))
+        for a in (*overall.each.values(), overall.ablation)
+    ]
+    assert [e.factor for e in levy] == pytest.approx(
+        [10**-0.3, 4 * 10**-0.3, 2 * 10**-0.3], rel=0.01
+    )
     assert [e.seeds for e in levy] == [len(SEEDS)] * 3
     assert levy[0].better[0] == 1.0  # ten times the noise: in every pair
     assert levy[1].better == (0.0, 0.0, 0.0)
@@ -68,7 +92,10 @@ def test_budgets_are_terms_of_their_own_and_never_pooled():
     runs = ablation_runs(subsets(range(5)))
     made = several([*moved(runs, "a", budget=15000), *moved(runs, "a", {"gaussian": 100.0})])
     assert [overall.terms for overall in made.overall] == ["15,000 simulations", "2 iterations"]
-    harms = [next(e for e in o.ablation.effects if e.switches == ("gaussian",)).factor for o in made.overall]
+    harms = [
+        next(e for e in o.ablation.effects if e.switches == ("gaussian",)).factor
+        for o in made.overall
+    ]
     assert harms == pytest.approx([10**0.1, 100 * 10**0.1], rel=0.01)
     told = overall_claims.of_agreement(made)
     assert told.startswith("Over all terms together, levy helps everywhere")
@@ -88,7 +115,9 @@ def test_what_a_switch_costs_is_counted():
     runs = []
     for run in ablation_runs(subsets(range(5))):
         more = 50.0 * run.config["optimizer.gaussian"]
-        runs.append(replace(run, simulations=run.simulations + more * np.arange(len(run.simulations))))
+        runs.append(
+            replace(run, simulations=run.simulations + more * np.arange(len(run.simulations)))
+        )
     (overall,) = several(runs).overall
     assert overall.cost == pytest.approx({s: 50.0 * (s == "gaussian") for s in SWITCHES})
     assert "gaussian +50.0" in overall_claims.of_cost(overall)
@@ -97,12 +126,19 @@ def test_what_a_switch_costs_is_counted():
 def test_a_search_that_ended_with_its_first_population_tells_no_cost_of_an_iteration():
     runs = ablation_runs(subsets(range(5)))
     first = runs[0]
-    runs[0] = replace(first, history=first.history[:1], simulations=first.simulations[:1], seconds=first.seconds[:1])
+    runs[0] = replace(
+        first,
+        history=first.history[:1],
+        simulations=first.simulations[:1],
+        seconds=first.seconds[:1],
+    )
     (overall,) = several(runs).overall
     assert overall.cost == pytest.approx(dict.fromkeys(SWITCHES, 0.0))
 
 
-@pytest.mark.parametrize(("values", "median"), [([5, 1, 2], 2), ([4, 1, 3, 2], 2.5), ([1, np.inf, np.inf], np.inf)])
+@pytest.mark.parametrize(
+    ("values", "median"), [([5, 1, 2], 2), ([4, 1, 3, 2], 2.5), ([1, np.inf, np.inf], np.inf)]
+)
 def test_the_median_of_an_odd_and_an_even_number_of_runs(values, median):
     variant = SimpleNamespace(objectives=dict(enumerate(map(float, values))))
     assert _median(variant, range(len(values))) == median
@@ -110,14 +146,18 @@ def test_the_median_of_an_odd_and_an_even_number_of_runs(values, median):
 
 def test_a_job_that_cannot_be_read_says_why_in_the_first_line_of_the_reason():
     with (
-        pytest.raises(UserError, match=r"a/b\.csv cannot be read: a column is missing; run this job again"),
+        pytest.raises(
+            UserError, match=r"a/b\.csv cannot be read: a column is missing; run this job again"
+        ),
         _readable(Path("a/b.csv")),
     ):
         raise ValueError("a column is missing\nand more")
 
 
 def test_on_bbob_a_function_is_a_block():
-    """Levy divides every distance by ten, on three instances; what has been met counts as met and no closer."""
+    """Levy divides every distance by ten, on three instances; what has been met counts as met and
+    no closer.
+    """
     family = VariantFamily(("levy",), {frozenset(): "ssa", frozenset({"levy"}): "flying"})
     plan = BbobPlan(tuple(range(1, 25)), (5,), (1, 2, 3), 3000, (1.0, 1e-8), 0)
     rng = np.random.default_rng(4)
@@ -153,7 +193,9 @@ def test_the_command_compares_several_records_on_one_page(folder):
     assert "median objective over the floor" in done.stdout
 
 
-def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_told(folder, monkeypatch):
+def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_told(
+    folder, monkeypatch
+):
     pytest.importorskip("ioh", reason="the extra [benchmark] is not installed")
     from tractexp.studies.bbob import runs as bbob
     from tractexp.studies.comparison import load
@@ -171,11 +213,18 @@ def test_the_variants_run_on_bbob_once_and_without_its_package_the_records_are_t
     assert again.overall[-1].figures == made.overall[-1].figures
     left = several(runs, folder=folder, bbob=2)
     assert len(left.overall) == 1
-    assert left.notes[-1] == "BBOB was left out: task=benchmark needs the package 'ioh', which is not installed."
+    assert (
+        left.notes[-1]
+        == "BBOB was left out: task=benchmark needs the package 'ioh', which is not installed."
+    )
 
 
-@pytest.mark.parametrize(("terminal", "display", "opened"), [(True, ":0", 1), (True, "", 0), (False, ":0", 0)])
-def test_the_page_opens_for_a_person_at_a_desktop_only(terminal, display, opened, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("terminal", "display", "opened"), [(True, ":0", 1), (True, "", 0), (False, ":0", 0)]
+)
+def test_the_page_opens_for_a_person_at_a_desktop_only(
+    terminal, display, opened, tmp_path, monkeypatch
+):
     shown = []
     monkeypatch.setattr(sweeper.webbrowser, "open", shown.append)
     monkeypatch.setattr(sweeper.sys, "platform", "linux")

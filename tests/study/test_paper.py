@@ -1,4 +1,6 @@
-"""The paper's experiments: numbers by hand, planted verdicts, every experiment and part, refusals."""
+"""The paper's experiments: numbers by hand, planted verdicts, every experiment and
+part, refusals.
+"""
 
 import json
 import re
@@ -21,14 +23,28 @@ from tractexp.studies.paper.valleys import Ends
 
 QUICK = ("task=paper", "task.seeds=1", "task.workers=1", "budget=300", "tracking.enabled=false")
 EXPERIMENTS = [
-    "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
-    "figure11", "equations", "readings",
-]  # fmt: skip
+    "table1",
+    "table2",
+    "table3",
+    "table4",
+    "table5",
+    "figure3",
+    "figure4",
+    "figure6",
+    "figure8",
+    "figure9",
+    "figure10",
+    "figure11",
+    "equations",
+    "readings",
+]
 
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    """All parts with one seed, few simulations and few random points: (folder, what was printed)."""
+    """All parts with one seed, few simulations and few random points: (folder, what
+    was printed).
+    """
     folder = tmp_path_factory.mktemp("paper")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("tractexp.studies.paper.study.RANDOM", 30)
@@ -43,9 +59,13 @@ def page(tmp_path_factory):
 def generalised(tmp_path_factory):
     folder = tmp_path_factory.mktemp("generalise")
     done = run_command(
-        "task=generalise", "task.optimizers=[pso]", "budget=400", "tracking.enabled=false", "hydra.run.dir=run",
+        "task=generalise",
+        "task.optimizers=[pso]",
+        "budget=400",
+        "tracking.enabled=false",
+        "hydra.run.dir=run",
         cwd=folder,
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
     return folder, done.stdout
 
@@ -59,12 +79,23 @@ def test_no_column_of_table_3_has_a_steady_state(name, sine):
 
 
 def test_the_columns_of_table_3_cannot_fit_one_record_however_they_were_rounded():
-    """Two columns give mean P² and mean Q² by Eqs. (8) and (20); the second is negative in every corner of rounding."""
+    """Two columns give mean P² and mean Q² by Eqs. (8) and (20); the second is negative in every
+    corner of rounding.
+    """
     half_P, half_Q, half_E = (5e-6, 5e-7), (5e-6, 5e-6), (5e-7, 5e-7)
     for signs in product((-1, 1), repeat=6):
-        P = [printed.EPSILON_P[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[:2], half_P, strict=True)]
-        Q = [printed.EPSILON_Q[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[2:4], half_Q, strict=True)]
-        E = [printed.OBJECTIVE[n] + s * h for n, s, h in zip(("issa", "ssa"), signs[4:], half_E, strict=True)]
+        P = [
+            printed.EPSILON_P[n] + s * h
+            for n, s, h in zip(("issa", "ssa"), signs[:2], half_P, strict=True)
+        ]
+        Q = [
+            printed.EPSILON_Q[n] + s * h
+            for n, s, h in zip(("issa", "ssa"), signs[2:4], half_Q, strict=True)
+        ]
+        E = [
+            printed.OBJECTIVE[n] + s * h
+            for n, s, h in zip(("issa", "ssa"), signs[4:], half_E, strict=True)
+        ]
         determinant = P[0] ** 2 * Q[1] ** 2 - P[1] ** 2 * Q[0] ** 2
         assert (P[0] ** 2 * E[1] - P[1] ** 2 * E[0]) / determinant < -1
     found = equations.consistency()
@@ -75,7 +106,10 @@ def test_the_columns_of_table_3_cannot_fit_one_record_however_they_were_rounded(
 
 def test_a_consistent_table_is_found_consistent(monkeypatch):
     """Objectives made of mean P² = 0.6 and mean Q² = 0.3 give these back, with no miss."""
-    made = {n: printed.EPSILON_P[n] ** 2 * 0.6 + printed.EPSILON_Q[n] ** 2 * 0.3 for n in printed.COMPARED}
+    made = {
+        n: printed.EPSILON_P[n] ** 2 * 0.6 + printed.EPSILON_Q[n] ** 2 * 0.3
+        for n in printed.COMPARED
+    }
     monkeypatch.setattr(printed, "OBJECTIVE", made)
     found = equations.consistency()
     assert found.best == pytest.approx((0.6, 0.3))
@@ -83,7 +117,9 @@ def test_a_consistent_table_is_found_consistent(monkeypatch):
 
 
 def test_eq_4_as_printed_is_of_first_order():
-    """y' = y by hand: 1 + h + 5/18 h² + h³/27 + h⁴/216 as printed, where the exponential series begins h²/2."""
+    """y' = y by hand: 1 + h + 5/18 h² + h³/27 + h⁴/216 as printed, where the exponential series
+    begins h²/2.
+    """
     h, one = 0.5, np.ones(1)
     wrong = 1 + h + 5 / 18 * h**2 + h**3 / 27 + h**4 / 216
     right = 1 + h + h**2 / 2 + h**3 / 6 + h**4 / 24
@@ -94,14 +130,24 @@ def test_eq_4_as_printed_is_of_first_order():
 
 
 def test_what_is_printed_is_put_into_the_printed_equations(monkeypatch):
-    """The columns of Table 3 fail; a table made of a machine and of one record's mean squares passes."""
+    """The columns of Table 3 fail; a table made of a machine and of one record's mean squares
+    passes.
+    """
     failed = {(c.where, c.printed.partition(" ")[0]) for c in equations.checks() if not c.holds}
-    assert {("Table 3, ISSA", "C"), ("Table 3, SSA", "T'"), ("Eq. (4)", "the"), ("Eq. (15)", "Lévy")} <= failed
+    assert {
+        ("Table 3, ISSA", "C"),
+        ("Table 3, SSA", "T'"),
+        ("Eq. (4)", "the"),
+        ("Eq. (15)", "Lévy"),
+    } <= failed
     assert ("Table 3, PSO", "C") not in failed
     assert ("Table 3, SSA and PSO", "errors") not in failed
     machine = (0.06, 0.7, 0.8, 0.0026, 0.36, 1.4, 3.6)
     monkeypatch.setattr(printed, "TABLE_3", dict.fromkeys(printed.COMPARED, machine))
-    made = {n: printed.EPSILON_P[n] ** 2 * 0.6 + printed.EPSILON_Q[n] ** 2 * 0.3 for n in printed.COMPARED}
+    made = {
+        n: printed.EPSILON_P[n] ** 2 * 0.6 + printed.EPSILON_Q[n] ** 2 * 0.3
+        for n in printed.COMPARED
+    }
     monkeypatch.setattr(printed, "OBJECTIVE", made)
     assert not [c for c in equations.checks() if not c.holds and c.where.startswith("Table 3, ")]
 
@@ -135,7 +181,9 @@ def test_sparrow_search_as_printed_is_drawn_to_zero_and_particle_swarm_is_not():
 
 
 def test_a_tent_orbit_follows_eq_14():
-    """By hand with alpha = 0.3: 0.15 -> 0.5 -> 0.5/0.7 = 0.714 -> 0.286/0.7 = 0.408; and each point of an orbit."""
+    """By hand with alpha = 0.3: 0.15 -> 0.5 -> 0.5/0.7 = 0.714 -> 0.286/0.7 = 0.408; and each point
+    of an orbit.
+    """
     z = 0.15
     for expected in (0.5, 5 / 7, (2 / 7) / 0.7):
         z = z / 0.3 if z < 0.3 else (1 - z) / 0.7
@@ -152,7 +200,9 @@ def test_a_logistic_orbit_follows_its_map():
 
 
 def test_discrepancy_ranks_what_is_known_to_be_even():
-    """Sobol points are more even than random ones, and these than the logistic map, which crowds at the walls."""
+    """Sobol points are more even than random ones, and these than the logistic map, which crowds at
+    the walls.
+    """
     found = {k: np.median(v) for k, v in maps.discrepancies(64, 2, (0.3, 0.9), draws=40).items()}
     assert found["Sobol"] < 0.5 * found["uniform"] < found["uniform"] < 0.5 * found["logistic"]
     assert found["tent, alpha = 0.3"] < found["tent, alpha = 0.9"]
@@ -165,7 +215,9 @@ def test_the_tail_exponent_of_known_tails_is_found():
 
 
 def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thirds():
-    """|nu|^-(1/beta) for a normal nu exceeds x with probability ~ x^-beta, |nu|^-beta with x^-(1/beta)."""
+    """|nu|^-(1/beta) for a normal nu exceeds x with probability ~ x^-beta, |nu|^-beta with
+    x^-(1/beta).
+    """
     assert maps.tail_exponent(maps.flights("mantegna", 200_000, 1)) == pytest.approx(1.5, abs=0.15)
     assert maps.tail_exponent(maps.flights("printed", 200_000, 1)) == pytest.approx(2 / 3, abs=0.07)
 
@@ -175,7 +227,9 @@ def test_mantegnas_steps_have_exponent_three_halves_and_the_printed_ones_two_thi
 
 def test_eq_21_by_hand():
     """|1 - 1.5| = 0.5 and |2 - 1| = 1 have mean 0.75; the gap does not count."""
-    assert mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(0.75)
+    assert mean_residual(np.array([1.0, 2.0, np.nan]), np.array([1.5, 1.0, 3.0])) == pytest.approx(
+        0.75
+    )
 
 
 def test_a_milder_dip_is_interpolated_and_a_deeper_one_extrapolated():
@@ -185,7 +239,9 @@ def test_a_milder_dip_is_interpolated_and_a_deeper_one_extrapolated():
 
 
 def test_generalise_writes_eq_21_of_the_model_it_identified(generalised):
-    """Recomputed from Eqs. (1)-(3) and (6)-(7) in polar form by SciPy, which share no code with the kernels."""
+    """Recomputed from Eqs. (1)-(3) and (6)-(7) in polar form by SciPy, which share no code with the
+    kernels.
+    """
     from scipy.integrate import solve_ivp
     from scipy.interpolate import Akima1DInterpolator
 
@@ -193,9 +249,15 @@ def test_generalise_writes_eq_21_of_the_model_it_identified(generalised):
     from tractexp.record import detect
 
     content = json.loads((generalised[0] / "run" / "generalise.json").read_text())
-    row = next(r for r in content["residuals"] if r["optimizer"] == "pso" and r["kind"] == "extrapolation")
+    row = next(
+        r for r in content["residuals"] if r["optimizer"] == "pso" and r["kind"] == "extrapolation"
+    )
     p = next(i for i in content["identified"] if i["optimizer"] == "pso")["parameters"]
-    event = detect(build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_65pct.csv"]}).read().train[0])
+    event = detect(
+        build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_65pct.csv"]})
+        .read()
+        .train[0]
+    )
     record, U0 = event.record, event.U0
     delta = 0.5 * np.arcsin(-2 * p["T_m"] * p["X_prime"] / (p["C"] * U0**2))
     E = p["C"] * U0 * np.cos(delta)
@@ -212,15 +274,23 @@ def test_generalise_writes_eq_21_of_the_model_it_identified(generalised):
         ]
 
     start = [E, delta, np.tan(delta) / p["T_prime"]]
-    solved = solve_ivp(slopes, record.t[[0, -1]], start, t_eval=record.t, rtol=1e-8, atol=1e-10, max_step=0.002).y
+    solved = solve_ivp(
+        slopes, record.t[[0, -1]], start, t_eval=record.t, rtol=1e-8, atol=1e-10, max_step=0.002
+    ).y
     U = record.U
-    P = (event.P0 - p["T_m"]) * (U / U0) ** p["p_v"] - U * solved[0] * np.sin(solved[1]) / p["X_prime"]
-    Q = (event.Q0 - Q_d0) * (U / U0) ** p["q_v"] + U * (U - solved[0] * np.cos(solved[1])) / p["X_prime"]
+    P = (event.P0 - p["T_m"]) * (U / U0) ** p["p_v"] - U * solved[0] * np.sin(solved[1]) / p[
+        "X_prime"
+    ]
+    Q = (event.Q0 - Q_d0) * (U / U0) ** p["q_v"] + U * (U - solved[0] * np.cos(solved[1])) / p[
+        "X_prime"
+    ]
     assert row["residual_P"] == pytest.approx(np.mean(np.abs(record.P - P)), rel=1e-3)
     assert row["residual_Q"] == pytest.approx(np.mean(np.abs(record.Q - Q)), rel=1e-3)
 
 
-def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are_synthetic(generalised):
+def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are_synthetic(
+    generalised,
+):
     folder, printed_ = generalised
     content = json.loads((folder / "run" / "generalise.json").read_text())
     assert {(r["optimizer"], r["kind"]) for r in content["residuals"]} == {
@@ -228,9 +298,16 @@ def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are
     }
     assert all(i["simulations"] == 400 for i in content["identified"])
     (estimate,) = (i for i in content["identified"] if i["optimizer"] == "estimate")
-    assert estimate["parameters"] not in [i["parameters"] for i in content["identified"] if i is not estimate]
+    assert estimate["parameters"] not in [
+        i["parameters"] for i in content["identified"] if i is not estimate
+    ]
     assert "synthetic stand-in" in printed_
-    for name in ("pso_interpolation", "pso_extrapolation", "issa_interpolation", "issa_extrapolation"):
+    for name in (
+        "pso_interpolation",
+        "pso_extrapolation",
+        "issa_interpolation",
+        "issa_extrapolation",
+    ):
         assert "synthetic stand-in" in (folder / "run" / f"{name}.svg").read_text()
 
 
@@ -240,7 +317,12 @@ def test_generalise_compares_the_chosen_optimizer_too_and_says_that_the_data_are
 def test_workers_change_no_result():
     made = [
         searches.run(
-            _recipe, {"pso": {"name": "pso"}, "ssa": {"name": "ssa"}}, 6, searches.Limits(150), workers, remember=False
+            _recipe,
+            {"pso": {"name": "pso"}, "ssa": {"name": "ssa"}},
+            6,
+            searches.Limits(150),
+            workers,
+            remember=False,
         )
         for workers in (1, 2)
     ]
@@ -263,8 +345,13 @@ def searched(monkeypatch, recipe=None, settings=None, seeds=2, budget=150):
     """The searches found, and how many of them were made just now."""
     made, search = [], searches.search
     monkeypatch.setattr(searches, "search", lambda *a: made.append(a) or search(*a))
-    found = searches.run(recipe or _recipe, {"pso": {"name": "pso", **(settings or {})}}, seeds,
-                         searches.Limits(budget), workers=1)["pso"]  # fmt: skip
+    found = searches.run(
+        recipe or _recipe,
+        {"pso": {"name": "pso", **(settings or {})}},
+        seeds,
+        searches.Limits(budget),
+        workers=1,
+    )["pso"]
     monkeypatch.setattr(searches, "search", search)
     return found, len(made)
 
@@ -278,8 +365,13 @@ def test_a_search_made_before_is_read_back_bit_for_bit(memory, monkeypatch):
         for name in ("simulations", "objective", "values", "seconds"):
             np.testing.assert_array_equal(getattr(a.history, name), getattr(b.history, name))
         assert (a.objective, a.simulations, a.refused, a.iterations, a.seconds, a.status) == (
-            b.objective, b.simulations, b.refused, b.iterations, b.seconds, b.status
-        )  # fmt: skip
+            b.objective,
+            b.simulations,
+            b.refused,
+            b.iterations,
+            b.seconds,
+            b.status,
+        )
 
 
 def test_a_search_of_anything_else_is_never_read_back(memory, monkeypatch):
@@ -320,7 +412,16 @@ def test_a_figure_of_one_run_makes_one_search(memory, tmp_path, monkeypatch):
 
     made, told = counted(monkeypatch), []
     for _ in range(2):
-        study = Study(_recipe, {}, _recipe().events, (), 30, workers=1, limits=searches.Limits(150), tell=told.append)
+        study = Study(
+            _recipe,
+            {},
+            _recipe().events,
+            (),
+            30,
+            workers=1,
+            limits=searches.Limits(150),
+            tell=told.append,
+        )
         study.prepare(["figure8"])
         page.report(study, ["figure8"], claims.claims(study, ["figure8"]))
     assert made == [(["issa"], 1)] * 2
@@ -342,7 +443,9 @@ def counted(monkeypatch):
 
 
 def test_what_one_part_searched_the_others_read_back(memory, tmp_path, monkeypatch):
-    """Table 3 makes the searches of Tables 2, 4 and 5 and of Figures 8, 10 and 11: after it they make none."""
+    """Table 3 makes the searches of Tables 2, 4 and 5 and of Figures 8, 10 and 11: after it they
+    make none.
+    """
     study = _study(seeds=2)
     study.prepare(["table3"])
     fresh, made, search = _study(seeds=2), [], searches.search
@@ -356,16 +459,24 @@ def test_what_one_part_searched_the_others_read_back(memory, tmp_path, monkeypat
 
 
 def _study(seeds=1, budget=150):
-    """The study of the shipped record with few simulations; the literal problem is that of Eq. (4) as printed."""
+    """The study of the shipped record with few simulations; the literal problem is that of Eq. (4)
+    as printed.
+    """
     limits = searches.Limits(budget)
     literal = lambda: _recipe(integration="printed")  # noqa: E731
-    return Study(_recipe, {}, _recipe().events, (), seeds, workers=1, limits=limits, literal=literal)
+    return Study(
+        _recipe, {}, _recipe().events, (), seeds, workers=1, limits=limits, literal=literal
+    )
 
 
 def test_descents_are_made_once_for_the_same_starts(memory, monkeypatch):
-    """What least squares reach is kept beside the searches; another floor or start is another descent."""
+    """What least squares reach is kept beside the searches; another floor or start is another
+    descent.
+    """
     made, descend = [], valleys.run_descents
-    monkeypatch.setattr(valleys, "run_descents", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k))
+    monkeypatch.setattr(
+        valleys, "run_descents", lambda *a, **k: made.append(len(a[1])) or descend(*a, **k)
+    )
     monkeypatch.setattr("tractexp.studies.paper.study.RANDOM", 4)
     first, again = (_study() for _ in range(2))
     for study in (first, again):
@@ -381,9 +492,15 @@ def test_descents_are_made_once_for_the_same_starts(memory, monkeypatch):
 
 
 def test_equal_budgets_are_laid_out_whole_and_equal_for_all(memory, monkeypatch):
-    """A search of 15,050 simulations is not one of 300 iterations cut: its schedules know where they end."""
+    """A search of 15,050 simulations is not one of 300 iterations cut: its schedules know where
+    they end.
+    """
     asked = []
-    monkeypatch.setattr(searches, "run", lambda r, v, n, limits, *a, **k: asked.append((v, limits)) or dict.fromkeys(v))
+    monkeypatch.setattr(
+        searches,
+        "run",
+        lambda r, v, n, limits, *a, **k: asked.append((v, limits)) or dict.fromkeys(v),
+    )
     study = replace(_study(), limits=None)
     for name in ("issa", "pso"):
         study.searched(name, "simulations")
@@ -412,7 +529,11 @@ def test_a_reading_is_the_optimizer_of_its_name(name):
     from tractexp.plugin import build
 
     reading = printed.READINGS[name]
-    chosen = name.removesuffix("_to_the_letter") if reading.optimizer == "pso" and reading.literal else name
+    chosen = (
+        name.removesuffix("_to_the_letter")
+        if reading.optimizer == "pso" and reading.literal
+        else name
+    )
     assert build("optimizer", reading.node) == Choice.of("optimizer", chosen).build("optimizer")
     assert reading.literal == name.endswith("_to_the_letter")
 
@@ -425,19 +546,29 @@ def _recipe(motor="electromechanical", shift=0.0, integration="classical", **kno
     from tractexp.record import detect
 
     node = {"motor": {"name": motor}, "static": {"name": "exponential"}, "integration": integration}
-    (record,) = build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]}).read().train
+    (record,) = (
+        build("data", {"name": "csv", "train": ["pkg://tractexp.data/tibet_50pct.csv"]})
+        .read()
+        .train
+    )
     return Problem(compose(*parts(node)), [detect(replace(record, P=record.P + shift))], **known)
 
 
 def planted(seeds, levels):
-    """A study whose searches fell in ten iterations to their level, plus a little that differs by seed."""
+    """A study whose searches fell in ten iterations to their level, plus a little that differs by
+    seed.
+    """
     study = Study(_recipe, {}, (), (), seeds)
     for (name, level), by in product(levels.items(), ("iterations", "simulations")):
         found = study.seen[name, by] = []
         for seed in range(seeds):
             objective = level * (1 + 0.01 * np.sin(seed)) * np.geomspace(100, 1, 10)
             history = SimpleNamespace(simulations=50 * np.arange(1, 11), objective=objective)
-            found.append(SimpleNamespace(history=history, objective=objective[-1], simulations=500, seconds=1.0))
+            found.append(
+                SimpleNamespace(
+                    history=history, objective=objective[-1], simulations=500, seconds=1.0
+                )
+            )
     vars(study)["reference"] = SimpleNamespace(objective=min(levels.values()), simulations=100)
     return study
 
@@ -445,7 +576,12 @@ def planted(seeds, levels):
 def read_alike(issa, ssa, pso, **others):
     """Levels of every reading of the three, equal unless said."""
     own = {"issa": issa, "ssa": ssa, "pso": pso}
-    return own | {f"{n}_10_perceivers": own[n] for n in ("issa", "ssa")} | {"pso_limited": pso} | others
+    return (
+        own
+        | {f"{n}_10_perceivers": own[n] for n in ("issa", "ssa")}
+        | {"pso_limited": pso}
+        | others
+    )
 
 
 def test_planted_rankings_are_judged_as_they_are():
@@ -461,7 +597,8 @@ def test_a_verdict_that_depends_on_the_reading_says_so():
     verdict, told = claims.compare_ends(study, "issa", "ssa", "iterations")
     assert verdict == "depends on the reading: confirmed only with the 10 perceivers of section 4.2"
     assert told.startswith(
-        "with SD = 20 (section 4.3) medians 2.01 and 2.01 pu², p = 1, A = 0.50; with the 10 perceivers"
+        "with SD = 20 (section 4.3) medians 2.01 and 2.01 pu², p = 1, A = 0.50; with the 10"
+        " perceivers"
     )
     limited = planted(10, read_alike(1.0, 2.0, 3.0, pso_limited=0.5))
     assert claims.compare_ends(limited, "issa", "pso", "iterations")[0].endswith(
@@ -480,11 +617,18 @@ def test_pairs_are_won_only_beyond_chance():
     """Ten seeds of ten lower win; five of ten do not; and the second of a pair never wins."""
     low = 1.0 + 0.01 * np.arange(10)
     high, mixed = low + 1, low + np.where(np.arange(10) % 2, 0.5, -0.5)
-    assert claims.lower([(low, high), (high, low), (low, mixed), (low, low)]) == [True, False, False, False]
+    assert claims.lower([(low, high), (high, low), (low, mixed), (low, low)]) == [
+        True,
+        False,
+        False,
+        False,
+    ]
 
 
 def test_running_times_are_those_of_the_planted_histories():
-    """100, 60, 36, 22, 13, 7.7, ... times the level: below ten times it after 5 iterations, 300 simulations."""
+    """100, 60, 36, 22, 13, 7.7, ... times the level: below ten times it after 5 iterations, 300
+    simulations.
+    """
     study = planted(1, {"issa": 1.0, "ssa": 4.0, "pso": 1.0})
     assert study.running_time("issa", 10.0, "iterations") == 5
     assert study.running_time("issa", 10.0, "simulations") == 300
@@ -495,20 +639,26 @@ def test_the_faster_reaches_every_target_with_less_beyond_chance():
     study = planted(10, {"issa": 1.0, "ssa": 1.7, "pso": 1.0})
     assert claims.faster(study, "issa", "ssa", "iterations")[0] == claims.CONFIRMED
     assert claims.faster(study, "ssa", "issa", "iterations")[0] == claims.REFUTED
-    assert claims.faster(study, "issa", "pso", "simulations") == (claims.REFUTED, ["300, 450", "300, 450"])
+    assert claims.faster(study, "issa", "pso", "simulations") == (
+        claims.REFUTED,
+        ["300, 450", "300, 450"],
+    )
 
 
 # Why they rank so
 
 
 def explored(seeds, ends):
-    """A study in which {reading: (ends, bottoms below)} were searched, and half of the random points are right."""
+    """A study in which {reading: (ends, bottoms below)} were searched, and half of the random
+    points are right.
+    """
     study = planted(seeds, {name: 1.0 for name in ends})
     for name, (at, _) in ends.items():
         for seed, found in enumerate(study.seen[name, "iterations"]):
             found.objective = at[seed]
     vars(study)["ends"] = {
-        name: Ends(np.asarray(b, dtype=float), np.empty((seeds, 0))) for name, (_, b) in ends.items()
+        name: Ends(np.asarray(b, dtype=float), np.empty((seeds, 0)))
+        for name, (_, b) in ends.items()
     }
     vars(study)["control"] = Ends(np.array([1.0, 1.35] * 10), np.empty((20, 0)))
     vars(study)["floor"] = 1.0
@@ -529,7 +679,9 @@ HALF = np.where(np.arange(20) % 2, 1.35, 1.0)
     ],
 )
 def test_what_the_sparrows_lack_is_found_where_it_is_planted(sparrow, told):
-    """Twice above the bottom of their valley they lack convergence; never in the right valley, exploration."""
+    """Twice above the bottom of their valley they lack convergence; never in the right valley,
+    exploration.
+    """
     half = HALF * NOISE, HALF
     study = explored(20, {"issa": sparrow, "ssa": sparrow, "pso": half, "random_search": half})
     assert why.answer(why.lacks(study)) == told
@@ -541,7 +693,9 @@ def test_shares_count_valleys_floors_and_bottoms():
 
 
 def test_the_second_valley_is_at_the_bound_of_C_and_attracts_whatever_the_bound():
-    """Two bottoms of the shipped record, and what the page says of the way between them, recomputed from Eq. (3)."""
+    """Two bottoms of the shipped record, and what the page says of the way between them, recomputed
+    from Eq. (3).
+    """
     problem, floor = _recipe(), 3.09e-5
     ends = valleys.run_descents(problem, valleys.draw_uniform_points(problem, 60, 0), floor)
     (lowest, n, right), (second, m, left), *_ = ends.grouped()
@@ -595,7 +749,10 @@ def test_the_whole_paper_and_the_paper_to_the_letter_are_experiments():
     assert (task.name, task.parts, set(EXPERIMENTS)) == ("paper", [], set(PARTS))
     letter = composed("experiment=to_the_letter")
     assert (letter.task.name, letter.model.integration) == ("identify", "printed")
-    chosen = {key: letter.optimizer[key] for key in ("space", "step", "acceptance", "levy_formula", "perceivers")}
+    chosen = {
+        key: letter.optimizer[key]
+        for key in ("space", "step", "acceptance", "levy_formula", "perceivers")
+    }
     assert chosen == {
         "space": "raw",
         "step": "scalar",
@@ -635,8 +792,12 @@ def test_the_page_begins_with_how_many_claims_and_the_conclusion(page):
     top = text.split("\n\n")[2].split("\n>\n")
     assert re.fullmatch(r"> Of \d+ claims: .*\.", top[0])
     assert 4 <= len(top) <= 6
-    for told in ("the load model that issa identifies", "3 has no steady state for any column", "median objectives are",
-                 "in the valley of the lowest objective end"):  # fmt: skip
+    for told in (
+        "the load model that issa identifies",
+        "3 has no steady state for any column",
+        "median objectives are",
+        "in the valley of the lowest objective end",
+    ):
         assert any(told in line.lower().replace("eq. (3)", "3") for line in top), told
 
 
@@ -696,8 +857,14 @@ def test_markdown_escapes_what_would_be_markup():
         (["task=paper", "data=tibet_30pct"], "no held-out event for the interpolation"),
         (["experiment=table5", "data=tibet_65pct"], "no held-out event for the extrapolation"),
         (["task=generalise", "data=tibet_30pct"], "task=generalise needs dips that are not fitted"),
-        (["task=generalise", "task.optimizers=[isa]"], "there is no optimizer 'isa'; did you mean 'issa'?"),
-        (["task=generalise", "task.seeds=0"], "task.seeds=0 is out of range: it must be at least 1"),
+        (
+            ["task=generalise", "task.optimizers=[isa]"],
+            "there is no optimizer 'isa'; did you mean 'issa'?",
+        ),
+        (
+            ["task=generalise", "task.seeds=0"],
+            "task.seeds=0 is out of range: it must be at least 1",
+        ),
     ],
 )
 def test_what_cannot_be_done_is_refused_in_a_sentence(arguments, sentence, tmp_path):
@@ -710,7 +877,11 @@ def test_what_cannot_be_done_is_refused_in_a_sentence(arguments, sentence, tmp_p
 
 def test_a_table_that_needs_no_held_out_dip_is_made_without_one(tmp_path):
     done = run_command(
-        "experiment=figure6", "data=tibet_30pct", "hydra.run.dir=run", "tracking.enabled=false", cwd=tmp_path
+        "experiment=figure6",
+        "data=tibet_30pct",
+        "hydra.run.dir=run",
+        "tracking.enabled=false",
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     assert "<h2>Figure 6: the record</h2>" in (tmp_path / "run" / "paper.html").read_text()
@@ -718,4 +889,6 @@ def test_a_table_that_needs_no_held_out_dip_is_made_without_one(tmp_path):
 
 def test_a_study_without_the_dip_it_needs_says_which():
     with pytest.raises(UserError, match="a dip deeper than the fitted one is needed"):
-        Study(_recipe, {}, (SimpleNamespace(depth=0.5),), (SimpleNamespace(depth=0.3),), 1).held("extrapolation")
+        Study(_recipe, {}, (SimpleNamespace(depth=0.5),), (SimpleNamespace(depth=0.3),), 1).held(
+            "extrapolation"
+        )

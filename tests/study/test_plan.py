@@ -1,4 +1,6 @@
-"""Plans: a forecast is what the record then gives, deeper tells more, and the best events are the best."""
+"""Plans: a forecast is what the record then gives, deeper tells more, and the best events are the
+best.
+"""
 
 import itertools
 import json
@@ -38,7 +40,9 @@ SHAPE = DipShape(depth=0.4, duration=0.2, rate=500.0, noise_P=0.004, noise_Q=0.0
 def recorded(depth, deviation=0.004, seed=5, name="dip"):
     t, U = study.Shape(depth).voltage()
     clean = study.printed(study.TYPICAL, t, U, 0.35)
-    return study.event(t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name)
+    return study.event(
+        t, U, clean + study.noise(np.random.default_rng(seed), len(t), deviation, 0.0), name
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +55,8 @@ def test_the_forecast_is_what_the_record_then_gives(problem):
     event = problem.events[0]
     shape = replace(DipShape.of(event), duration=0.2, noise_P=0.004, noise_Q=0.004, memory=0.0)
     planned = forecast(problem, study.TYPICAL, shape)
-    # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other estimates.
+    # The plan's trapezoid has edges of 20 ms, the record's of 30 ms; q_v and C are at other
+    # estimates.
     np.testing.assert_allclose(planned.half[[0, 3, 4, 5]], known.half[[0, 3, 4, 5]], rtol=0.25)
 
 
@@ -81,7 +86,9 @@ def test_what_no_dip_can_give_is_said_with_the_best_there_is(problem):
 
 def test_the_best_two_events_are_those_of_all_pairs():
     depths = (0.1, 0.5, 0.25, 0.6)
-    archive = Problem(study.model(), [recorded(d, seed=k, name=f"{d:g}") for k, d in enumerate(depths)])
+    archive = Problem(
+        study.model(), [recorded(d, seed=k, name=f"{d:g}") for k, d in enumerate(depths)]
+    )
     chosen = best_events(archive, study.TYPICAL, least=0.0, most=2)
     informations = each(archive, study.TYPICAL)
     pairs = itertools.combinations(range(4), 2)
@@ -97,8 +104,12 @@ def test_the_best_two_events_are_those_of_all_pairs():
 
 
 def test_a_plan_stands_on_the_numbers_of_the_identification():
-    """Estimate and noise are those of `identify`, and so is what the recorded dip is said to tell."""
-    fit = public.identify(recorded(0.4), model="third_order_exponential", optimizer="pso", budget=2000, progress=False)
+    """Estimate and noise are those of `identify`, and so is what the recorded dip is
+    said to tell.
+    """
+    fit = public.identify(
+        recorded(0.4), model="third_order_exponential", optimizer="pso", budget=2000, progress=False
+    )
     planned = public.plan(recorded(0.4), model="third_order_exponential", parameter="M")
     assert fit.grade == "adequate"
     for name, value in planned.content["parameters"].items():
@@ -116,15 +127,22 @@ def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_
 
     def judged(*others):
         events = [recorded(depth, 0.006, seed, name="other") for depth, seed in others]
-        return check_by_profiles(study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty)
+        return check_by_profiles(
+            study.judged(Problem(study.model(), [one, *events]), study.TYPICAL).uncertainty
+        )
 
     known = judged()
     (said,) = [sentence for sentence in advise(known, GOOD) if sentence.startswith("for C:")]
     assert 0.07 < known.half[2] / known.values[2] < 0.1
     assert known.profiled["C"][1] == 0.99
-    low, high, goal = re.search(r"dip of (\S+) to (\S+) % for 234 ms.* ± (\S+) % or better", said).groups()
+    low, high, goal = re.search(
+        r"dip of (\S+) to (\S+) % for 234 ms.* ± (\S+) % or better", said
+    ).groups()
     assert 20 < float(low) < 60 < float(high)  # as deep as the one recorded is not among them
-    assert "its interval now reaches its bound 0.99, and if it does so then, ask whether model.bounds.C" in said
+    assert (
+        "its interval now reaches its bound 0.99, and if it does so then, ask whether"
+        " model.bounds.C" in said
+    )
     advised, repeated = judged((0.6, 13)), judged((0.2, 12))
     assert advised.verdicts["C"].word == IDENTIFIED
     assert advised.half[2] / advised.values[2] < 1.1 * float(goal) / 100
@@ -132,18 +150,25 @@ def test_a_further_dip_as_advised_gives_what_was_promised_and_a_repetition_does_
 
 
 def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
-    """Such a model reads more than the voltage, so that nothing can be forecast; what is open must be said still."""
+    """Such a model reads more than the voltage, so that nothing can be forecast; what is open must
+    be said still.
+    """
     static, f = get("model/static", "exponential_frequency")(), np.full(1000, 50.0)
     event = recorded(0.2, 0.015)
     event = replace(event, record=replace(event.record, f=f + 0.2 * (event.record.t > 0.3)))
     problem = Problem(compose(get("model/motor", "electromechanical")(), static), [event])
     known = study.judged(problem, np.array([*study.TYPICAL, 0.0, 0.0])).uncertainty
     said = advise(known, GOOD)[-1]
-    poor = [name for name, verdict in known.verdicts.items() if verdict.word in (WEAK, UNIDENTIFIED)]
+    poor = [
+        name for name, verdict in known.verdicts.items() if verdict.word in (WEAK, UNIDENTIFIED)
+    ]
     assert "q_f" in poor
-    assert said.startswith(f"for {', '.join(poor)}: record a dip of another depth and fit it together")
+    assert said.startswith(
+        f"for {', '.join(poor)}: record a dip of another depth and fit it together"
+    )
     sentence = (
-        "a voltage alone, but of this model the model/static 'exponential_frequency' reads f: nothing can be planned"
+        "a voltage alone, but of this model the model/static 'exponential_frequency' reads f:"
+        " nothing can be planned"
     )
     with pytest.raises(UserError, match=sentence):
         forecast(problem, known.values, SHAPE)
@@ -151,7 +176,10 @@ def test_advice_for_a_model_that_no_planned_dip_can_hold_has_no_figures():
 
 def test_shapes_that_cannot_be_recorded_are_refused():
     for changes, sentence in (
-        ({"depth": 0.99}, "task.depth=0.99 is out of range: it must be at least 0.03 and at most 0.95"),
+        (
+            {"depth": 0.99},
+            "task.depth=0.99 is out of range: it must be at least 0.03 and at most 0.95",
+        ),
         ({"rate": 1.0}, "task.duration=0.2 is out of range"),
         ({"noise_P": 0.0}, "the records show no noise before the dip.*give it as task.noise"),
         ({"noise_P": float("nan")}, "the records show no noise before the dip"),
@@ -170,7 +198,9 @@ def plan_command(*arguments, cwd):
 
 
 def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
-    done = plan_command("task=plan", "task.parameter=M", "task.within=0.05", "hydra.run.dir=run", cwd=tmp_path)
+    done = plan_command(
+        "task=plan", "task.parameter=M", "task.within=0.05", "hydra.run.dir=run", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / "run" / "plan.json").read_text())
     assert 0.05 < content["depth_needed"] < 0.5
@@ -207,10 +237,21 @@ def test_the_plan_task_answers_with_a_number_and_a_figure(tmp_path):
 
 def test_the_page_of_a_plan_ranks_the_archive(tmp_path):
     shipped = ",".join(f"pkg://tractexp.data/tibet_{depth}pct.csv" for depth in (30, 50, 65))
-    arguments = ("data=csv", f"data.train=[{shipped}]", "task.within=1e-4", "task.least=0.3", "model.fixed.q_v=3")
-    done = plan_command("task=plan", "task.values=default", *arguments, "hydra.run.dir=run", cwd=tmp_path)
+    arguments = (
+        "data=csv",
+        f"data.train=[{shipped}]",
+        "task.within=1e-4",
+        "task.least=0.3",
+        "model.fixed.q_v=3",
+    )
+    done = plan_command(
+        "task=plan", "task.values=default", *arguments, "hydra.run.dir=run", cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
-    content, page = json.loads((tmp_path / "run" / "plan.json").read_text()), read(tmp_path / "run" / "plan.html")
+    content, page = (
+        json.loads((tmp_path / "run" / "plan.json").read_text()),
+        read(tmp_path / "run" / "plan.html"),
+    )
     assert content["depth_needed"] is None
     assert 0 < len(content["best_events"]) < 3
     assert page.tags.count("table") == 6
@@ -228,7 +269,10 @@ def test_the_page_of_a_plan_ranks_the_archive(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
-        (["task.parameter=X_prim"], "task.parameter=X_prim is not a free parameter; did you mean 'X_prime'?"),
+        (
+            ["task.parameter=X_prim"],
+            "task.parameter=X_prim is not a free parameter; did you mean 'X_prime'?",
+        ),
         (["task.depth=0.99"], "task.depth=0.99 is out of range"),
         (["task.within=0"], "task.within=0.0 is out of range"),
         (["task.values=nowhere.json"], "there is no result file nowhere.json"),
@@ -242,7 +286,9 @@ def test_the_plan_task_refuses_bad_input_in_one_sentence(arguments, sentence, tm
 
 
 def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
-    """A motor that stalls: sensitivities beyond all numbers overflow nowhere, and add nothing to what is known."""
+    """A motor that stalls: sensitivities beyond all numbers overflow nowhere, and add nothing to
+    what is known.
+    """
     from tractexp.inference.likelihood import Likelihood
 
     (known,) = each(problem, study.TYPICAL)
@@ -256,5 +302,7 @@ def test_a_dip_in_which_the_model_diverges_tells_nothing(problem, monkeypatch):
     planned = forecast(problem, study.TYPICAL, SHAPE, known)
     alone = forecast(problem, study.TYPICAL, SHAPE)
     monkeypatch.undo()
-    assert planned.half == pytest.approx(add_information([known]).standard_errors * planned.half[0] / known.standard_errors[0])
+    assert planned.half == pytest.approx(
+        add_information([known]).standard_errors * planned.half[0] / known.standard_errors[0]
+    )
     assert not np.isfinite(alone.half).any()

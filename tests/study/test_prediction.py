@@ -1,4 +1,6 @@
-"""Names by what they predict of held-out events: the rule by itself, and where a model is never exact."""
+"""Names by what they predict of held-out events: the rule by itself, and where a model is never
+exact.
+"""
 
 import json
 from dataclasses import replace
@@ -56,7 +58,9 @@ def named(*sets):
 
 
 def test_the_set_that_divides_the_error_and_leaves_all_others_behind_is_named():
-    assert named(off(error=1.0), off("a", error=0.05), off("b", error=0.8), off("a", "b", error=0.049)) == [("a",)]
+    assert named(
+        off(error=1.0), off("a", error=0.05), off("b", error=0.8), off("a", "b", error=0.049)
+    ) == [("a",)]
 
 
 def test_a_stranger_s_best_imitation_is_not():
@@ -85,11 +89,15 @@ def test_a_set_whose_lead_may_be_chance_hides_none_that_is_clear():
 
 
 def test_sets_that_predict_alike_are_tied_the_better_one_first():
-    assert named(off(error=1.0), off("b", error=0.1), off("a", error=0.09), off("c", error=0.7)) == [("a",), ("b",)]
+    assert named(
+        off(error=1.0), off("b", error=0.1), off("a", error=0.09), off("c", error=0.7)
+    ) == [("a",), ("b",)]
 
 
 def test_a_pair_needs_both_of_its_members():
-    """The pair is ahead of either alone; a third that takes away a tenth of what is left is not needed."""
+    """The pair is ahead of either alone; a third that takes away a tenth of what is left is not
+    needed.
+    """
     sets = [off(error=1.0), off("a", error=0.5), off("b", error=0.6), off("a", "b", error=0.1)]
     assert named(*sets, off("a", "b", "c", error=0.09)) == [("a", "b")]
 
@@ -99,13 +107,16 @@ PAIRS = off(error=1.0), off("a", error=0.5), off("a", "b", error=0.4), off("a", 
 
 @pytest.mark.parametrize(("error", "names"), [(0.7, [("a",)]), (0.65, [])])
 def test_what_all_sets_share_that_divide_the_error_is_named(error, names):
-    """Alone it divides it by 2 only, and no pair needs its second. It needs no lead over what is no better than the
-    base model, but over any rival."""
+    """Alone it divides it by 2 only, and no pair needs its second. It needs no lead over what is no
+    better than the base model, but over any rival.
+    """
     assert named(*PAIRS, off("b", error=error)) == names
 
 
 def test_what_all_share_is_named_though_pairs_are_ahead_of_it():
-    assert named(off(error=1.0), off("a", error=0.25), off("a", "b", error=0.15), off("a", "c", error=0.16)) == [("a",)]
+    assert named(
+        off(error=1.0), off("a", error=0.25), off("a", "b", error=0.15), off("a", "c", error=0.16)
+    ) == [("a",)]
 
 
 def test_of_sets_that_share_nothing_the_smallest_are_tied():
@@ -133,14 +144,20 @@ def test_what_one_block_decides_is_chance():
 
 
 def test_few_blocks_tell_less_of_chance_and_one_tells_nothing():
-    """A lead that is clear in twenty blocks; three alike have the quantile of two degrees of freedom."""
+    """A lead that is clear in twenty blocks; three alike have the quantile of two degrees of
+    freedom.
+    """
 
     def first(one, blocks):
         rows = (getattr(one, name)[:blocks] for name in ("squares", "noise", "response"))
         return PredictedError(*rows, one.unit)
 
     one, other = off("a", error=0.1).prediction, off("b", error=0.2, uneven=0.8).prediction
-    assert [first(one, blocks).is_clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [False, False, True]
+    assert [first(one, blocks).is_clear_of(first(other, blocks)) for blocks in (1, 3, 20)] == [
+        False,
+        False,
+        True,
+    ]
 
 
 def test_a_model_that_diverges_is_behind_any_that_does_not():
@@ -161,7 +178,9 @@ def test_of_one_family_a_larger_member_must_be_ahead(error, name):
 @pytest.mark.parametrize(("error", "stays"), [(0.3, True), (0.2 / 1.45, True), (0.2 / 1.55, False)])
 def test_a_term_of_the_library_that_is_ahead_takes_a_name(error, stays):
     """What has no name predicts better then. One that only imitates the name's effect does not."""
-    sets = table(off(error=1.0), off("a", error=0.2), off("b", error=0.9), term=off("term", error=error))
+    sets = table(
+        off(error=1.0), off("a", error=0.2), off("b", error=0.9), term=off("term", error=error)
+    )
     assert [row.names for row in find_predicting(sets, Criteria())] == [("a",)] * stays
     assert [row.names for row in find_predicting(replace(sets, term=None), Criteria())] == [("a",)]
 
@@ -179,7 +198,9 @@ def by_deviance(*names, left, rejected=False):
 
 
 def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not():
-    one, other = (by_deviance("a", left=50.0, rejected=rejected).prediction for rejected in (False, True))
+    one, other = (
+        by_deviance("a", left=50.0, rejected=rejected).prediction for rejected in (False, True)
+    )
     assert one.is_clear_of(other)
     assert not other.is_clear_of(one)
 
@@ -194,13 +215,21 @@ def test_a_set_that_the_fitted_events_reject_is_clear_of_none_that_they_do_not()
         (61.0, 12.0, [("a",)]),
     ],
 )
-def test_what_leaves_no_more_than_chance_need_not_divide_what_the_base_model_leaves(bare, left, names):
+def test_what_leaves_no_more_than_chance_need_not_divide_what_the_base_model_leaves(
+    bare, left, names
+):
     assert named(by_deviance(left=bare), by_deviance("a", left=left)) == names
 
 
 def test_by_deviance_what_chance_leaves_is_no_lead():
-    """Of two that leave no more than chance, neither is told from the other, though one is far below the other."""
-    sets = by_deviance(left=100.0, rejected=True), by_deviance("a", left=-20.0), by_deviance("b", left=10.0)
+    """Of two that leave no more than chance, neither is told from the other, though one is far
+    below the other.
+    """
+    sets = (
+        by_deviance(left=100.0, rejected=True),
+        by_deviance("a", left=-20.0),
+        by_deviance("b", left=10.0),
+    )
     assert named(*sets) == [("a",), ("b",)]
 
 
@@ -208,28 +237,60 @@ def test_by_deviance_what_chance_leaves_is_no_lead():
 
 
 def dips(depths=(0.5, 0.35, 0.6)):
-    """Dips of a load with a stator resistance and, unknown to all, a torque that swings with the flux's history."""
+    """Dips of a load with a stator resistance and, unknown to all, a torque that swings with the
+    flux's history.
+    """
     rng, made = np.random.default_rng(11), []
-    motor = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(),
-                    [get("effect", name)() for name in ("stator_resistance", "undervoltage_trip")])  # fmt: skip
-    values = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0,
-              "tripped_share": 0.25, "trip_level": 0.75, "trip_delay": 0.05, "reconnect_delay": 0.3}  # fmt: skip
-    row = np.array([values.get(p.name, p.default if p.null is None else p.null) for p in motor.parameters])
+    motor = compose(
+        get("model/motor", "electromechanical")(),
+        get("model/static", "exponential")(),
+        [get("effect", name)() for name in ("stator_resistance", "undervoltage_trip")],
+    )
+    values = {
+        "T_prime": 0.12,
+        "X_prime": 0.25,
+        "C": 0.9,
+        "M": 0.006,
+        "T_m": 0.55,
+        "p_v": 1.4,
+        "q_v": 3.0,
+        "tripped_share": 0.25,
+        "trip_level": 0.75,
+        "trip_delay": 0.05,
+        "reconnect_delay": 0.3,
+    }
+    row = np.array(
+        [values.get(p.name, p.default if p.null is None else p.null) for p in motor.parameters]
+    )
     flat = np.ones(SAMPLES)
     for k, depth in enumerate(depths):
         t = np.arange(SAMPLES) * STEP
         shape = np.clip((t - 0.1) / 0.02, 0, 1) - np.clip((t - 0.25) / 0.02, 0, 1)
         drive = Drive.of([Excitation(STEP, 1 - depth * shape, flat, 0.6 * flat, 1.0, 1.0, 0.6)])
         response = motor.simulate(drive, row, 8).outputs[:, 0]
-        unknown = 0.01 * np.sin(2 * np.pi * 3.1 * (t - 0.1)) * (t > 0.1) * depth * np.exp(-(t - 0.1) / 0.5)
+        unknown = (
+            0.01
+            * np.sin(2 * np.pi * 3.1 * (t - 0.1))
+            * (t > 0.1)
+            * depth
+            * np.exp(-(t - 0.1) / 0.5)
+        )
         P, Q = response + unknown + 2e-4 * rng.standard_normal((2, SAMPLES))
-        made.append(detect(Record(f"dip{k + 1}", t=t, U=drive.inputs[0], P=P, Q=Q, source=f"made {k + 1}").check()))
+        made.append(
+            detect(
+                Record(
+                    f"dip{k + 1}", t=t, U=drive.inputs[0], P=P, Q=Q, source=f"made {k + 1}"
+                ).check()
+            )
+        )
     return made
 
 
 @pytest.fixture(scope="module")
 def investigation():
-    """A trip of a quarter of the load, and beside it a swing of 1 % that no effect has, fifty times the noise."""
+    """A trip of a quarter of the load, and beside it a swing of 1 % that no effect has, fifty times
+    the noise.
+    """
     only = ("undervoltage_trip", "stator_resistance", "dc_link_lag")
     events = dips()
     return tractexp.investigate(events[:2], validate=events[2:], effects=only, progress=False)
@@ -274,7 +335,9 @@ def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
         base, *rows = (replace(row, fit=replace(fit, names=row.names)) for row in sets)
         own = replace(base, tests=inexact.first)
         rows = sorted(rows, key=lambda row: row.prediction.left)
-        return reason_of(inexact, replace(inexact.evidence, base=own, rows=tuple(rows), others=(), term=None))
+        return reason_of(
+            inexact, replace(inexact.evidence, base=own, rows=tuple(rows), others=(), term=None)
+        )
 
     bare, trip = off(error=1.0), off("undervoltage_trip", error=0.3)
     pair = off("stator_resistance", "undervoltage_trip", error=0.25)
@@ -283,7 +346,9 @@ def test_the_sentence_says_why_the_nearest_set_is_not_named(inexact):
     trip.prediction.squares[4] += 3.0
     assert "that may be chance in so few blocks" in reason(bare, trip)
     louder = replace(pair.prediction, squares=pair.prediction.squares + 0.1)
-    assert "one of them alone does hardly worse" in reason(bare, trip, replace(pair, prediction=louder))
+    assert "one of them alone does hardly worse" in reason(
+        bare, trip, replace(pair, prediction=louder)
+    )
 
 
 def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
@@ -294,14 +359,23 @@ def test_the_sentence_says_that_the_best_sets_have_what_is_named(inexact):
     louder = replace(trip, prediction=replace(own, squares=own.squares * left / own.left / 2.0**2))
     names = ("dc_link_lag", "undervoltage_trip")
     better = replace(louder.prediction, squares=louder.prediction.squares / 1.4)
-    pair = replace(trip, fit=replace(trip.fit, names=names), names=names, family=names, prediction=better)
-    no_better = replace(evidence.term, prediction=replace(own, squares=2 * louder.prediction.squares))
+    pair = replace(
+        trip, fit=replace(trip.fit, names=names), names=names, family=names, prediction=better
+    )
+    no_better = replace(
+        evidence.term, prediction=replace(own, squares=2 * louder.prediction.squares)
+    )
     reason = reason_of(inexact, replace(evidence, rows=(louder, pair), others=(), term=no_better))
-    assert f"; dc_link_lag and undervoltage_trip miss {in_percent(better.error)}, the least, and {near};" in reason
+    assert (
+        f"; dc_link_lag and undervoltage_trip miss {in_percent(better.error)}, the least, and"
+        f" {near};" in reason
+    )
 
 
 def test_leads_are_told_by_blocks_that_share_the_response(inexact):
-    """A dip of 0.15 s in 0.7 s has two of the seven blocks of a tenth of a second, and fourteen of 20 ms."""
+    """A dip of 0.15 s in 0.7 s has two of the seven blocks of a tenth of a second, and fourteen of
+    20 ms.
+    """
     response = inexact.evidence.base.prediction.response
     assert len(response) == 35
     assert response.sum() ** 2 >= SHARING * np.sum(response**2)
@@ -310,7 +384,9 @@ def test_leads_are_told_by_blocks_that_share_the_response(inexact):
 
 
 def test_its_share_is_that_which_tripped_though_the_model_is_not_exact(inexact):
-    """What is off is a bias by the swing, 3.6 standard errors: a covariance of residuals holds scatter alone."""
+    """What is off is a bias by the swing, 3.6 standard errors: a covariance of residuals holds
+    scatter alone.
+    """
     share = next(e for e in inexact.after if e.parameter.name == "tripped_share")
     assert share.value == pytest.approx(0.25, rel=0.005)
 
@@ -325,7 +401,9 @@ def test_the_covariance_by_least_squares_is_wider_where_residuals_are_correlated
 
 
 def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identified(inexact):
-    """Fits are by least squares, under which the noise is as large as what they leave: nothing would stand out."""
+    """Fits are by least squares, under which the noise is as large as what they leave: nothing
+    would stand out.
+    """
     assert inexact.train.before.chi2_per_sample > 100
     assert inexact.train.after.chi2_per_sample > 5
     assert inexact.tests.noise.levels == pytest.approx([2e-4, 2e-4], rel=0.5)
@@ -341,26 +419,35 @@ def test_all_is_told_by_the_records_own_noise_and_the_base_model_as_it_is_identi
 @pytest.mark.usefixtures("no_proposal")
 def test_where_nothing_predicts_the_base_model_and_the_nearest_are_told_by_least_squares():
     """The trip is not among the effects that are tried."""
-    found = tractexp.investigate(dips()[:2], validate=dips()[2:], effects=("dc_link_lag",), progress=False)
+    found = tractexp.investigate(
+        dips()[:2], validate=dips()[2:], effects=("dc_link_lag",), progress=False
+    )
     assert found.verdict == "unexplained"
     alone = tractexp.identify(dips()[:2], progress=False)
-    assert found.gap.train.before.model_error["value"] == pytest.approx(alone.model_error.value, rel=0.03)
+    assert found.gap.train.before.model_error["value"] == pytest.approx(
+        alone.model_error.value, rel=0.03
+    )
     assert "a name must divide that by 2.25" in found.reason
     gap = found.content["nearest"]["gap"]["validate"]
     before, after = (gap[stage]["model_error"]["value"] for stage in ("before", "after"))
     assert (
-        f"{in_percent(after)} of the response there, where the base model misses {in_percent(before)}" in found.reason
+        f"{in_percent(after)} of the response there, where the base model misses"
+        f" {in_percent(before)}" in found.reason
     )
     assert 1 - (after / before) ** 2 == pytest.approx(gap["closed"], abs=1e-3)
 
 
 def test_by_the_size_of_the_error_the_same_family_is_chosen(inexact):
-    """By least squares its members fit a swing that none of them has, too; they are told by one name."""
+    """By least squares its members fit a swing that none of them has, too; they are told by one
+    name.
+    """
     evidence = inexact.evidence
     best = find_predicting(evidence, inexact.context.criteria)
     assert [row.family for row in best] == [("undervoltage_trip",)]
     assert {name for row in evidence.every for name in row.names} - set(inexact.catalogue.of_load)
-    assert best[0].prediction.error * inexact.context.criteria.divides < evidence.base.prediction.error
+    assert (
+        best[0].prediction.error * inexact.context.criteria.divides < evidence.base.prediction.error
+    )
 
 
 def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identification_has_it():
@@ -368,10 +455,14 @@ def test_at_the_powers_measured_a_fit_to_any_number_of_events_is_as_the_identifi
     events = dips((0.5, 0.35, 0.6, 0.4))
     model = compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")())
     missing = catalogue(model, events, ("dc_link_lag",))
-    context = Context.of(model, missing, Records.of(events), {}, {}, Criteria(), Effort(lambda line: None))
+    context = Context.of(
+        model, missing, Records.of(events), {}, {}, Criteria(), Effort(lambda line: None)
+    )
     noise = Noise(Noise.white(0.01, 0.01).pairs, np.eye(2))
     alone = tractexp.identify(events, progress=False).result
-    begin = context.coordinates.placed(context.coordinates.null, {n: 0.97 * v for n, v in alone.parameters.items()})
+    begin = context.coordinates.placed(
+        context.coordinates.null, {n: 0.97 * v for n, v in alone.parameters.items()}
+    )
     fit = refit(context.with_measured_power, noise, [((), begin)], faults=())[0]
     values = np.array([context.coordinates.value(name, fit.unit) for name in alone.parameters])
     assert values == pytest.approx([*alone.parameters.values()], rel=0.02)
@@ -382,7 +473,9 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     inexact, tmp_path, monkeypatch
 ):
     def page_of(evidence):
-        add_prediction_section(page := Report("candidates", ""), replace(inexact, evidence=evidence))
+        add_prediction_section(
+            page := Report("candidates", ""), replace(inexact, evidence=evidence)
+        )
         return page.save(tmp_path / "page.html").read_text(encoding="utf-8")
 
     made = inexact.evidence
@@ -395,9 +488,16 @@ def test_the_page_shows_what_is_named_however_many_leave_less_and_no_chart_where
     assert term(made.term.names[0]).words in shown
 
     def lose(row):
-        return replace(row, prediction=replace(row.prediction, squares=np.full_like(row.prediction.squares, np.inf)))
+        return replace(
+            row,
+            prediction=replace(
+                row.prediction, squares=np.full_like(row.prediction.squares, np.inf)
+            ),
+        )
 
-    lost = replace(made, base=lose(made.base), rows=tuple(map(lose, made.rows)), others=(), term=None)
+    lost = replace(
+        made, base=lose(made.base), rows=tuple(map(lose, made.rows)), others=(), term=None
+    )
     assert "No set has a steady state on the held-out events" in page_of(lost)
 
 
@@ -409,16 +509,34 @@ def test_without_held_out_events_nothing_incomplete_is_named():
 
 
 def test_a_pair_that_the_fitted_events_reject_does_not_keep_its_right_member_from_its_name():
-    """Of an inexact load a second effect patches something up; which one does so of the held-out event is chance."""
-    off = (("broken_torque", 0.1002), ("bounded_flux", 0.5169), ("mixing_exponents", 0.198), ("other_motors", 0.6207))
+    """Of an inexact load a second effect patches something up; which one does so of the held-out
+    event is chance.
+    """
+    off = (
+        ("broken_torque", 0.1002),
+        ("bounded_flux", 0.5169),
+        ("mixing_exponents", 0.198),
+        ("other_motors", 0.6207),
+    )
     case = Case(
-        "exponential_recovery", 0.1676, events=4, noise=hidden_effects.Noise(0.0005), imperfections=off,
+        "exponential_recovery",
+        0.1676,
+        events=4,
+        noise=hidden_effects.Noise(0.0005),
+        imperfections=off,
         recorder=Recorder(rate=200.0, samples=400, phasor_window=0.02),
-    )  # fmt: skip
-    made = [detect(Record(f"event{k}", **r, source=str(k)).check()) for k, r in enumerate(make(case, 1044483946))]
+    )
+    made = [
+        detect(Record(f"event{k}", **r, source=str(k)).check())
+        for k, r in enumerate(make(case, 1044483946))
+    ]
     only = ("exponential_recovery", "second_motor_group", "second_cage", "transformer_inrush")
-    found = investigate(compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")()),
-                        made[:3], made[3:], only=only)  # fmt: skip
+    found = investigate(
+        compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")()),
+        made[:3],
+        made[3:],
+        only=only,
+    )
     assert (found.verdict.names, found.verdict.complete) == (("exponential_recovery",), False)
     best = min(found.explanations.refits.values(), key=lambda fit: fit.cost)
     assert len(best.names) == 2
@@ -427,7 +545,11 @@ def test_a_pair_that_the_fitted_events_reject_does_not_keep_its_right_member_fro
 def test_the_files_say_what_is_left(investigation, tmp_path):
     investigation.write(tmp_path / "run")
     made = json.loads((tmp_path / "run" / "discrepancy.json").read_text())
-    assert (made["verdict"], made["complete"], made["effects"]) == ("named", False, ["undervoltage_trip"])
+    assert (made["verdict"], made["complete"], made["effects"]) == (
+        "named",
+        False,
+        ["undervoltage_trip"],
+    )
     left, gap = made["remainder"], made["gap"]["validate"]
     assert left["model_error"]["value"] == pytest.approx(gap["after"]["model_error"]["value"])
     before, after = (gap[stage]["model_error"]["value"] for stage in ("before", "after"))

@@ -1,4 +1,6 @@
-"""Priors in a fit: real motors are machines by them, and where nothing but noise is left nothing moves."""
+"""Priors in a fit: real motors are machines by them, and where nothing but noise is left nothing
+moves.
+"""
 
 from pathlib import Path
 
@@ -12,7 +14,12 @@ LOADS = {
     "first": {"voltages": [0, 1, 2], "currents": [16, 17, 18]},
     "second": {"voltages": [4, 5, 6], "currents": [8, 9, 10]},
 }  # fmt: skip
-QUICK = {"optimizer": "multistart_least_squares", "budget": 600, "check_intervals": False, "progress": False}
+QUICK = {
+    "optimizer": "multistart_least_squares",
+    "budget": 600,
+    "check_intervals": False,
+    "progress": False,
+}
 
 
 def identified(records, priors, **known):
@@ -22,7 +29,10 @@ def identified(records, priors, **known):
 
 def test_where_nothing_but_noise_is_left_no_digit_moves():
     _, events = waves.drawn_events([1, 3])
-    free, held = (identified(events, priors, model="fifth_order_branch", domain="waves") for priors in (False, True))
+    free, held = (
+        identified(events, priors, model="fifth_order_branch", domain="waves")
+        for priors in (False, True)
+    )
     assert free.adequate
     assert held.result.parameters == free.result.parameters
     assert held.result.standard_errors == free.result.standard_errors

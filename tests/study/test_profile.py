@@ -1,4 +1,6 @@
-"""Profiles: a parabola where theory says so, open sides, two minima, better optima, and the posterior beside them."""
+"""Profiles: a parabola where theory says so, open sides, two minima, better optima, and the
+posterior beside them.
+"""
 
 import re
 from dataclasses import replace
@@ -64,12 +66,16 @@ def test_a_point_of_a_profile_is_the_constrained_optimum(quiet):
     def rows(x):
         return likelihood.rows(np.insert(x, j, held)[None])[0]
 
-    solved = least_squares(rows, np.delete(quiet.unit, j), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12)
+    solved = least_squares(
+        rows, np.delete(quiet.unit, j), x_scale="jac", xtol=1e-12, ftol=1e-12, gtol=1e-12
+    )
     assert profile.deviance[-1] == pytest.approx(2 * solved.cost - quiet.deviance, abs=0.02)
 
 
 def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_says_so():
-    """At C = 0.75 the deviance is up by 16, at 0.3 by 0.3: a lane from the estimate alone ends at the crest."""
+    """At C = 0.75 the deviance is up by 16, at 0.3 by 0.3: a lane from the estimate alone ends at
+    the crest.
+    """
     known = study.judged(Problem(study.model(), events((0.15,), 0.01)), study.TYPICAL).uncertainty
     made = {p.name: p for p in profiles(known).profiles}
     assert made["C"].ends == (End.BOUND, End.BOUND)
@@ -80,19 +86,27 @@ def test_a_shallow_dip_leaves_c_open_on_both_sides_of_a_crest_and_the_verdict_sa
     assert "open upwards" in judged.verdicts["C"].detail
     assert judged.profiled["C"] == pytest.approx(made["C"].interval, rel=1e-3)
     assert set(judged.profiled) >= {"C", "X_prime", "q_v"}
-    narrow = {n for n, v, h in zip(known.names, known.values, known.half, strict=True) if h <= 0.05 * v}
+    narrow = {
+        n for n, v, h in zip(known.names, known.values, known.half, strict=True) if h <= 0.05 * v
+    }
     assert narrow  # a parabola anyway
     assert not narrow & set(judged.profiled)
     assert judged.verdicts["T_m"].word == IDENTIFIED
 
 
 @pytest.mark.parametrize(("deviation", "seed", "Q_s0"), [(0.01, 2, 0.02), (0.005, 3, 0.05)])
-def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile_was_begun_from(deviation, seed, Q_s0):
-    """Where the static load draws next to no reactive power, q_v is hardly known, and X' and C follow it in a curve.
+def test_an_interval_holds_what_the_records_do_not_rule_out_whatever_its_profile_was_begun_from(
+    deviation, seed, Q_s0
+):
+    """Where the static load draws next to no reactive power, q_v is hardly known, and X' and C
+    follow it in a curve.
 
-    With one parameter held at its truth after the other, the best fit from the truth is close enough to the optimum.
+    With one parameter held at its truth after the other, the best fit from the truth is close
+    enough to the optimum.
     """
-    known = study.judged(Problem(study.model(), events((0.3,), deviation, seed, Q_s0)), study.TYPICAL).uncertainty
+    known = study.judged(
+        Problem(study.model(), events((0.3,), deviation, seed, Q_s0)), study.TYPICAL
+    ).uncertainty
     judged = check_by_profiles(known)
     likelihood = judged.likelihood
     start = np.repeat(likelihood.to_unit(np.array(study.TYPICAL)), len(judged.names), axis=0)
@@ -119,14 +133,21 @@ def test_a_better_optimum_restarts_the_profiles_and_is_said(quiet):
 def test_two_minima_and_open_sides_change_the_verdict():
     good = ParameterVerdict(IDENTIFIED, "± 3 %")
     base = LikelihoodProfile(
-        "C", np.array([0.4, 0.5, 0.6]), np.array([5.0, 0, 5.0]), (0.48, 0.52), (End.CLOSED, End.CLOSED), ()
+        "C",
+        np.array([0.4, 0.5, 0.6]),
+        np.array([5.0, 0, 5.0]),
+        (0.48, 0.52),
+        (End.CLOSED, End.CLOSED),
+        (),
     )
     assert revise_verdict(good, base, 0, 1).word == IDENTIFIED
     twice = revise_verdict(good, replace(base, minima=(0.58,)), 0, 1)
     assert (twice.word, "two minima, another at 0.58" in twice.detail) == (WEAK, True)
     upwards = revise_verdict(good, replace(base, ends=(End.CLOSED, End.BOUND)), 0, 1)
     assert (upwards.word, "open upwards" in upwards.detail) == (WEAK, True)
-    assert revise_verdict(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
+    assert (
+        revise_verdict(good, replace(base, ends=(End.BOUND, End.BOUND)), 0, 1).word == UNIDENTIFIED
+    )
     assert revise_verdict(good, replace(base, interval=(0.3, 0.7)), 0, 1).word == WEAK
 
 
@@ -146,7 +167,9 @@ def test_too_few_walkers_are_refused(quiet):
     pytest.importorskip("emcee", reason="the optional extra [posterior] is not installed")
     from tractexp.identification.posterior import sample
 
-    with pytest.raises(UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"):
+    with pytest.raises(
+        UserError, match=r"task.walkers=10 is too few: 9 coordinates need at least 18"
+    ):
         sample(quiet, walkers=10, steps=100, seed=0)
 
 
@@ -154,7 +177,9 @@ def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(qu
     found = profiles(quiet)
     path = report(found).save(tmp_path / "profile.html")
     told, drawn = read(path), charts(path.read_text(encoding="utf-8"))
-    for chart, profile, value, half in zip(drawn, found.profiles, quiet.values, quiet.half, strict=True):
+    for chart, profile, value, half in zip(
+        drawn, found.profiles, quiet.values, quiet.half, strict=True
+    ):
         assert chart["layout"]["title"]["text"] == f"{profile.name}: identified"
         curves = {trace["name"]: trace for trace in chart["data"] if trace["name"]}
         x, y = (unpacked(curves["profile"][axis]) for axis in "xy")
@@ -174,16 +199,21 @@ def test_the_page_draws_each_profile_with_its_parabola_threshold_and_interval(qu
 
 def test_the_page_of_a_model_that_lacks_something_says_what_its_intervals_hold(tmp_path):
     (event,) = events((0.5,), 0.002)
-    step = 0.02 * (event.record.t > 0.85)  # a load that is switched on: nothing of the model can do that
-    spoiled = study.event(event.record.t, event.record.U, np.array([event.record.P + step, event.record.Q]))
+    # a load that is switched on: nothing of the model can do that
+    step = 0.02 * (event.record.t > 0.85)
+    spoiled = study.event(
+        event.record.t, event.record.U, np.array([event.record.P + step, event.record.Q])
+    )
     known = study.judged(Problem(study.model(), [spoiled]), study.TYPICAL).uncertainty
     assert not known.exact
     found = profiles(known, names=["M", "p_v"])
     told = read(report(found, "an effect is missing").save(tmp_path / "profile.html"))
     assert "An effect is missing." in told.words
     assert "More than noise is left, so these are intervals of least squares" in told.words
-    assert all(profile.interval[0] < value < profile.interval[1] for profile, value in zip(
-        found.profiles, (known.values[3], known.values[5]), strict=True))  # fmt: skip
+    assert all(
+        profile.interval[0] < value < profile.interval[1]
+        for profile, value in zip(found.profiles, (known.values[3], known.values[5]), strict=True)
+    )
 
 
 def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path):
@@ -191,7 +221,8 @@ def test_the_page_of_a_posterior_shows_its_draws_beside_the_fit(quiet, tmp_path)
     error = quiet.information.standard_errors
     draws = quiet.values + error * rng.standard_normal((20_000, len(error)))
     draws[:, 1] += 1.5 * error[1]  # of one parameter they lie elsewhere
-    draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]  # as C does, so does q_v
+    # as C does, so does q_v
+    draws[:, 6] = quiet.values[6] + error[6] * (draws[:, 2] - quiet.values[2]) / error[2]
     path = posterior.report(quiet, PosteriorSample(quiet.names, draws, 2000, 50.0, 0.3, 1)).save(
         tmp_path / "posterior.html"
     )
@@ -218,7 +249,10 @@ def test_the_page_says_where_curvature_misleads(quiet):
         ({"interval": (value - 2 * half, value + half)}, r"Lopsided: 2\.0 times as far down"),
         ({"interval": (value - half / 2, value + half / 2)}, "Narrower than by curvature"),
         ({"interval": (value - 2 * half, value + 2 * half)}, "Wider than by curvature"),
-        ({"ends": bound, "interval": (value - half, 0.03)}, r"No limit upwards but the bound 0\.03"),
+        (
+            {"ends": bound, "interval": (value - half, 0.03)},
+            r"No limit upwards but the bound 0\.03",
+        ),
         ({"ends": (End.BOUND, End.BOUND)}, "No limit but the bounds: the record does not tell it"),
         ({"ends": points}, "Not followed to its end downwards: raise points"),
         ({"minima": (0.02,)}, r"0\.02 fits about as well as the estimate"),
@@ -227,10 +261,17 @@ def test_the_page_says_where_curvature_misleads(quiet):
 
 
 def test_a_verdict_repeats_no_interval():
-    """The table has the one interval that holds: a half-width of the curvature beside it would be another."""
+    """The table has the one interval that holds: a half-width of the curvature beside it would be
+    another.
+    """
     by_curvature = ParameterVerdict(WEAK, "trades against T_m (correlation 0.98)")
     profile = LikelihoodProfile(
-        "C", np.array([0.3, 0.5, 0.9]), np.array([5.0, 0.0, 5.0]), (0.31, 0.88), (End.CLOSED, End.CLOSED), ()
+        "C",
+        np.array([0.3, 0.5, 0.9]),
+        np.array([5.0, 0.0, 5.0]),
+        (0.31, 0.88),
+        (End.CLOSED, End.CLOSED),
+        (),
     )
     verdict = str(revise_verdict(by_curvature, profile, 0.0, 1.0))
     assert verdict == "weakly identified: trades against T_m (correlation 0.98)"

@@ -14,11 +14,15 @@ TRIP = ("undervoltage_trip",)
 
 @pytest.fixture(scope="module")
 def planted():
-    """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's grid."""
+    """The bench of a trip of 5 %, its base fit, and a start at each setting of the catalogue's
+    grid.
+    """
     at = bench(base(), events("undervoltage_trip", 0.5, 800012, noise=LOUD, recorder=FAST), TRIP)
     first = disagreement(base_fit(at), 0)
     settings = at.catalogue["undervoltage_trip"].settings
-    units = np.array([at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings])
+    units = np.array(
+        [at.coordinates.placed(first.fit.unit, s | {"tripped_share": 0.05}) for s in settings]
+    )
     coordinates = at.coordinates
     faults = coordinates.parameters(at.catalogue.of_measurement)
     return at, first.noise, units, [*coordinates.base, *coordinates.before, *faults]
@@ -30,17 +34,24 @@ def test_the_best_of_all_descents_begins_at_a_start_that_promises(planted):
     assert len(units) == 2 * fit_effort.MOST_STARTS
     assert len(kept) == fit_effort.MOST_STARTS
     best = lambda these: min(  # noqa: E731
-        f.deviance for f in fitting._run_descents(at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT)
+        f.deviance
+        for f in fitting._run_descents(
+            at, noise, [(TRIP, u) for u in these], None, fit_effort.ROUGH_DESCENT
+        )
     )
     assert best(kept) == pytest.approx(best(units), abs=1.0)
 
 
 def test_what_changes_nothing_promises_least(planted):
-    """A relay whose level no dip reaches leaves the deviance of the base model; so does one of no size."""
+    """A relay whose level no dip reaches leaves the deviance of the base model; so does one of no
+    size.
+    """
     at, noise, units, nuisances = planted
     never = at.coordinates.placed(units[0], {"trip_level": 0.3, "trip_delay": 0.5})
     still = at.coordinates.placed(units[1], {"tripped_share": 0.0})
-    kept = select_promising_starts(at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units))
+    kept = select_promising_starts(
+        at, noise, TRIP, np.array([never, *units, still]), nuisances, len(units)
+    )
     assert not any(np.array_equal(k, u) for k in kept for u in (never, still))
 
 

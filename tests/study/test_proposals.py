@@ -1,4 +1,6 @@
-"""A term for what no effect of the catalogue explains: columns, screen, refit, gate, plugin and what machines read."""
+"""A term for what no effect of the catalogue explains: columns, screen, refit, gate, plugin and
+what machines read.
+"""
 
 import importlib.util
 import itertools
@@ -16,9 +18,24 @@ from hidden_effects import EFFECTS, Case, Noise, Recorder, make
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.disagreement import disagreement
 from tractexp.discrepancy.proposal import generate
-from tractexp.discrepancy.proposal.bed import carried_over, context_of_terms, place, sizes_of, with_terms
+from tractexp.discrepancy.proposal.bed import (
+    carried_over,
+    context_of_terms,
+    place,
+    sizes_of,
+    with_terms,
+)
 from tractexp.discrepancy.proposal.effect import Library
-from tractexp.discrepancy.proposal.library import ANSWER, BALANCES, CLOCKS, SIGNALS, Term, pick_of, term, terms
+from tractexp.discrepancy.proposal.library import (
+    ANSWER,
+    BALANCES,
+    CLOCKS,
+    SIGNALS,
+    Term,
+    pick_of,
+    term,
+    terms,
+)
 from tractexp.discrepancy.proposal.propose import propose, to_dict
 from tractexp.discrepancy.proposal.refit import term_fits
 from tractexp.discrepancy.proposal.screen import Ground, scores, screen
@@ -40,18 +57,32 @@ SLOW, FAST = Recorder(rate=250.0, samples=500), Recorder()
 STEP, TRIP = "timed:power:step:of_return", "answer:static:relay"
 FEW = tuple(
     term(n)
-    for n in (STEP, "timed:power:ramp:of_dip", "timed:power_P:step:of_record", TRIP, "answer:torque:slip",
-              "answer:decay:slip", "answer:static:washout", "answer:whole:relay", "answer:resistance:constant")
-)  # fmt: skip
+    for n in (
+        STEP,
+        "timed:power:ramp:of_dip",
+        "timed:power_P:step:of_record",
+        TRIP,
+        "answer:torque:slip",
+        "answer:decay:slip",
+        "answer:static:washout",
+        "answer:whole:relay",
+        "answer:resistance:constant",
+    )
+)
 
 
 def base(*effects):
-    return compose(get("model/motor", "electromechanical")(), get("model/static", "exponential")(), effects)
+    return compose(
+        get("model/motor", "electromechanical")(), get("model/static", "exponential")(), effects
+    )
 
 
 def events(effect=None, size=1.0, seed=800001, count=3, noise=0.003, recorder=SLOW):
     records = make(Case(effect, size, events=count, noise=Noise(noise), recorder=recorder), seed)
-    return [detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check()) for k, r in enumerate(records)]
+    return [
+        detect(Record(f"event{k + 1}", **r, source=f"made {k + 1}").check())
+        for k, r in enumerate(records)
+    ]
 
 
 def fitted_base(made):
@@ -65,7 +96,9 @@ def searched(made, held, among=FEW, seed=0):
     fit = fitted_base(made)
     first = disagreement(fit, seed)
     at = fit.context.coordinates
-    bare = refit(fit.context, first.noise, [((), at.without_faults(first.fit.unit, ()))], faults=())[0]
+    bare = refit(
+        fit.context, first.noise, [((), at.without_faults(first.fit.unit, ()))], faults=()
+    )[0]
     return propose(fit, first, bare, first.noise, held, seed, among)
 
 
@@ -79,18 +112,26 @@ def ground():
 @pytest.fixture(scope="module")
 def stepped():
     made = events("load_step", 3.0, count=3)
-    return made, tractexp.investigate(made[:2], validate=made[2:], effects=["stator_resistance"], progress=False)
+    return made, tractexp.investigate(
+        made[:2], validate=made[2:], effects=["stator_resistance"], progress=False
+    )
 
 
 @pytest.mark.parametrize(
-    "name", ["answer:torque:slip", "answer:decay:slip", "answer:static_P:relay", "answer:angle:rate", STEP]
+    "name",
+    ["answer:torque:slip", "answer:decay:slip", "answer:static_P:relay", "answer:angle:rate", STEP],
 )
 def test_a_column_is_the_difference_of_two_simulations(ground, name):
-    """Central differences of a tenth of the relevant size, against the one-sided ones of the screen."""
+    """Central differences of a tenth of the relevant size, against the one-sided ones of the
+    screen.
+    """
     chosen, at = term(name), ground.context.coordinates
     setting = chosen.signal.settings[len(chosen.signal.settings) // 2]
     (size, _), zeros = sizes_of(chosen)[0], [0.0] * (len(sizes_of(chosen)) - 1)
-    up, down, small = (place(at, ground.unit, chosen, setting, [k * size.relevant, *zeros]) for k in (0.1, -0.1, 0.02))
+    up, down, small = (
+        place(at, ground.unit, chosen, setting, [k * size.relevant, *zeros])
+        for k in (0.1, -0.1, 0.02)
+    )
     raw = ground.context.residuals(np.array([up, down]), (chosen.signal.kind,))
     central = ground.context.whiten(ground.noise, (raw[:1] - raw[1:]) / (0.2 * size.relevant))
     column = ground.columns(small[None], np.array([0.02 * size.relevant]), chosen.signal.kind)
@@ -116,14 +157,18 @@ def test_equal_bits_of_the_base_model_on_both_benches():
     assert np.array_equal(mine, fit.context.residuals(fit.fit.unit[None], ()))
 
 
-@pytest.mark.parametrize(("clock", "begins"), [("of_record", 0.0), ("of_dip", "start"), ("of_return", "end")])
+@pytest.mark.parametrize(
+    ("clock", "begins"), [("of_record", 0.0), ("of_dip", "start"), ("of_return", "end")]
+)
 def test_a_clock_counts_from_where_it_says(ground, clock, begins):
     chosen = term(f"timed:power_P:step:{clock}")
     point = place(ground.context.coordinates, ground.unit, chosen, {"instant": 0.1}, [1.0])
     added = ground.context.residuals(point[None], (chosen.signal.kind,))[0, 0] - ground.raw[0]
     for e, event in enumerate(ground.context.events):
         own, t = added[ground.context.drive.part(e)], event.record.t - event.record.t[0]
-        assert np.all((np.abs(own) < 1e-9) | (np.abs(own - 1) < 1e-6) | (np.abs(np.gradient(own)) > 0))
+        assert np.all(
+            (np.abs(own) < 1e-9) | (np.abs(own - 1) < 1e-6) | (np.abs(np.gradient(own)) > 0)
+        )
         first = t[np.flatnonzero(own > 0.5)[0]] - 0.1
         if begins == 0.0:
             assert first == pytest.approx(0.0, abs=event.record.step)
@@ -137,13 +182,21 @@ def test_a_step_by_itself_is_found_with_its_time(stepped):
     made, found = stepped
     assert found.verdict == "unexplained"
     (proposed,) = found.proposal["terms"]
-    assert (proposed["balance"], proposed["signal"], proposed["clock"]) == ("power", "step", "of_return")
+    assert (proposed["balance"], proposed["signal"], proposed["clock"]) == (
+        "power",
+        "step",
+        "of_return",
+    )
     assert proposed["function_of_voltage"] is False
     assert found.proposal["explained"]["train"] > 0.9
     assert found.proposal["explained"]["validate"] > 0.9
-    truth = EFFECTS["load_step"].details(np.random.default_rng([800001, zlib.crc32(b"load_step")]), ())
+    truth = EFFECTS["load_step"].details(
+        np.random.default_rng([800001, zlib.crc32(b"load_step")]), ()
+    )
     assert proposed["parameters"]["instant"]["value"] == pytest.approx(truth["delay"], abs=0.02)
-    assert made[0].record.P[0] * 0.06 == pytest.approx(proposed["parameters"]["size_P"]["value"], rel=0.1)
+    assert made[0].record.P[0] * 0.06 == pytest.approx(
+        proposed["parameters"]["size_P"]["value"], rel=0.1
+    )
 
 
 def test_what_machines_read(stepped):
@@ -165,7 +218,10 @@ def test_the_page_and_the_table_tell_it(stepped, tmp_path):
     assert ">Proposal<" in text
     assert "not a function of the voltage" in text
     assert "proposed_effect.py" in paths
-    assert any(line.startswith("proposed: a step") for line in map(str.strip, str(found.summary()).splitlines()))
+    assert any(
+        line.startswith("proposed: a step")
+        for line in map(str.strip, str(found.summary()).splitlines())
+    )
 
 
 def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
@@ -180,7 +236,9 @@ def test_the_plugin_file_reproduces_the_fit(stepped, tmp_path, monkeypatch):
     values = [own[n] if n in own else at.value(n, chosen.unit) for n in model.names]
     width = 0.2 * np.maximum(np.linalg.norm(bench.drive.before, axis=1, keepdims=True), 0.1)
     before = bench.drive.before + width * (2 * chosen.unit[at.before].reshape(-1, 2) - 1)
-    made = model.simulate(bench.drive, np.array(values)[None], bench.problem.step.substeps, before[:, None])
+    made = model.simulate(
+        bench.drive, np.array(values)[None], bench.problem.step.substeps, before[:, None]
+    )
     assert np.abs(made.outputs[:, 0] - proposal.train.after.calculated).max() < 1e-8
     assert any("proposed_size_P" in line or "k_P" in line for line in model.latex())
 
@@ -191,14 +249,17 @@ def test_a_transformer_whose_ratio_steps_is_found_in_the_voltage_that_the_load_s
     voltage, power = "timed:voltage:step:of_return", "timed:power:decay:of_return"
     found = searched(made[:2], made[2:], (*FEW, term(voltage), term(power)))
     assert found.proposal.term.name == voltage
-    assert found.proposal.values["size"] == pytest.approx(0.5 * EFFECTS["tap_changer_step"].reference, rel=0.05)
+    assert found.proposal.values["size"] == pytest.approx(
+        0.5 * EFFECTS["tap_changer_step"].reference, rel=0.05
+    )
     assert [t.name for t, _ in found.tried].index(power) > 0
 
 
 @pytest.mark.parametrize(("seed", "measured"), [(800001, 0.6), (800002, 4.0)])
 def test_what_a_right_term_explains_does_not_hang_on_the_level_of_the_noise(seed, measured):
-    """Of the deviance in excess of the noise, `measured` on the held-out event, the same step gains too little once,
-    and once four times what there is."""
+    """Of the deviance in excess of the noise, `measured` on the held-out event, the same step gains
+    too little once, and once four times what there is.
+    """
     made = events("load_step", 0.2, seed=seed, recorder=FAST)
     found = searched(made[:2], made[2:])
     held = found.proposal.validate
@@ -217,7 +278,9 @@ def test_nothing_is_proposed_where_nothing_is_missing():
 
 
 def test_without_a_held_out_event_nothing_is_proposed():
-    assert "none was held out" in propose(SimpleNamespace(context=None), None, None, None, (), 0).why
+    assert (
+        "none was held out" in propose(SimpleNamespace(context=None), None, None, None, (), 0).why
+    )
     assert proposed_in_words(None, "why not") == ["no term is proposed: why not"]
     assert proposed_in_words(None, None) == []
 
@@ -235,11 +298,16 @@ def test_what_a_proposal_ties_with_and_looks_like_is_said():
     further = proposed_in_words(
         {**told, "ties": [{"words": "a ramp of P"}], "alike": {"undervoltage_trip": 0.93}}, None
     )
-    assert further[2:] == ["these events cannot tell it from a ramp of P", "looks like it: undervoltage_trip (93%)"]
+    assert further[2:] == [
+        "these events cannot tell it from a ramp of P",
+        "looks like it: undervoltage_trip (93%)",
+    ]
 
 
 def test_the_library_adds_each_signal_that_is_picked():
-    """Of the steady state only: what it adds to an equation is the picked signal times the size, with its sign."""
+    """Of the steady state only: what it adds to an equation is the picked signal times the size,
+    with its sign.
+    """
     library = Library(ANSWER)
     eq = base(library).equations
     (defined,) = [e for s, e in eq.definitions.items() if s.name == f"{ANSWER}_signal"]
@@ -261,17 +329,26 @@ def _loaded(path, monkeypatch):
 def _every_balance_and_signal():
     answers = [s for s in SIGNALS if s.kind == ANSWER]
     here = list(BALANCES)
-    pairs = [(b, s) for b, s in zip(here, itertools.cycle(answers), strict=False) if s.name not in b.without]
+    pairs = [
+        (b, s)
+        for b, s in zip(here, itertools.cycle(answers), strict=False)
+        if s.name not in b.without
+    ]
     pairs += [(here[7], s) for s in answers if s.name != "constant"]
     made = [Term(b, s) for b, s in dict.fromkeys(pairs)]
     return [
         *made,
-        *(Term(here[2], s, c) for s, c in zip((s for s in SIGNALS if s.kind != ANSWER), itertools.cycle(CLOCKS))),
+        *(
+            Term(here[2], s, c)
+            for s, c in zip((s for s in SIGNALS if s.kind != ANSWER), itertools.cycle(CLOCKS))
+        ),
     ]
 
 
 @pytest.mark.parametrize("chosen", _every_balance_and_signal(), ids=lambda t: t.name)
-def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(chosen, tmp_path, monkeypatch):
+def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(
+    chosen, tmp_path, monkeypatch
+):
     values = {s.name: 0.1 for s in chosen.balance.sizes}
     values |= {s.name: s.grid[0] for s in chosen.signal.shapes}
     path = tmp_path / "proposed_effect.py"
@@ -283,13 +360,18 @@ def test_every_balance_and_signal_makes_a_plugin_that_the_model_takes(chosen, tm
 
 def test_a_name_of_a_record_is_text_in_the_plugin_that_is_to_be_installed(tmp_path, monkeypatch):
     chosen = _every_balance_and_signal()[0]
-    values = {s.name: 0.1 for s in chosen.balance.sizes} | {s.name: s.grid[0] for s in chosen.signal.shapes}
+    values = {s.name: 0.1 for s in chosen.balance.sizes} | {
+        s.name: s.grid[0] for s in chosen.signal.shapes
+    }
     monkeypatch.chdir(tmp_path)
     for k, name in enumerate(NASTY):
         path = tmp_path / f"{k}.py"
         path.write_text(generate.source(chosen, values, name), encoding="utf-8")
         name = name.encode(errors="backslashreplace").decode()
-        assert f"workflow from {name}; no textbook" in _loaded(path, monkeypatch).ProposedEffect.__doc__
+        assert (
+            f"workflow from {name}; no textbook"
+            in _loaded(path, monkeypatch).ProposedEffect.__doc__
+        )
     assert not (tmp_path / "owned").exists()
 
 
@@ -302,4 +384,7 @@ def test_the_library_has_a_name_for_each_term():
 def test_terms_become_candidates_with_their_own_parameters_only(ground):
     bench = with_terms(ground.context, [term(TRIP), term(TRIP)])
     own = [bench.coordinates.names[k] for k in bench.coordinates.parameters([TRIP])]
-    assert own == ["answer_static_size", *(f"answer_relay_{n}" for n in ("level", "margin", "delay", "wait", "ramp"))]
+    assert own == [
+        "answer_static_size",
+        *(f"answer_relay_{n}" for n in ("level", "margin", "delay", "wait", "ramp")),
+    ]

@@ -1,4 +1,6 @@
-"""Recorders that average phasors over whole cycles: the average, the voltage reckoned back, and what is said of it."""
+"""Recorders that average phasors over whole cycles: the average, the voltage reckoned back, and
+what is said of it.
+"""
 
 from dataclasses import replace
 
@@ -51,15 +53,20 @@ def test_the_voltage_reckoned_back_is_that_which_was_averaged(cycles):
     back = RecorderWindow(window).sharpened(shown).record.U
     shows, error = shown.record.U - event.record.U, back - event.record.U
     assert np.abs(shows).max() > 0.01
-    # What repeats with the window itself cannot be told: corners lose a little where it is shorter than the edges.
+    # What repeats with the window itself cannot be told: corners lose a little where it is shorter
+    # than the edges.
     assert error @ error < (0.2 if cycles == 1 else 1e-3) * (shows @ shows)
 
 
 def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampling_resolves():
     (event,) = events(count=1)
     windows = windows_of([event])
-    assert [w.window for w in windows if not w.shape] == pytest.approx([0.02 * k for k in (1, 2, 3, 4, 5, 6)])
-    assert {w.shape.name: w.window for w in windows if w.shape} == pytest.approx({"p_class": 0.04, "m_class": 0.1775})
+    assert [w.window for w in windows if not w.shape] == pytest.approx(
+        [0.02 * k for k in (1, 2, 3, 4, 5, 6)]
+    )
+    assert {w.shape.name: w.window for w in windows if w.shape} == pytest.approx(
+        {"p_class": 0.04, "m_class": 0.1775}
+    )
     assert "40 ms by the weights of p_class" in next(w for w in windows if w.shape).describe()
     slow = replace(event, record=replace(event.record, t=event.record.t * 10))
     assert min(w.window for w in windows_of([slow])) >= 2 * slow.record.step
@@ -67,11 +74,14 @@ def test_windows_are_whole_cycles_and_those_of_measurement_units_that_the_sampli
 
 def test_a_window_that_the_records_say_is_the_only_one_tried():
     (event,) = events(count=1)
-    said = replace(event, record=replace(event.record, window=chosen("estimator", "p_class").window(50.0)))
+    said = replace(
+        event, record=replace(event.record, window=chosen("estimator", "p_class").window(50.0))
+    )
     (window,) = windows_of([said, said])
     assert window.window == pytest.approx(0.04)
     assert "p_class" in window.describe()
-    assert len(windows_of([said, event])) == 8  # where they contradict each other it is searched for
+    # where they contradict each other it is searched for
+    assert len(windows_of([said, event])) == 8
 
 
 def test_what_a_triangle_did_is_undone():
@@ -87,7 +97,9 @@ def test_what_a_triangle_did_is_undone():
 
 
 def test_a_window_of_phasors_is_no_missing_effect():
-    """The load is nonlinear, so that a window on voltage and current shows, and no effect is named for it."""
+    """The load is nonlinear, so that a window on voltage and current shows, and no effect is named
+    for it.
+    """
     made = events(count=3, nuisances=(("phasor_window", 3.0),))
     told = []
     found = investigate(base(), made[:2], made[2:], {}, {}, only=FEW, tell=told.append)
@@ -108,7 +120,9 @@ def test_no_window_is_found_where_there_is_none():
 
 @pytest.mark.parametrize("window", [0.02, 0.035, "p_class", "m_class"])
 def test_a_model_set_to_a_window_is_looked_at_as_an_investigation_looks(window):
-    """`model.window`: driven by the voltage reckoned back, its power averaged; the same as behind the recorder."""
+    """`model.window`: driven by the voltage reckoned back, its power averaged; the same as behind
+    the recorder.
+    """
     (event,) = events(count=1)
     load = tractexp.compose().model
     shape = chosen("estimator", window).window(50.0) if isinstance(window, str) else None
@@ -130,7 +144,9 @@ def test_a_window_that_the_records_say_is_theirs():
     shape = chosen("estimator", "p_class").window(50.0)
     said = replace(event, record=replace(event.record, window=shape))
     model = tractexp.compose(window="recorded").model
-    assert np.array_equal(phasors(said, model).window, phasors(event, tractexp.compose(window="p_class").model).window)
+    assert np.array_equal(
+        phasors(said, model).window, phasors(event, tractexp.compose(window="p_class").model).window
+    )
     assert phasors(event, model).window is None
     assert RecorderWindow(shape.length, shape, said=True).setting == "recorded"
 
@@ -156,11 +172,15 @@ def test_waveforms_have_no_window():
 
 
 def test_the_extended_model_has_the_window_that_was_taken_into_account(tmp_path):
-    """As a file and as a call's, so that the next step sees the records as the investigation did."""
+    """As a file and as a call's, so that the next step sees the records as the
+    investigation did.
+    """
     made = events("stator_resistance", size=3.0, count=3, nuisances=(("phasor_window", 3.0),))
     train, held = made[:2], made[2:]
     model = tractexp.compose(window=0.06)
-    found = tractexp.investigate(train, model, validate=held, effects=["stator_resistance"], progress=False)
+    found = tractexp.investigate(
+        train, model, validate=held, effects=["stator_resistance"], progress=False
+    )
     assert found.names == ("stator_resistance",)
     assert found.content["recorder_window"] == pytest.approx(0.06)
     assert found.extended.window == pytest.approx(0.06)
@@ -173,5 +193,7 @@ def test_the_extended_model_has_the_window_that_was_taken_into_account(tmp_path)
     assert str(file) in first
     assert "found missing: stator_resistance" in second
     assert third == "# window: as in the base model."
-    again = tractexp.identify(train, file, optimizer="multistart_least_squares", check_intervals=False, progress=False)
+    again = tractexp.identify(
+        train, file, optimizer="multistart_least_squares", check_intervals=False, progress=False
+    )
     assert again.grade == found.content["adequacy"]["grade"]

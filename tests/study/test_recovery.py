@@ -1,4 +1,6 @@
-"""Parameters that others' simulators were run with come back from their records (table: benchmarks/recovery.py)."""
+"""Parameters that others' simulators were run with come back from their records (table:
+benchmarks/recovery.py).
+"""
 
 from dataclasses import replace
 from functools import cache
@@ -11,7 +13,10 @@ import recovery
 def skip_without(simulator):
     if recovery.SIMULATORS[simulator][0]() is None:
         variable = f"TRACTEXP_{simulator.upper()}_PYTHON"
-        pytest.skip(f"{simulator} is not installed; install the extra 'crosscheck' or name a Python in {variable}")
+        pytest.skip(
+            f"{simulator} is not installed; install the extra 'crosscheck' or name a Python in"
+            f" {variable}"
+        )
 
 
 @cache
@@ -30,7 +35,9 @@ def test_the_parameters_of_a_case_are_recovered(case):
 def test_cases_are_numbered_and_ask_for_what_their_loads_have():
     assert [case.number for case in recovery.CASES] == list(range(1, len(recovery.CASES) + 1))
     for case in recovery.CASES:
-        assert {name for pair in case.within for name in pair.split(" / ")} <= set(case.truth), case.number
+        assert {name for pair in case.within for name in pair.split(" / ")} <= set(case.truth), (
+            case.number
+        )
 
 
 def test_a_truth_off_by_a_thousandth_is_not_recovered():
@@ -42,7 +49,9 @@ def test_a_truth_off_by_a_thousandth_is_not_recovered():
 
 
 def test_our_motor_draws_what_motulators_machine_draws():
-    """Against a machine that nobody here wrote, where a Python that has it is named (benchmarks/motulator_check.py)."""
+    """Against a machine that nobody here wrote, where a Python that has it is named
+    (benchmarks/motulator_check.py).
+    """
     skip_without("motulator")
     found = motulator_check.check()
     assert found["largest"] > 3.0

@@ -45,7 +45,9 @@ def test_a_damped_oscillation_is_told_by_start_frequency_damping_and_size(made):
     assert told.size == pytest.approx(0.01, rel=0.15)
     assert told.noise == pytest.approx(told.size / first.noise_P)
     assert told.share > 0.8
-    assert str(told).startswith("P of event1 rings at 23 Hz from t = 0.748 s on, 0.1 s after the dip ends, at first by")
+    assert str(told).startswith(
+        "P of event1 rings at 23 Hz from t = 0.748 s on, 0.1 s after the dip ends, at first by"
+    )
     assert "damping ratio 0.03" in str(told)
 
 
@@ -81,7 +83,10 @@ def test_the_loudest_comes_first_and_each_is_taken_away_before_the_next(made):
     residual[0, 600:n] += 0.004
     residual[1, n + 700 :] -= 0.008
     loud, quiet = found(made, residual)
-    assert [(s.event, s.channel, s.kind) for s in (loud, quiet)] == [("event2", "Q", "step"), ("event1", "P", "step")]
+    assert [(s.event, s.channel, s.kind) for s in (loud, quiet)] == [
+        ("event2", "Q", "step"),
+        ("event1", "P", "step"),
+    ]
     assert loud.share > quiet.share > 0
     assert loud.share + quiet.share < 1.05
 
@@ -97,4 +102,7 @@ def test_noise_has_no_shape_white_or_colored(made):
         drawn = LEVEL * colored.draw(np.random.default_rng(seed), 1, lengths)[0]
         spoken += bool(found(made, drawn))
     assert spoken <= 2
-    assert len(found(made, 20 * LEVEL * np.random.default_rng(5).standard_normal((2, sum(lengths))))) <= MOST_SHAPES
+    assert (
+        len(found(made, 20 * LEVEL * np.random.default_rng(5).standard_normal((2, sum(lengths)))))
+        <= MOST_SHAPES
+    )

@@ -1,4 +1,6 @@
-"""A ringing branch that an independent circuit draws is found by its effect, and none where there is none."""
+"""A ringing branch that an independent circuit draws is found by its effect, and none where there
+is none.
+"""
 
 from dataclasses import dataclass, replace
 
@@ -9,14 +11,21 @@ import wave_records as waves
 import tractexp
 from independent.source import OMEGA
 
-QUICK = {"optimizer": "multistart_least_squares", "budget": 1500, "check_intervals": False, "progress": False}
+QUICK = {
+    "optimizer": "multistart_least_squares",
+    "budget": 1500,
+    "check_intervals": False,
+    "progress": False,
+}
 MODEL = {"model": "fifth_order_branch", "domain": "waves", "effects": ["resonant_branch"]}
 FINE = {"bounds": {"resonance_frequency": [120.0, 300.0], "ringing_time": [0.005, 0.1]}}
 
 
 @dataclass(frozen=True)
 class Ringing:
-    """Resistance, reactance and capacitive susceptance in series [pu]: flux linkage and charge are states."""
+    """Resistance, reactance and capacitive susceptance in series [pu]: flux linkage and charge are
+    states.
+    """
 
     R: float
     X: float
@@ -37,7 +46,9 @@ def beside(*devices):
     """An event of a load drawn by lot, recorded at 6.4 kHz, with more devices beside it."""
     case = waves.case([5, 1], kind="two phases")
     sampler = replace(case.sampler, rate=6400.0)
-    return waves.events(replace(case, sampler=sampler, site=replace(case.site, more=devices)), [5, 1])
+    return waves.events(
+        replace(case, sampler=sampler, site=replace(case.site, more=devices)), [5, 1]
+    )
 
 
 def test_a_planted_branch_is_found():
@@ -49,7 +60,9 @@ def test_a_planted_branch_is_found():
     bare = tractexp.identify(events, "fifth_order_branch", domain="waves", **QUICK)
     assert fit.parameters["resonance_frequency"].value == pytest.approx(f, rel=0.01)
     assert fit.parameters["ringing_time"].value == pytest.approx(T, rel=0.05)
-    assert fit.parameters["resonant_susceptance"].value * fit.result.base.ratio == pytest.approx(b, rel=0.05)
+    assert fit.parameters["resonant_susceptance"].value * fit.result.base.ratio == pytest.approx(
+        b, rel=0.05
+    )
     left = [one.result.events[0]["epsilon_i"] for one in (fit, bare)]
     assert left[0] < 0.2 * left[1]
 

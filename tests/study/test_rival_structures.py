@@ -1,4 +1,6 @@
-"""Rival structures: what a stator resistance that is there, or is not, does to the parameters of a model without it."""
+"""Rival structures: what a stator resistance that is there, or is not, does to the parameters of a
+model without it.
+"""
 
 from dataclasses import replace
 
@@ -20,9 +22,13 @@ SEED = 5
 
 
 def judged(case):
-    """The judgement of the first two events of a case of the independent generator, and the truth."""
+    """The judgement of the first two events of a case of the independent generator,
+    and the truth.
+    """
     dips = [detect(Record(f"event{k}", **r).check()) for k, r in enumerate(make(case, SEED))]
-    return with_rivals(estimate_without_search(Problem(study.model(), dips)).uncertainty), truth(case, SEED)["load"]
+    return with_rivals(estimate_without_search(Problem(study.model(), dips)).uncertainty), truth(
+        case, SEED
+    )["load"]
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +42,16 @@ def test_a_resistance_that_is_there_fits_better_and_its_parameters_are_nearer_th
     rivals = {rival.name: rival for rival in known.rivals}
     best = rivals["stator_resistance"]
     assert best.squares < 0.9
-    off = {n: (abs(best.values[n] / load[n] - 1), abs(v / load[n] - 1))
-           for n, v in zip(known.names, known.values, strict=True)}  # fmt: skip
+    off = {
+        n: (abs(best.values[n] / load[n] - 1), abs(v / load[n] - 1))
+        for n, v in zip(known.names, known.values, strict=True)
+    }
     assert sum(with_it < without for with_it, without in off.values()) >= 5
 
 
-def test_intervals_reach_over_what_a_rival_makes_of_a_parameter_where_more_than_noise_is_left(missing):
+def test_intervals_reach_over_what_a_rival_makes_of_a_parameter_where_more_than_noise_is_left(
+    missing,
+):
     known, _ = missing
     alone = replace(known, rivals=())
     for rival in known.rivals:
@@ -58,9 +68,16 @@ def test_a_static_load_that_refuses_an_effect_of_the_model_is_no_rival():
     motor, static = get("model/motor", "electromechanical")(), get("model/static", "exponential")()
     with_share = compose(motor, static, [get("effect", "polynomial_static_load")()])
     assert {name for name, _ in _structures(compose(motor, static))} == {
-        "second_cage", "stator_resistance", "stator_transients", "zip",
-    }  # fmt: skip
-    assert {name for name, _ in _structures(with_share)} == {"second_cage", "stator_resistance", "stator_transients"}
+        "second_cage",
+        "stator_resistance",
+        "stator_transients",
+        "zip",
+    }
+    assert {name for name, _ in _structures(with_share)} == {
+        "second_cage",
+        "stator_resistance",
+        "stator_transients",
+    }
 
 
 def test_where_nothing_is_missing_the_interval_is_the_fits_own_and_no_rival_gains():
@@ -68,7 +85,9 @@ def test_where_nothing_is_missing_the_interval_is_the_fits_own_and_no_rival_gain
     assert known.exact
     assert (known.intervals == replace(known, rivals=()).intervals).all()
     assert all(rival.squares > 0.98 for rival in known.rivals)
-    inside = [low <= load[n] <= high for n, (low, high) in zip(known.names, known.intervals, strict=True)]
+    inside = [
+        low <= load[n] <= high for n, (low, high) in zip(known.names, known.intervals, strict=True)
+    ]
     assert sum(inside) >= 6
 
 
@@ -87,7 +106,9 @@ def test_a_parameter_that_a_rival_moves_far_is_not_called_identified(missing):
 
 
 def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(missing):
-    """Each moves it by a tenth only, but one up and one down: with its scatter that is more than a fifth each way."""
+    """Each moves it by a tenth only, but one up and one down: with its scatter that is more than a
+    fifth each way.
+    """
     from tractexp.identification import rivals as module
 
     known, _ = missing
@@ -95,7 +116,9 @@ def test_a_parameter_whose_interval_rivals_make_wide_is_not_called_identified(mi
     j = known.names.index("T_m")
     value = float(known.values[j])
     known = replace(known, profiled=dict(known.profiled) | {"T_m": (0.88 * value, 1.12 * value)})
-    rivals = tuple(RivalStructure(f"by {share}", 1.0, {"T_m": share * value}) for share in (0.9, 1.1))
+    rivals = tuple(
+        RivalStructure(f"by {share}", 1.0, {"T_m": share * value}) for share in (0.9, 1.1)
+    )
     assert dict(module._find_moved_parameters(known, replace(known, rivals=rivals[:1]))) == {}
     assert module.IDENTIFIED_SHARE == 0.2
     both = dict(module._find_moved_parameters(known, replace(known, rivals=rivals)))

@@ -4,7 +4,9 @@ import pytest
 
 from tractexp.model.drive import Drive
 
-pytest.importorskip("numba", reason="rivals of the benchmark are compiled by Numba: pip install 'tractexp[race]'")
+pytest.importorskip(
+    "numba", reason="rivals of the benchmark are compiled by Numba: pip install 'tractexp[race]'"
+)
 
 
 @pytest.fixture(scope="module")
@@ -31,7 +33,9 @@ def test_the_rivals_with_a_tolerance_solve_the_same_equations(dip):
     record = rivals.Record(excitation)
     assert rivals.SciPy(record, "LSODA", 1e-9)(values[:2]) == pytest.approx(sums[:2], rel=1e-6)
     P, Q = record.solution(values[0])
-    assert ((P - excitation.P) ** 2 + (Q - excitation.Q) ** 2).sum() == pytest.approx(sums[0], rel=1e-6)
+    assert ((P - excitation.P) ** 2 + (Q - excitation.Q) ** 2).sum() == pytest.approx(
+        sums[0], rel=1e-6
+    )
 
 
 def test_the_operations_of_a_kernel_are_counted():

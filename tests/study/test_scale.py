@@ -1,4 +1,6 @@
-"""A short run of `benchmarks/scale.py`, and that what is stored of the long one grows no faster than its sizes."""
+"""A short run of `benchmarks/scale.py`, and that what is stored of the long one grows no faster
+than its sizes.
+"""
 
 import json
 import os
@@ -38,7 +40,11 @@ def test_slopes():
 def test_stored_time_grows_no_faster_than_the_size(case):
     rows = STORED[case]
     assert {row["size"] for row in rows} <= {*scale.CASES[case].sizes}
-    assert [slope for slope in scale.slopes(rows, STORED["idle"]) if slope is not None and slope > FASTEST] == []
+    assert [
+        slope
+        for slope in scale.slopes(rows, STORED["idle"])
+        if slope is not None and slope > FASTEST
+    ] == []
 
 
 def test_the_page_has_what_is_stored():

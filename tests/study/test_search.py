@@ -1,4 +1,6 @@
-"""The one search loop: clipping, counting, budgets, the best, the history, and the polish it ends with."""
+"""The one search loop: clipping, counting, budgets, the best, the history, and the polish it ends
+with.
+"""
 
 from collections.abc import Iterator
 
@@ -11,7 +13,13 @@ from hypothesis.extra.numpy import arrays
 from tractexp import progress
 from tractexp.errors import UserError
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate, Optimizer
-from tractexp.identification.polish import LEAST_START_DISTANCE, Elite, _Residuals, least_squares_from, race
+from tractexp.identification.polish import (
+    LEAST_START_DISTANCE,
+    Elite,
+    _Residuals,
+    least_squares_from,
+    race,
+)
 from tractexp.identification.search import Limits, search
 from tractexp.parameter import best_distinct
 from tractexp.plugin import build
@@ -45,19 +53,28 @@ class Scripted(Optimizer):
     name = "scripted"
 
     def __init__(self, batches, space="unit", residuals=False, polish=False):
-        for key, value in {"batches": batches, "space": space, "with_residuals": residuals, "polish": polish}.items():
+        for key, value in {
+            "batches": batches,
+            "space": space,
+            "with_residuals": residuals,
+            "polish": polish,
+        }.items():
             object.__setattr__(self, key, value)
         object.__setattr__(self, "answers", [])
 
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
         for batch in self.batches:
-            self.answers.append((evaluate.residuals if self.with_residuals else evaluate)(np.asarray(batch)))
+            self.answers.append(
+                (evaluate.residuals if self.with_residuals else evaluate)(np.asarray(batch))
+            )
             yield
 
 
 coordinates = st.floats(-1e6, 1e6)
 batches = st.lists(
-    arrays(float, st.tuples(st.integers(1, 7), st.just(3)), elements=coordinates), min_size=1, max_size=6
+    arrays(float, st.tuples(st.integers(1, 7), st.just(3)), elements=coordinates),
+    min_size=1,
+    max_size=6,
 )
 
 
@@ -71,11 +88,16 @@ def test_the_loop_clips_counts_stops_and_keeps_the_best(proposed, space, residua
     assert len(points) == found.simulations == min(budget, wanted)
     assert ((points >= LOWER) & (points <= UPPER)).all()
     f = Watched().objective(points)
-    rounding = 1e-14 if residuals else 0.0  # the loop sums squared residuals in another order than the problem
+    # the loop sums squared residuals in another order than the problem
+    rounding = 1e-14 if residuals else 0.0
     assert found.objective == pytest.approx(f.min(), rel=rounding, abs=0)
-    assert found.objective == pytest.approx(Watched().objective(found.values[None])[0], rel=rounding, abs=0)
+    assert found.objective == pytest.approx(
+        Watched().objective(found.values[None])[0], rel=rounding, abs=0
+    )
     best = np.minimum.accumulate(f)
-    np.testing.assert_allclose(found.history.objective, best[found.history.simulations - 1], rtol=rounding, atol=0)
+    np.testing.assert_allclose(
+        found.history.objective, best[found.history.simulations - 1], rtol=rounding, atol=0
+    )
     assert (f"budget of {budget}" in found.status) == (wanted > budget)
 
 
@@ -86,13 +108,17 @@ def test_an_optimizer_is_told_the_points_really_evaluated(x):
     search(Watched(), optimizer, 0)
     told, f = optimizer.answers[0]
     np.testing.assert_array_equal(told, np.clip(x, 0, 1))
-    np.testing.assert_array_equal(f, Watched().objective(np.clip(LOWER + told * (UPPER - LOWER), LOWER, UPPER)))
+    np.testing.assert_array_equal(
+        f, Watched().objective(np.clip(LOWER + told * (UPPER - LOWER), LOWER, UPPER))
+    )
 
 
 def test_history_has_one_row_per_iteration_and_one_for_a_cut_one():
     batches = [np.full((4, 3), 0.2)] * 3
     assert search(Watched(), Scripted(batches), 0).history.simulations.tolist() == [4, 8, 12]
-    assert search(Watched(), Scripted(batches), 0, Limits(simulations=8)).history.simulations.tolist() == [4, 8]
+    assert search(
+        Watched(), Scripted(batches), 0, Limits(simulations=8)
+    ).history.simulations.tolist() == [4, 8]
     cut = search(Watched(), Scripted(batches), 0, Limits(simulations=10))
     assert cut.history.simulations.tolist() == [4, 8, 10]
     assert cut.status == "stopped at the budget of 10 simulations"
@@ -100,7 +126,9 @@ def test_history_has_one_row_per_iteration_and_one_for_a_cut_one():
 
 def test_progress_is_told_each_iteration():
     told = []
-    search(Watched(), Scripted([np.full((4, 3), 0.2)] * 3), 0, progress=lambda *row: told.append(row))
+    search(
+        Watched(), Scripted([np.full((4, 3), 0.2)] * 3), 0, progress=lambda *row: told.append(row)
+    )
     assert [(i, n) for i, _, n in told] == [(0, 4), (1, 8), (2, 12)]
 
 
@@ -108,7 +136,12 @@ def test_an_end_that_the_search_has_passed_is_none(capsys, monkeypatch):
     assert progress.share(3, 30, 4, None) == 0.75
     assert progress.share(5, 30, 4, None) is None
     assert progress.share(5, 30, 4, 60) == 0.5
-    assert [progress.describe_remaining_time(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [", about 2 s left", "", "", ""]
+    assert [progress.describe_remaining_time(6.0, done) for done in (0.75, 1.0, 0.0, None)] == [
+        ", about 2 s left",
+        "",
+        "",
+        "",
+    ]
     monkeypatch.setattr(progress, "FIRST_LINE", 0.0)
     monkeypatch.setattr(progress, "_lively", lambda: False)
     with progress.report_search(4, None) as tell:
@@ -158,8 +191,12 @@ def test_residuals_count_and_refuse_like_objectives():
 
 def test_best_distinct_takes_the_best_and_leaves_its_neighbors():
     unit = np.array([[0.5, 0.5], [0.51, 0.5], [0.9, 0.5], [0.5, 0.05]])
-    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 10).tolist() == [1, 2, 3]
-    assert best_distinct(unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 2).tolist() == [1, 2]
+    assert best_distinct(
+        unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 10
+    ).tolist() == [1, 2, 3]
+    assert best_distinct(
+        unit, np.array([2.0, 1.0, 3.0, 4.0]), LEAST_START_DISTANCE, 2
+    ).tolist() == [1, 2]
 
 
 @given(arrays(float, (40, 2), elements=st.floats(0, 1)), st.integers(0, 99))
@@ -203,7 +240,8 @@ def test_the_jacobian_is_one_batch_of_d_and_right():
     J = residuals.jacobian(unit)
     a, b = 2 * 0.6 - 1, 5 * 0.3
     exact = [[3 * np.cos(3 * a) * b * 2, np.sin(3 * a) * 5], [np.exp(a) * 2, 0], [0, 3 * b**2 * 5]]
-    np.testing.assert_allclose(J, exact, rtol=5e-6, atol=1e-9)  # a forward difference errs by half its step times f''
+    # a forward difference errs by half its step times f''
+    np.testing.assert_allclose(J, exact, rtol=5e-6, atol=1e-9)
     assert evaluate.sizes == [1, 2]
 
 
@@ -226,10 +264,14 @@ def test_a_start_that_cannot_be_simulated_costs_one_simulation():
 
 
 class TwoValleys(Direct):
-    """One coordinate, objective 1 + (x - 0.2)^2 in one valley and (x - 0.8)^2 in the other, with x = 0.5 between."""
+    """One coordinate, objective 1 + (x - 0.2)^2 in one valley and (x - 0.8)^2 in the other, with x
+    = 0.5 between.
+    """
 
     def __init__(self):
-        super().__init__(lambda x: np.hstack((np.where(x < 0.5, x - 0.2, x - 0.8), 1.0 * (x < 0.5))))
+        super().__init__(
+            lambda x: np.hstack((np.where(x < 0.5, x - 0.2, x - 0.8), 1.0 * (x < 0.5)))
+        )
         self.lowest = np.inf
 
     def residuals(self, x):
@@ -264,7 +306,8 @@ def test_polish_finishes_what_a_search_began_inside_the_budget(space):
     assert polished.objective < 1e-20
     np.testing.assert_allclose(polished.values, TRUTH, rtol=1e-9)
     assert polished.simulations <= 600
-    np.testing.assert_array_equal(polished.history.objective[:4], rough.history.objective[:4])  # a third
+    # a third
+    np.testing.assert_array_equal(polished.history.objective[:4], rough.history.objective[:4])
 
 
 def test_polish_follows_a_search_that_ends_by_itself():
@@ -308,4 +351,8 @@ def test_polish_of_a_problem_without_residuals_says_so():
             raise UserError("this problem has no residuals")
 
     with pytest.raises(UserError, match="no residuals"):
-        search(Bare(), build("optimizer", {"name": "random_search", "iterations": 1, "polish": True}), 0)
+        search(
+            Bare(),
+            build("optimizer", {"name": "random_search", "iterations": 1, "polish": True}),
+            0,
+        )

@@ -1,4 +1,6 @@
-"""A static load by another law than the base model's: an investigation names the share of constant power."""
+"""A static load by another law than the base model's: an investigation names the share of constant
+power.
+"""
 
 import numpy as np
 import pytest
@@ -10,8 +12,17 @@ from tractexp.plugin import get
 from tractexp.record import Record, detect
 
 STEP, NOISE, Q0 = 5e-3, 1e-3, 0.6
-ZIP = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.45,
-       "a_Z": 0.5, "a_I": 0.1, "b_Z": 0.7, "b_I": 0.1}  # fmt: skip
+ZIP = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.45,
+    "a_Z": 0.5,
+    "a_I": 0.1,
+    "b_Z": 0.7,
+    "b_I": 0.1,
+}
 
 
 def load(static):
@@ -29,8 +40,10 @@ def dip(depth, duration, rng):
     return detect(Record(f"dip of {depth:.0%}", t, U, P, Q).check())
 
 
-def test_a_zip_load_that_is_taken_for_an_exponential_one_is_named_with_its_share_of_constant_power():
-    """Constant current of 0.1 adds a little to the share of constant power, 0.4, where the exponent is free."""
+def test_a_zip_load_taken_for_an_exponential_one_is_named_with_its_share_of_constant_power():
+    """Constant current of 0.1 adds a little to the share of constant power, 0.4, where the exponent
+    is free.
+    """
     rng = np.random.default_rng(1)
     made = [dip(depth, duration, rng) for depth, duration in ((0.5, 0.2), (0.3, 0.3), (0.6, 0.15))]
     of = load("exponential")

@@ -1,4 +1,6 @@
-"""The studies as public calls: results that print, tabulate, save, load and write the same page again; refusals."""
+"""The studies as public calls: results that print, tabulate, save, load and write the same page
+again; refusals.
+"""
 
 import json
 import pickle
@@ -29,22 +31,42 @@ def dips():
 @pytest.fixture(scope="module")
 def generalised(dips, model):
     return tractexp.generalise(
-        dips[1], model, validate=[dips[0], dips[2]], optimizers={"brief": {"name": "pso", "population": 20}}, seeds=2,
-        budget=200, progress=False,
-    )  # fmt: skip
+        dips[1],
+        model,
+        validate=[dips[0], dips[2]],
+        optimizers={"brief": {"name": "pso", "population": 20}},
+        seeds=2,
+        budget=200,
+        progress=False,
+    )
 
 
 @pytest.fixture(scope="module")
 def replicated(dips, model):
-    return tractexp.paper(dips[1], model, validate=dips[0], parts=["figure4", "figure6", "table2"], seeds=1,
-                          budget=200, workers=1, progress=False)  # fmt: skip
+    return tractexp.paper(
+        dips[1],
+        model,
+        validate=dips[0],
+        parts=["figure4", "figure6", "table2"],
+        seeds=1,
+        budget=200,
+        workers=1,
+        progress=False,
+    )
 
 
 @pytest.fixture(scope="module")
 def benchmarked():
     pytest.importorskip("ioh", reason="the extra [benchmark] is not installed")
-    return tractexp.benchmark(["random_search", "issa_no_levy"], functions=[1, 15], dimensions=[2], instances=[1],
-                              multiplier=50, cores=1, progress=False)  # fmt: skip
+    return tractexp.benchmark(
+        ["random_search", "issa_no_levy"],
+        functions=[1, 15],
+        dimensions=[2],
+        instances=[1],
+        multiplier=50,
+        cores=1,
+        progress=False,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -91,49 +113,95 @@ def test_a_comparison_holds_what_its_file_does(compared, tmp_path):
     assert list(frame.index[:2]) == ["good", "bad"]
     by_name = {v["name"]: v for v in content["variants"]}
     assert frame["median [pu²]"]["bad"] == by_name["bad"]["objective"]["median"]
-    assert frame["ERT [simulations]"]["good"] == pytest.approx(by_name["good"]["ert"]["simulations"][1], nan_ok=True)
+    assert frame["ERT [simulations]"]["good"] == pytest.approx(
+        by_name["good"]["ert"]["simulations"][1], nan_ok=True
+    )
     assert compared.sentences == content["sentences"]
 
 
 def test_a_benchmark_is_the_same_by_names_and_by_settings_and_tells_of_each_run(benchmarked):
     told = []
-    named = {"random_search": {"name": "random_search"}, "issa_no_levy": {"name": "issa", "levy": False}}
-    again = tractexp.benchmark(named, functions=[1, 15], dimensions=[2], instances=[1], multiplier=50, cores=1,
-                               progress=told.append)  # fmt: skip
+    named = {
+        "random_search": {"name": "random_search"},
+        "issa_no_levy": {"name": "issa", "levy": False},
+    }
+    again = tractexp.benchmark(
+        named,
+        functions=[1, 15],
+        dimensions=[2],
+        instances=[1],
+        multiplier=50,
+        cores=1,
+        progress=told.append,
+    )
     assert again.to_dict() == benchmarked.to_dict()
     assert told == [f"{k} of 4 runs" for k in (1, 2, 3, 4)]
     assert benchmarked.optimizers["issa_no_levy"]["levy"] is False
-    assert benchmarked.bbob.share("issa_no_levy", 2, [1]) == benchmarked.to_dict()["summary"][1]["groups"]["separable"]
+    assert (
+        benchmarked.bbob.share("issa_no_levy", 2, [1])
+        == benchmarked.to_dict()["summary"][1]["groups"]["separable"]
+    )
 
 
 def test_medians_are_those_of_the_rows(generalised):
-    rows = [r for r in generalised.residuals if (r["kind"], r["optimizer"]) == ("extrapolation", "brief")]
+    rows = [
+        r
+        for r in generalised.residuals
+        if (r["kind"], r["optimizer"]) == ("extrapolation", "brief")
+    ]
     assert [row["seed"] for row in rows] == [0, 1]
-    (middle,) = [r for r in generalised.medians if (r["kind"], r["optimizer"]) == ("extrapolation", "brief")]
+    (middle,) = [
+        r for r in generalised.medians if (r["kind"], r["optimizer"]) == ("extrapolation", "brief")
+    ]
     for error in ("residual_P", "epsilon_q"):
         assert middle[error] == pytest.approx((rows[0][error] + rows[1][error]) / 2)
     assert rows[0]["residual_P"] != rows[1]["residual_P"]
 
 
 def test_a_study_finds_what_an_identification_does(dips, model, generalised):
-    """The same as an identification with these settings, seed by seed: its estimate first, then its searches."""
+    """The same as an identification with these settings, seed by seed: its estimate first, then its
+    searches.
+    """
     assert [told["optimizer"] for told in generalised.identified] == ["estimate", "brief", "brief"]
     for told in generalised.identified:
         brief = {"name": "pso", "population": 20}
-        fit = tractexp.identify(dips[1], model, optimizer=brief, seed=told["seed"], budget=200, check_intervals=False,
-                                progress=False)  # fmt: skip
+        fit = tractexp.identify(
+            dips[1],
+            model,
+            optimizer=brief,
+            seed=told["seed"],
+            budget=200,
+            check_intervals=False,
+            progress=False,
+        )
         estimate = told["optimizer"] == "estimate"
-        assert told["objective"] == (fit.result.objective if estimate else fit.result.search["objective"])
-        assert told["parameters"] == (fit.result.parameters if estimate else fit.result.search["parameters"])
+        assert told["objective"] == (
+            fit.result.objective if estimate else fit.result.search["objective"]
+        )
+        assert told["parameters"] == (
+            fit.result.parameters if estimate else fit.result.search["parameters"]
+        )
 
 
 def test_a_study_tells_what_it_reads_and_each_search(dips, capsys):
     lines = []
-    tractexp.generalise(dips[1], validate=dips[0], optimizers=["issa_no_levy", "pso"], budget=50, progress=lines.append)
+    tractexp.generalise(
+        dips[1],
+        validate=dips[0],
+        optimizers=["issa_no_levy", "pso"],
+        budget=50,
+        progress=lines.append,
+    )
     assert [line for line in lines if not line.startswith("  ")] == [
-        f"fit: {dips[1]!r}", f"validate: {dips[0]!r}", lines[-3], "issa_no_levy, seed 0", "pso, seed 0",
-    ]  # fmt: skip
-    assert lines[-3].startswith("model: electromechanical motor and exponential static load, 7 parameters")
+        f"fit: {dips[1]!r}",
+        f"validate: {dips[0]!r}",
+        lines[-3],
+        "issa_no_levy, seed 0",
+        "pso, seed 0",
+    ]
+    assert lines[-3].startswith(
+        "model: electromechanical motor and exponential static load, 7 parameters"
+    )
     capsys.readouterr()
     tractexp.generalise(dips[1], validate=dips[0], optimizers="pso", budget=50, progress=False)
     lines.clear()
@@ -149,13 +217,19 @@ def test_claims_are_judged_and_counted(replicated):
 
 def test_a_setup_poses_the_same_problem_after_travel(dips, model):
     """Through JSON, and through pickle once it holds what cannot be pickled."""
-    setup = Setup.of(dips[1], model, dips[0], "huber", fixed={"C": 0.9}, bounds=None, seed=3, budget=10)
+    setup = Setup.of(
+        dips[1], model, dips[0], "huber", fixed={"C": 0.9}, bounds=None, seed=3, budget=10
+    )
     one = setup.problem
     middle = (one.lower + one.upper)[None] / 2
     told = json.loads(json.dumps(tractexp.files.plain(setup.to_dict())))
     packed = pickle.dumps(setup)
     assert len(packed) < 3 * len(pickle.dumps([setup.train, setup.validate]))
-    for back in (Setup.from_dict(told), pickle.loads(packed), pickle.loads(pickle.dumps(setup.problem_of)).__self__):
+    for back in (
+        Setup.from_dict(told),
+        pickle.loads(packed),
+        pickle.loads(pickle.dumps(setup.problem_of)).__self__,
+    ):
         assert vars(back).keys() == vars(Setup.from_dict(told)).keys()
         two = back.problem
         assert one.space.names == two.space.names
@@ -171,8 +245,9 @@ def test_optimizers_are_given_by_name_by_settings_and_by_names_of_ones_own():
     brief = {"name": "pso", "population": 20}
     pso, plain = build("optimizer", brief), build("optimizer", {"name": "pso"})
     assert several(["pso", "issa_no_levy"]) == {
-        "pso": plain, "issa_no_levy": build("optimizer", {"name": "issa", "levy": False}),
-    }  # fmt: skip
+        "pso": plain,
+        "issa_no_levy": build("optimizer", {"name": "issa", "levy": False}),
+    }
     assert several({"mine": brief, "theirs": "pso"}) == {"mine": pso, "theirs": plain}
     assert several([brief]) == several(brief) == {"pso": pso}
     assert several("pso") == {"pso": plain}
@@ -182,8 +257,12 @@ def test_optimizers_are_given_by_name_by_settings_and_by_names_of_ones_own():
 @pytest.mark.parametrize("forms", ["third_order_exponential", "mapping", "model"])
 def test_a_study_takes_a_model_in_every_form(forms, dips, model):
     given = {"mapping": model.node, "model": model.model}.get(forms, forms)
-    made = tractexp.generalise(dips[1], given, validate="tibet_30pct", optimizers="pso", budget=50, progress=False)
-    same = tractexp.generalise(dips[1], validate=dips[0], optimizers="pso", budget=50, progress=False)
+    made = tractexp.generalise(
+        dips[1], given, validate="tibet_30pct", optimizers="pso", budget=50, progress=False
+    )
+    same = tractexp.generalise(
+        dips[1], validate=dips[0], optimizers="pso", budget=50, progress=False
+    )
     assert made.identified == same.identified
     assert made.residuals == same.residuals
 
@@ -194,12 +273,21 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
         (lambda d: tractexp.compare("x", filter="y"), "sweep and filter are both given"),
         (lambda d: tractexp.compare("missing"), "sweep=missing is not a folder"),
         (lambda d: tractexp.compare("x", targets=[0.5]), "targets=0.5 is out of range"),
-        (lambda d: tractexp.compare("x", targets="2"), "targets='2' is a text, but it must be a list, each a number"),
+        (
+            lambda d: tractexp.compare("x", targets="2"),
+            "targets='2' is a text, but it must be a list, each a number",
+        ),
         (lambda d: tractexp.compare("x", floor=0), "floor=0 must be an objective above 0"),
-        (lambda d: tractexp.compare("x", tie=1), "compare() has no argument 'tie'; did you mean 'ties'?"),
+        (
+            lambda d: tractexp.compare("x", tie=1),
+            "compare() has no argument 'tie'; did you mean 'ties'?",
+        ),
         (lambda d: tractexp.benchmark([]), "optimizers is empty"),
         (lambda d: tractexp.benchmark(["pso", "pso"]), "optimizers names pso twice"),
-        (lambda d: tractexp.benchmark(["pos"]), "optimizer=pos: there is no such choice; did you mean 'pso'"),
+        (
+            lambda d: tractexp.benchmark(["pos"]),
+            "optimizer=pos: there is no such choice; did you mean 'pso'",
+        ),
         (lambda d: tractexp.benchmark("issa_polish"), "set optimizer.polish=false"),
         (lambda d: tractexp.benchmark(["pso"], functions=[25]), "functions=25 is out of range"),
         (lambda d: tractexp.benchmark(["pso"], seed=-1), "seed=-1 is out of range"),
@@ -207,16 +295,31 @@ def test_a_study_takes_a_model_in_every_form(forms, dips, model):
             lambda d: tractexp.generalise(d, validate=[]),
             "generalise() needs dips that are not fitted: name them in validate",
         ),
-        (lambda d: tractexp.generalise(d[1]), "generalise(): missing a required argument: 'validate'"),
+        (
+            lambda d: tractexp.generalise(d[1]),
+            "generalise(): missing a required argument: 'validate'",
+        ),
         (lambda d: tractexp.generalise("a.csv", validate=d), "a.csv: there is no such file"),
         (lambda d: tractexp.generalise([], validate=d), "records is empty"),
         (lambda d: tractexp.generalise(d, validate=d, budget=0), "budget=0 is out of range"),
         (lambda d: tractexp.generalise(d, validate=d, seeds=0), "seeds=0 is out of range"),
-        (lambda d: tractexp.generalise(d, validate=d, fixed={"c": 1}), "fixed.c: this model has no parameter 'c'"),
-        (lambda d: tractexp.generalise(d, "third", validate=d), "model=third: there is no such choice"),
+        (
+            lambda d: tractexp.generalise(d, validate=d, fixed={"c": 1}),
+            "fixed.c: this model has no parameter 'c'",
+        ),
+        (
+            lambda d: tractexp.generalise(d, "third", validate=d),
+            "model=third: there is no such choice",
+        ),
         (lambda d: tractexp.paper(d[:1], parts=["table6"]), "parts=table6 is not one of"),
-        (lambda d: tractexp.paper(d[:1], parts="table2"), "parts='table2' is a text, but it must be a list"),
-        (lambda d: tractexp.paper(d[:1], parts=["table5"]), "name one in validate, or leave the table out with parts"),
+        (
+            lambda d: tractexp.paper(d[:1], parts="table2"),
+            "parts='table2' is a text, but it must be a list",
+        ),
+        (
+            lambda d: tractexp.paper(d[:1], parts=["table5"]),
+            "name one in validate, or leave the table out with parts",
+        ),
         (lambda d: tractexp.paper(d[:1], seeds=0), "seeds=0 is out of range"),
     ],
 )

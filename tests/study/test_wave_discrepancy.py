@@ -1,7 +1,8 @@
-"""An investigation of waveforms: what is planted is named and closes the gap held out, what is not there is not.
+"""An investigation of waveforms: what is planted is named and closes the gap held out, what is not
+there is not.
 
-Records come from the independent generator of `tests/oracle/independent`: other equations, another solver, noise of the
-voltage and of the currents, offsets, quantization.
+Records come from the independent generator of `tests/oracle/independent`: other equations, another
+solver, noise of the voltage and of the currents, offsets, quantization.
 """
 
 import json
@@ -26,8 +27,9 @@ from tractexp.plugin import get
 from tractexp.record import in_waves
 from tractexp.report import overlay
 
-# Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder by noise that the
-# machine's fluxes have summed up, and edges of the voltage are left open: chi-squared is 0.77 where nothing is missing.
+# Nothing but noise is left. Its level is estimated from quiet stretches; the later ones are louder
+# by noise that the machine's fluxes have summed up, and edges of the voltage are left open:
+# chi-squared is 0.77 where nothing is missing.
 QUIET, LOUD = 0.75, 1.15
 FEW = ("shunt_capacitor", "speed_dependent_torque")
 SEED, RATE, FAN = (4, 0), 3200.0, 0.9  # samples per second, share of the torque
@@ -47,13 +49,17 @@ def given():
 
 @pytest.fixture(scope="module")
 def planted(given):
-    return tractexp.investigate(given[:1], validate=given[1:], domain="waves", effects=FEW, progress=False)
+    return tractexp.investigate(
+        given[:1], validate=given[1:], domain="waves", effects=FEW, progress=False
+    )
 
 
 @pytest.fixture(scope="module")
 def silent():
     made = dips()
-    return tractexp.investigate(made[:1], validate=made[1:], domain="waves", effects=FEW, progress=False)
+    return tractexp.investigate(
+        made[:1], validate=made[1:], domain="waves", effects=FEW, progress=False
+    )
 
 
 def test_what_is_planted_is_named_with_its_size(planted):
@@ -64,7 +70,8 @@ def test_what_is_planted_is_named_with_its_size(planted):
 
 def test_the_gap_shrinks_to_the_noise_on_the_dip_held_out(planted):
     for gap in (planted.gap.train, planted.gap.validate):
-        assert gap.after.epsilon_i < 0.6 * gap.before.epsilon_i  # half of what is missed there is the currents' noise
+        # half of what is missed there is the currents' noise
+        assert gap.after.epsilon_i < 0.6 * gap.before.epsilon_i
         assert gap.closed > 0.9
         assert QUIET < gap.after.chi2_per_sample < LOUD
     told = planted.content["gap"]["validate"]["after"]
@@ -77,10 +84,14 @@ def test_nothing_is_said_where_nothing_is_missing(silent):
 
 
 def test_places_and_noise_are_told_in_words(planted):
-    assert {place["channel"] for place in planted.content["where"]} <= {"current alpha", "current beta"}
+    assert {place["channel"] for place in planted.content["where"]} <= {
+        "current alpha",
+        "current beta",
+    }
     assert planted.content["where"]
     assert "current alpha 0.0" in planted.content["noise"]
-    assert "zero-sequence" not in planted.content["noise"]  # a delta winding keeps it out, so it is not compared
+    # a delta winding keeps it out, so it is not compared
+    assert "zero-sequence" not in planted.content["noise"]
 
 
 def test_the_page_and_the_extended_model(planted, tmp_path):
@@ -105,15 +116,22 @@ def test_the_page_shows_the_currents_of_the_phases_before_and_after(planted):
     assert shown[0] < first.event.t_start < first.event.t_end < shown[1]
     assert shown[1] - shown[0] < 0.3  # s: the dip is in view, not the whole record
     part = slice(first.event.start, None)
-    before, after = (np.abs((first.measured - made)[:2, part]).max() for made in (first.before, first.after))
+    before, after = (
+        np.abs((first.measured - made)[:2, part]).max() for made in (first.before, first.after)
+    )
     assert after < before
 
 
 @pytest.mark.usefixtures("registry_as_it_was")
 def test_a_term_is_proposed_that_does_what_no_effect_is_said_to_do(planted, tmp_path):
-    steps, few = planted.steps, ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip")
+    steps, few = (
+        planted.steps,
+        ("torque:slip", "torque:slip_squared", "motor:slip", "power:washout", "angle:slip"),
+    )
     among = [term(f"answer:{name}") for name in few]
-    proposed = propose(steps.base, steps.first, steps.bare, steps.last.noise, steps.withheld, 0, among)
+    proposed = propose(
+        steps.base, steps.first, steps.bare, steps.last.noise, steps.withheld, 0, among
+    )
     proposal = proposed.proposal
     assert proposal.term.name == "answer:torque:slip"  # the torque falls with the speed
     assert proposal.values["size"] < 0
@@ -140,7 +158,9 @@ def test_an_event_that_would_decide_is_found_in_waveforms(planted):
     assert 0.04 <= chosen.best.event.duration <= 0.32
     assert {np.sign(t.event.jump) for t in chosen.tried} == {-1.0, 0.0, 1.0}
     assert {t.event.unbalance for t in chosen.tried} == {0.0, 0.5}
-    assert not any(", with " in t.event.words for t in chosen.tried), "waveforms need no channel of their own"
+    assert not any(", with " in t.event.words for t in chosen.tried), (
+        "waveforms need no channel of their own"
+    )
     assert chosen.best.chances.least > 0.5
     assert not chosen.same
     assert chosen.sentence()
@@ -150,10 +170,15 @@ def test_a_push_of_waveforms_is_the_terminal_current(given):
     static = get("model/static", "constant_impedance")()
     model = compose(get("model/motor", "none")(), static, [Injection()], domain="waves")
     problem = Problem(model, given[:1], substeps=1)
-    pushes = [{"window_on": -500.0, "window_off": 500.0, **push} for push in ({}, {"push_P": 0.1}, {"push_Q": 0.1})]
+    pushes = [
+        {"window_on": -500.0, "window_off": 500.0, **push}
+        for push in ({}, {"push_P": 0.1}, {"push_Q": 0.1})
+    ]
     values = np.array([[push.get(name, 0.0) for name in problem.space.names] for push in pushes])
     drawn = model.simulate(problem.drive, values, 1).outputs
-    moved = (drawn[0] + 1j * drawn[1] - drawn[0, 0] - 1j * drawn[1, 0]) * in_waves(given[0]).turn.conj()
+    moved = (drawn[0] + 1j * drawn[1] - drawn[0, 0] - 1j * drawn[1, 0]) * in_waves(
+        given[0]
+    ).turn.conj()
     assert np.abs(moved[1] - 0.1).max() < 1e-9
     assert np.abs(moved[2] + 0.1j).max() < 1e-9
 
@@ -161,8 +186,13 @@ def test_a_push_of_waveforms_is_the_terminal_current(given):
 def test_what_is_left_of_a_current_is_told_by_its_shape(silent):
     (event,), noise = silent.steps.context.events, silent.steps.last.noise
     t = event.record.t - event.t_end
-    ring = np.where(t >= 0, 0.1 * np.exp(-np.maximum(t, 0) / 0.03) * np.cos(2 * np.pi * 180 * t), 0.0)
-    residual = noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0] * silent.steps.context.valid
+    ring = np.where(
+        t >= 0, 0.1 * np.exp(-np.maximum(t, 0) / 0.03) * np.cos(2 * np.pi * 180 * t), 0.0
+    )
+    residual = (
+        noise.draw(np.random.default_rng(1), 1, [event.record.samples])[0]
+        * silent.steps.context.valid
+    )
     residual[1] += ring
     told = remainders(residual, [event], noise)[0]
     assert (told.channel, told.kind) == ("current beta", "ringing")
@@ -181,5 +211,7 @@ def test_a_record_without_samples_is_refused_in_a_sentence(given, role):
 def test_an_effect_that_makes_no_sense_of_waveforms_says_why(given):
     motor, static = get("model/motor", "stator_flux")(), get("model/static", "branch")()
     made = tuple(map(in_waves, given))
-    refused = catalogue(compose(motor, static, domain="waves"), made, ("stator_resistance",)).untestable
+    refused = catalogue(
+        compose(motor, static, domain="waves"), made, ("stator_resistance",)
+    ).untestable
     assert "R_s" in refused["stator_resistance"]

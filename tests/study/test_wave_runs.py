@@ -1,4 +1,6 @@
-"""A run in waveforms from a shipped record to its page, and what else is done with what it finds."""
+"""A run in waveforms from a shipped record to its page, and what else is done with
+what it finds.
+"""
 
 import base64
 import json
@@ -32,16 +34,27 @@ def dip():
 def fit(dip):
     """The machine of the shipped records has no stator resistance."""
     return tractexp.identify(
-        dip, tractexp.compose(**LOAD, fixed={"R_s": 0.001}), optimizer="multistart_least_squares", budget=1200,
-        check_intervals=False, progress=False,
-    )  # fmt: skip
+        dip,
+        tractexp.compose(**LOAD, fixed={"R_s": 0.001}),
+        optimizer="multistart_least_squares",
+        budget=1200,
+        check_intervals=False,
+        progress=False,
+    )
 
 
 def test_the_truth_behind_a_shipped_record_is_found(dip, fit):
-    """What is well seen to a few percent; X', C and q_v trade against each other, as in phasors (docs/data.md)."""
-    truth, one = json.loads(_truth("tibet_50pct"))["truth"], 1 / dip.P0  # its per unit is P, a file's is |S|
+    """What is well seen to a few percent; X', C and q_v trade against each other, as in phasors
+    (docs/data.md).
+    """
+    # its per unit is P, a file's is |S|
+    truth, one = json.loads(_truth("tibet_50pct"))["truth"], 1 / dip.P0
     at_base = {"X_prime": truth["X_prime"] * one, "M": truth["M"] / one, "T_m": truth["T_m"] / one}
-    found = {name: e.value / (truth | at_base)[name] for name, e in fit.parameters.items() if name != "R_s"}
+    found = {
+        name: e.value / (truth | at_base)[name]
+        for name, e in fit.parameters.items()
+        if name != "R_s"
+    }
     for name, within in {
         "T_prime": 0.03,
         "M": 0.06,
@@ -67,8 +80,15 @@ def _truth(name):
 def test_the_page_shows_currents_spectra_and_the_power_of_the_same_estimator(fit, tmp_path):
     (path,) = fit.write_drawings(tmp_path)
     text = path.read_text(encoding="utf-8")
-    for told in ("In waveforms the sampled currents are compared", "epsilon_i", "offsets of up to", "Runge-Kutta steps",
-                 "cycles before the dip", "still change by", "phasors of the currents above"):  # fmt: skip
+    for told in (
+        "In waveforms the sampled currents are compared",
+        "epsilon_i",
+        "offsets of up to",
+        "Runge-Kutta steps",
+        "cycles before the dip",
+        "still change by",
+        "phasors of the currents above",
+    ):
         assert told in text, told
     axes = re.findall(r'"title":\{"text":"([^"]*)"\}', text)
     assert {"u [kV]", "i_a [A]", "i_b [A]", "i_c [A]", "frequency [Hz]", "after [%]"} <= set(axes)
@@ -174,17 +194,22 @@ def test_a_forecast_in_waveforms_narrows_with_depth_and_with_a_jump_of_the_phase
     shape = replace(shape, depth=0.2, duration=0.1, jump=0.0, noise_P=0.005, noise_Q=0.005)
     shape.check()
     plain, deeper, jumping = (
-        forecast(problem, values, s) for s in (shape, replace(shape, depth=0.5), replace(shape, jump=40.0))
+        forecast(problem, values, s)
+        for s in (shape, replace(shape, depth=0.5), replace(shape, jump=40.0))
     )
     assert (deeper.half < plain.half).all()
     T_m = plain.names.index("T_m")
     assert jumping.half[T_m] < plain.half[T_m]
-    with pytest.raises(UserError, match=r"task\.rate=600.* is out of range: it must be at least 800"):
+    with pytest.raises(
+        UserError, match=r"task\.rate=600.* is out of range: it must be at least 800"
+    ):
         replace(shape, rate=600.0).check()
 
 
 def test_a_planned_dip_has_the_sequences_that_were_asked_for():
-    """Long after the edge the last half cycle shows 1 - depth of the positive and unbalance x depth of the negative."""
+    """Long after the edge the last half cycle shows 1 - depth of the positive and unbalance x depth
+    of the negative.
+    """
     shape = DipShape(0.4, 0.2, 6400.0, 0.005, 0.005, domain=WAVES, jump=20.0, unbalance=0.6)
     event = shape.event()
     low = slice(event.start + 128, event.end - 32)
@@ -200,10 +225,18 @@ def test_a_planned_dip_has_the_sequences_that_were_asked_for():
 
 
 def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
-    """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its flux does."""
+    """The negative sequence sees the machine at a slip of nearly two: its leakages, whatever its
+    flux does.
+    """
     problem, values = fit.spec.problem, fit.details.uncertainty.values
     shape = replace(
-        DipShape.of(problem.events[0]), depth=0.2, duration=0.2, jump=0.0, unbalance=0.0, noise_P=0.005, noise_Q=0.005
+        DipShape.of(problem.events[0]),
+        depth=0.2,
+        duration=0.2,
+        jump=0.0,
+        unbalance=0.0,
+        noise_P=0.005,
+        noise_Q=0.005,
     )
     plain, unbalanced = (forecast(problem, values, replace(shape, unbalance=u)) for u in (0.0, 1.0))
     X_prime = plain.names.index("X_prime")
@@ -213,16 +246,23 @@ def test_an_unbalanced_dip_tells_more_of_the_locked_rotor(fit):
 @pytest.mark.parametrize("asked", [{"jump": 20.0}, {"unbalance": 0.5}])
 def test_phase_jumps_and_negative_sequences_are_of_waveforms(asked):
     (name,) = asked
-    with pytest.raises(UserError, match=f"{name}={asked[name]:g} is of waveforms: add domain=waves"):
+    with pytest.raises(
+        UserError, match=f"{name}={asked[name]:g} is of waveforms: add domain=waves"
+    ):
         tractexp.plan("tibet_50pct", **asked)
 
 
 def test_a_step_is_chosen_by_the_circuits_that_last(dip, monkeypatch):
-    """Most reactances below zero grow without end at any step; the others say how many steps it takes."""
-    for module in ("model.model", "identification.problem"):  # fewer, since the search up to them takes its time
+    """Most reactances below zero grow without end at any step; the others say how many steps it
+    takes.
+    """
+    # fewer, since the search up to them takes its time
+    for module in ("model.model", "identification.problem"):
         monkeypatch.setattr(f"tractexp.{module}.MOST_SUBSTEPS", 16)
     bounds = {"X_f": (-0.05, 0.0)}
-    model = tractexp.compose(motor="stator_flux", static="branch", effects=["feeder_impedance"], domain="waves")
+    model = tractexp.compose(
+        motor="stator_flux", static="branch", effects=["feeder_impedance"], domain="waves"
+    )
     problem = Problem(model.model, [dip], bounds=bounds)
     assert problem.step.substeps.tolist() == [4]
     assert problem.step.error < 5e-5
@@ -254,7 +294,8 @@ def test_a_short_or_unbalanced_dip_with_samples_is_better_fitted_in_waveforms(di
     assert said(dip) == []  # 340 ms, balanced
     short = replace(dip, end=dip.start + round(0.06 * dip.rate))
     assert said(short) == [
-        "fit the sampled waveforms, by domain=waves: the dip of tibet_50pct_dip1 lasts 60 ms, less than 5 cycles, which"
+        "fit the sampled waveforms, by domain=waves: the dip of tibet_50pct_dip1 lasts 60 ms, less"
+        " than 5 cycles, which"
         " phasors smear"
     ]
     assert said(replace(short, record=replace(dip.record, waves=None))) == []

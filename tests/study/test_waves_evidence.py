@@ -1,4 +1,5 @@
-"""Waveforms of known truth through the product: a short run of benchmarks/waves.py and benchmarks/waves_hidden.py.
+"""Waveforms of known truth through the product: a short run of benchmarks/waves.py and
+benchmarks/waves_hidden.py.
 
 The generator's equations, frame and solver are its own; it is judged first.
 """
@@ -27,7 +28,7 @@ from independent.circuit import (
     Shunt,
     Switched,
     drawn,
-)  # fmt: skip
+)
 from independent.fault import Fault, vector
 from independent.sampler import CurrentTransformer, Sampler
 from independent.source import OMEGA
@@ -46,7 +47,9 @@ def test_a_branch_draws_what_its_impedance_says_and_forgets_the_fault():
     made = drawn((Branch(0.5, 1.5),), FAULT, T)
     before = T < 0.09
     speed = 1.002
-    np.testing.assert_allclose(made.current[before], made.voltage[before] / (0.5 + 1.5j * speed), rtol=1e-6)
+    np.testing.assert_allclose(
+        made.current[before], made.voltage[before] / (0.5 + 1.5j * speed), rtol=1e-6
+    )
     left = np.abs(made.current - made.voltage / (0.5 + 1.5j * speed))
     assert left[(T > 0.1) & (T < 0.16)].max() > 0.1 > 1e-3 > left[T > 0.28].max()
 
@@ -68,8 +71,12 @@ def test_energy_is_conserved_through_an_unbalanced_fault():
     from scipy.integrate import trapezoid
 
     made = drawn((Group(MACHINE, 1.0, 0.7), Branch(0.5, 1.5), Shunt(0.3)), FAULT, T)
-    alone = [drawn((d,), FAULT, T).current for d in (Group(MACHINE, 1.0, 0.7), Branch(0.5, 1.5), Shunt(0.3))]
-    np.testing.assert_allclose(sum(alone), made.current, atol=1e-4)  # of the solver, far below any noise
+    alone = [
+        drawn((d,), FAULT, T).current
+        for d in (Group(MACHINE, 1.0, 0.7), Branch(0.5, 1.5), Shunt(0.3))
+    ]
+    # of the solver, far below any noise
+    np.testing.assert_allclose(sum(alone), made.current, atol=1e-4)
     branch = alone[1]
     entered = trapezoid((made.voltage * branch.conj()).real, T)
     stored = 1.5 * (np.abs(branch[-1]) ** 2 - np.abs(branch[0]) ** 2) / (2 * OMEGA)
@@ -79,13 +86,16 @@ def test_energy_is_conserved_through_an_unbalanced_fault():
 def test_devices_that_may_be_hidden_do_what_they_are_named_for():
     capacitor = drawn((Shunt(B=0.3),), FAULT, T)
     before = T < 0.09
-    np.testing.assert_allclose(capacitor.current[before], 0.3j * 1.002 * capacitor.voltage[before], rtol=1e-4)
+    np.testing.assert_allclose(
+        capacitor.current[before], 0.3j * 1.002 * capacitor.voltage[before], rtol=1e-4
+    )
     core = drawn((Core(1.15, 0.5, 0.02),), FAULT, T)
     assert np.abs(core.current[before]).max() == 0.0 < np.abs(core.current[T > 0.17]).max()
     star = replace(FAULT, delta=False)
     earthed = drawn((Earthed(0.2, 1.0),), star, T)
     assert np.abs(earthed.current).max() == 0.0 < 0.05 < np.abs(earthed.current_zero).max()
-    assert np.abs(drawn((Earthed(0.2, 1.0),), FAULT, T).current_zero).max() < 1e-9  # a delta keeps it out
+    # a delta keeps it out
+    assert np.abs(drawn((Earthed(0.2, 1.0),), FAULT, T).current_zero).max() < 1e-9
     relay = Relay(0.05, 0.04, 0.01)  # from 50 ms after the fault's start to 40 ms after its end
     tripped = drawn((Switched(Shunt(0.4), 1.0, relay),), FAULT, T)
     assert np.abs(tripped.current[(T > 0.151) & (FAULT.end + 0.04 > T)]).max() == 0.0
@@ -99,7 +109,9 @@ def test_what_may_be_hidden_in_one_phase_or_in_the_fault_alone_is_there():
     np.testing.assert_allclose(b, -c, atol=1e-12)
     np.testing.assert_allclose(across.current.real, 0.0, atol=1e-12)
     power = (across.voltage * across.current.conj()).real[before]
-    assert power.mean() == pytest.approx(2 / 3 * 3 / 2 * 0.3 / (0.3**2 + (0.8 * 1.002) ** 2), rel=2e-2)
+    assert power.mean() == pytest.approx(
+        2 / 3 * 3 / 2 * 0.3 / (0.3**2 + (0.8 * 1.002) ** 2), rel=2e-2
+    )
 
     held = drawn((Held(0.3 + 0.1j),), FAULT, T)
     power = held.voltage * held.current.conj()
@@ -113,7 +125,8 @@ def test_what_may_be_hidden_in_one_phase_or_in_the_fault_alone_is_there():
 
     rectifier = drawn((Rectifier(0.06j, 0.03),), FAULT, T)
     assert np.abs(rectifier.current).max() == pytest.approx(0.09, rel=1e-3)
-    sixth = 0.02 / 6 / 1.002  # s: fifth and seventh, of either sequence, are the same again after it but for the frame
+    # s: fifth and seventh, of either sequence, are the same again after it but for the frame
+    sixth = 0.02 / 6 / 1.002
     shift = round(6 * sixth / 2e-5)
     np.testing.assert_allclose(rectifier.current[shift:], rectifier.current[:-shift], atol=1e-3)
 
@@ -137,10 +150,14 @@ def test_the_sampler_adds_what_it_says():
     off = Sampler(3200.0, 1e-3, (0.0, 0.0, 0.0, 0.01, 0.0, 0.0), 14, cutoff=None)
     seen = off.read(made, 0.0, np.random.default_rng(0)) - clean
     assert seen[3].mean() == pytest.approx(0.01, abs=2e-4)
-    assert seen[0].std() == pytest.approx(np.hypot(1e-3 / np.sqrt(2), 4 / 2**14 / np.sqrt(12)), rel=0.05)
+    assert seen[0].std() == pytest.approx(
+        np.hypot(1e-3 / np.sqrt(2), 4 / 2**14 / np.sqrt(12)), rel=0.05
+    )
     passed = CurrentTransformer(knee=0.5).passed(clean[3:], 1 / 3200)
     assert np.abs(passed - clean[3:]).max() > 0.3
-    np.testing.assert_allclose(CurrentTransformer(knee=50.0).passed(clean[3:], 1 / 3200), clean[3:], atol=1e-12)
+    np.testing.assert_allclose(
+        CurrentTransformer(knee=50.0).passed(clean[3:], 1 / 3200), clean[3:], atol=1e-12
+    )
 
 
 # The noise that the voltage's noise makes of currents
@@ -165,11 +182,17 @@ def test_noise_that_turns_one_way_is_whitened_and_its_parts_are_told_apart():
     known = np.ones(residuals.shape, dtype=bool)
     known[2] = False
     noise = of_waves(residuals, known, [slice(0, 5000)], (answer, np.zeros(400)), 3)
-    white = noise.pairs[0][0].whiten(residuals[0] + 1j * residuals[1], np.ones(len(slow), dtype=bool))
+    white = noise.pairs[0][0].whiten(
+        residuals[0] + 1j * residuals[1], np.ones(len(slow), dtype=bool)
+    )
     assert np.std(white.real) == pytest.approx(1.0, abs=0.05)
-    lagged = [abs(np.vdot(white[k:], white[:-k])) / np.vdot(white, white).real for k in range(1, 40)]
+    lagged = [
+        abs(np.vdot(white[k:], white[:-k])) / np.vdot(white, white).real for k in range(1, 40)
+    ]
     assert max(lagged) < 5 / np.sqrt(len(white))
-    least = solve_levinson(np.r_[covariances(answer, 48)[0] + 0.25, covariances(answer, 48)[1:]]).deviation[-1]
+    least = solve_levinson(
+        np.r_[covariances(answer, 48)[0] + 0.25, covariances(answer, 48)[1:]]
+    ).deviation[-1]
     assert noise.pairs[0][0].deviation[-1] == pytest.approx(least, rel=0.03)
 
 
@@ -197,13 +220,18 @@ def test_without_noise_little_but_interpolation_is_left():
     still = replace(case, sampler=replace(case.sampler, noise=0.0, bits=None, offsets=(0.0,) * 6))
     row = study.judged(study.identified(waves.events(still, [1, 3])[0]), case.site)
     assert row["epsilon_i"] < 2e-4
-    # What the voltage did between samples at its edges is left open, which costs the branch's ratio most.
+    # What the voltage did between samples at its edges is left open, which costs the branch's ratio
+    # most.
     limits = {"branch_resistance": 1e-2}
-    assert {name: off for name, off in row["off"].items() if abs(off) > limits.get(name, 5e-3)} == {}
+    assert {
+        name: off for name, off in row["off"].items() if abs(off) > limits.get(name, 5e-3)
+    } == {}
 
 
 def test_what_is_recorded_reaches_the_event_through_the_product():
-    """Frequency, voltage, offsets: what the product takes for the state before the event is the generator's."""
+    """Frequency, voltage, offsets: what the product takes for the state before the event is the
+    generator's.
+    """
     case, events = waves.drawn_events([1, 2])
     event = in_waves(events[0])
     fault = case.faults[0]
@@ -226,13 +254,19 @@ def test_nothing_is_named_where_nothing_is_hidden():
 
 
 def test_a_record_made_here_is_read_from_comtrade_as_it_is(tmp_path):
-    """Written by the product's own writer from a table of samples, read, fitted to the same values."""
+    """Written by the product's own writer from a table of samples, read, fitted to the
+    same values.
+    """
     _, events = waves.drawn_events([1, 3])
     kept = events[0].record.waves
     t = kept.start + np.arange(kept.samples.shape[1]) / kept.rate
     table = tmp_path / "site.csv"
     head = "t [s],ua [kV],ub [kV],uc [kV],ia [kA],ib [kA],ic [kA]"
-    np.savetxt(table, np.vstack([t, kept.samples]).T, delimiter=",", header=head, comments="", fmt="%.9g")
+    np.savetxt(
+        table, np.vstack([t, kept.samples]).T, delimiter=",", header=head, comments="", fmt="%.9g"
+    )
     tractexp.convert(table, to="comtrade", folder=tmp_path)
     read = tractexp.read(tmp_path / "site.cfg")[0]
-    np.testing.assert_allclose(read.record.waves.samples[:, 100:1000], kept.samples[:, 100:1000], rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(
+        read.record.waves.samples[:, 100:1000], kept.samples[:, 100:1000], rtol=1e-5, atol=1e-5
+    )

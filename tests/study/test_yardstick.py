@@ -13,8 +13,21 @@ from tractexp.identification.linear_network import CRITERION, HELD_OUT, black_bo
 from tractexp.identification.yardstick import poles_in_words, yardstick
 from tractexp.inference.model_error import model_error
 
-FAST = {"optimizer": "multistart_least_squares", "budget": 300, "check_intervals": False, "progress": False}
-TRUTH = {"T_prime": 0.12, "X_prime": 0.25, "C": 0.9, "M": 0.006, "T_m": 0.55, "p_v": 1.4, "q_v": 3.0}
+FAST = {
+    "optimizer": "multistart_least_squares",
+    "budget": 300,
+    "check_intervals": False,
+    "progress": False,
+}
+TRUTH = {
+    "T_prime": 0.12,
+    "X_prime": 0.25,
+    "C": 0.9,
+    "M": 0.006,
+    "T_m": 0.55,
+    "p_v": 1.4,
+    "q_v": 3.0,
+}
 
 
 def simulated(depth, model="third_order_exponential", noise=0.002, values=TRUTH, **shape):
@@ -35,7 +48,9 @@ def test_it_is_in_the_result_beside_the_model_s_own_error(fit):
     beside, own = fit.result.linear_network, fit.result.model_error
     assert beside["chosen_by"] == HELD_OUT
     assert beside["model_error"].keys() == own.keys()
-    assert [e["name"] for e in beside["model_error"]["events"]] == [e["name"] for e in own["events"]]
+    assert [e["name"] for e in beside["model_error"]["events"]] == [
+        e["name"] for e in own["events"]
+    ]
     assert beside["ratio"] == own["held_out"]["value"] / beside["model_error"]["held_out"]["value"]
     assert all(pole["decay"] > 0 for pole in beside["poles"])
 
@@ -49,19 +64,27 @@ def test_one_sentence_on_console_page_and_result(fit, tmp_path):
     poles = len(fit.result.linear_network["poles"])
     ratio = fit.result.linear_network["ratio"]
     assert sentence == (
-        f"the physical model leaves {ratio:.2g} times what the best linear network of {poles} poles does on the dip it"
+        f"the physical model leaves {ratio:.2g} times what the best linear network of {poles} poles"
+        " does on the dip it"
         " never saw"
     )
     assert fit.yardstick == sentence
     told = sentence.replace("the physical", "The physical")
     assert f"{told}. The network's poles: " in " ".join(str(fit.summary()).split())
     assert f"{told}. The network's poles: " in unescape(fit.report().html)
-    assert json.loads(fit.result.write(tmp_path / "result.json").read_text())["linear_network"]["sentence"] == sentence
+    assert (
+        json.loads(fit.result.write(tmp_path / "result.json").read_text())["linear_network"][
+            "sentence"
+        ]
+        == sentence
+    )
 
 
 def test_a_model_that_is_wrong_leaves_a_multiple():
     """A static load fitted to a motor's dip."""
-    wrong = tractexp.identify(simulated(0.3), "static_exponential", validate=simulated(0.35), **FAST)
+    wrong = tractexp.identify(
+        simulated(0.3), "static_exponential", validate=simulated(0.35), **FAST
+    )
     assert wrong.result.linear_network["ratio"] > 3
 
 
@@ -70,7 +93,9 @@ def test_of_a_linear_load_the_network_leaves_no_more_than_noise():
     t = np.arange(400) / 200
     U = np.where((t >= 0.5) & (t < 0.8), 0.7, 1.0)
     rng = np.random.default_rng(5)
-    P, Q = (x + 0.002 * rng.standard_normal(400) for x in (0.8 + 1.6 * (U - 1), 0.3 + 0.9 * (U - 1)))
+    P, Q = (
+        x + 0.002 * rng.standard_normal(400) for x in (0.8 + 1.6 * (U - 1), 0.3 + 0.9 * (U - 1))
+    )
     (dip,) = tractexp.read(t=t, U=U, P=P, Q=Q, name="line")
     beside = tractexp.identify(dip, "static_exponential", **FAST).result.linear_network
     assert beside["poles"] == []
@@ -90,10 +115,15 @@ def test_the_error_is_that_of_every_other_model(fit):
 
 
 def test_a_record_that_is_too_short_is_a_sentence_beside_the_fit(fit):
-    fits = [replace(f, event=replace(f.event, start=f.event.record.samples - 3)) for f in fit.details.fits[:1]]
+    fits = [
+        replace(f, event=replace(f.event, start=f.event.record.samples - 3))
+        for f in fit.details.fits[:1]
+    ]
     beside = yardstick(fits, fit.result.model_error)
     assert beside.keys() == {"sentence"}
-    assert beside["sentence"].startswith("no linear network stands beside it: dip 0.3: 3 samples from the dip on are")
+    assert beside["sentence"].startswith(
+        "no linear network stands beside it: dip 0.3: 3 samples from the dip on are"
+    )
 
 
 def test_a_result_of_an_earlier_version_has_none(fit, tmp_path):
@@ -104,10 +134,14 @@ def test_a_result_of_an_earlier_version_has_none(fit, tmp_path):
 
 
 def test_of_waves_the_sentence_tells_of_the_currents_too(shared_data):
-    """Without its path the zero sequence of an earthed transformer is missing in the currents, but not in P and Q."""
+    """Without its path the zero sequence of an earthed transformer is missing in the currents, but
+    not in P and Q.
+    """
     path = shared_data / "dfr220kv-shandong" / "xtz.cfg"
     train, validate = tractexp.read(path, voltages=[0, 1, 2], currents=[16, 17, 18])
-    fit = tractexp.identify(train, "third_order_impedance", validate=validate, domain="waves", **FAST | {"budget": 50})
+    fit = tractexp.identify(
+        train, "third_order_impedance", validate=validate, domain="waves", **FAST | {"budget": 50}
+    )
     beside, own = fit.result.linear_network, fit.result.events[1]["epsilon_i"]
     network = beside["events"][1]["epsilon_i"]
     assert beside["events"][1]["role"] == "validate"
@@ -127,7 +161,9 @@ def test_poles_are_told_as_decay_and_frequency():
     ids=["earthed", "isolated"],
 )
 def test_two_poles_follow_a_real_transformer(shared_data, voltages, currents, fitted, held):
-    """One dip fitted, one held out: the currents' error, zero sequence included where it is earthed."""
+    """One dip fitted, one held out: the currents' error, zero sequence included where it is
+    earthed.
+    """
     path = shared_data / "dfr220kv-shandong" / "xtz.cfg"
     train, validate = WAVES.events(tractexp.read(path, voltages=voltages, currents=currents))
     box = black_boxes(WAVES, [train], most=2)[2]

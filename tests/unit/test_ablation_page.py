@@ -23,11 +23,15 @@ def test_the_stored_result_is_of_all_sets_of_ingredients_on_all_problems_from_a_
     records, iterations, bbob = STORED["overall"]
     assert "dirty" not in STORED["commit"]
     assert len(STORED["commit"]) == 40
-    assert records["columns"] == iterations["columns"] == ["tibet_50pct", "tibet_30pct", "tibet_65pct"]
+    assert (
+        records["columns"] == iterations["columns"] == ["tibet_50pct", "tibet_30pct", "tibet_65pct"]
+    )
     assert (records["ranks"]["seeds"], bbob["ranks"]["seeds"]) == (90, 24)
     for part in STORED["overall"]:
         assert len(part["figures"]) == 16
-        assert [effect["seeds"] for effect in part["ablation"]["effects"]] == [24 if part["share"] else 30] * 4
+        assert [effect["seeds"] for effect in part["ablation"]["effects"]] == [
+            24 if part["share"] else 30
+        ] * 4
         assert {len(effect["contrasts"]) for effect in part["ablation"]["effects"]} == {8}
 
 

@@ -1,6 +1,8 @@
-"""What a refusal advises helps, or is a final no: every advice is followed until the file is read or none is left.
+"""What a refusal advises helps, or is a final no: every advice is followed until the file is read
+or none is left.
 
-Settings of a sentence ("data.currents=[3, 5, 4]", "data.columns={P: 'F1 P', Q: 'F1 Q'}") are taken as they stand.
+Settings of a sentence ("data.currents=[3, 5, 4]", "data.columns={P: 'F1 P', Q: 'F1 Q'}") are taken
+as they stand.
 """
 
 import re
@@ -37,9 +39,19 @@ def recorded(tmp_path, rows, names, units, rate=RATE):
     channels = []
     for row, name, unit in zip(rows, names, units, strict=True):
         gain = (np.abs(row).max() or 1.0) / 30000
-        channels.append(Channel(name, np.round(row / gain).astype(np.int16), unit, quantities.get(unit, ""), gain=gain))
+        channels.append(
+            Channel(
+                name,
+                np.round(row / gain).astype(np.int16),
+                unit,
+                quantities.get(unit, ""),
+                gain=gain,
+            )
+        )
     segments = [Segment(0, len(rows[0]), rate, 0.0)]
-    write(Recording(str(tmp_path / "r.cfg"), channels, segments), tmp_path / "r.cfg", "BINARY", 1999)
+    write(
+        Recording(str(tmp_path / "r.cfg"), channels, segments), tmp_path / "r.cfg", "BINARY", 1999
+    )
     return str(tmp_path / "r.cfg")
 
 
@@ -53,7 +65,10 @@ def walk(path, settings):
             return "read", seen, str(tractexp.read(path, **settings))
         except UserError as error:
             sentence = str(error)
-        advice = {key: yaml.safe_load(value) for key, value in SETTING.findall(sentence.rpartition(";")[2])}
+        advice = {
+            key: yaml.safe_load(value)
+            for key, value in SETTING.findall(sentence.rpartition(";")[2])
+        }
         advice = {key: value for key, value in advice.items() if "..." not in str(value)}
         if not advice:
             return "no", seen, sentence
@@ -67,7 +82,9 @@ PLAIN = ["C1", "C2", "C3", "C4", "C5", "C6"]
 ORDERS = [[0, 1, 2], [0, 2, 1], [1, 2, 0], [2, 0, 1]]
 
 
-@pytest.mark.parametrize("names", [NAMES, PLAIN, [*NAMES[:3], "IC", "IB", "IA"], [*NAMES[:3], "IB", "IC", "IA"]])
+@pytest.mark.parametrize(
+    "names", [NAMES, PLAIN, [*NAMES[:3], "IC", "IB", "IA"], [*NAMES[:3], "IB", "IC", "IA"]]
+)
 @pytest.mark.parametrize("volts", ORDERS)
 @pytest.mark.parametrize("amps", ORDERS)
 def test_every_order_that_is_advised_is_accepted(tmp_path, names, volts, amps):
@@ -111,7 +128,9 @@ def test_of_voltages_alone_the_dip_is_told_in_a_csv_as_well(tmp_path):
     v = waves()[:3]
     t = np.arange(v.shape[1]) / RATE
     for order in ([0, 1, 2], [0, 2, 1]):
-        np.savetxt(tmp_path / "v.csv", np.c_[t, v[order].T], "%.6f", ",", header="t,va,vb,vc", comments="")
+        np.savetxt(
+            tmp_path / "v.csv", np.c_[t, v[order].T], "%.6f", ",", header="t,va,vb,vc", comments=""
+        )
         (event,) = tractexp.look(str(tmp_path / "v.csv"), progress=False).events
         assert (event["kind"], event["worth"]) == ("dip", False)
         assert event["depth"] == pytest.approx(0.3, abs=0.01)
@@ -125,7 +144,10 @@ def table(tmp_path, above, header, columns):
     lines = [
         *above,
         header,
-        *(",".join(f"{x:.4f}" for x in row) for row in zip(t, *(values[c] for c in columns), strict=True)),
+        *(
+            ",".join(f"{x:.4f}" for x in row)
+            for row in zip(t, *(values[c] for c in columns), strict=True)
+        ),
     ]
     (tmp_path / "t.csv").write_text("\n".join(lines) + "\n")
     return str(tmp_path / "t.csv")
@@ -150,13 +172,22 @@ def test_two_feeders_in_a_table_are_told_apart_by_one_answer(tmp_path, above, he
 
 
 def test_merged_headings_name_the_feeder_in_the_question(tmp_path):
-    path = table(tmp_path, [",,Line North,,Line South"], "t,U (kV),P (MW),Q (Mvar),P (MW),Q (Mvar)",
-                 ["U", "P", "Q", "P2", "Q2"])  # fmt: skip
-    with pytest.raises(UserError, match=r"'Line North P' \[MW\], 'Line South P'.*P: 'Line North P', Q: 'Line North Q'"):
+    path = table(
+        tmp_path,
+        [",,Line North,,Line South"],
+        "t,U (kV),P (MW),Q (Mvar),P (MW),Q (Mvar)",
+        ["U", "P", "Q", "P2", "Q2"],
+    )
+    with pytest.raises(
+        UserError,
+        match=r"'Line North P' \[MW\], 'Line South P'.*P: 'Line North P', Q: 'Line North Q'",
+    ):
         tractexp.read(path)
 
 
 def test_a_choice_that_is_given_stands_in_the_next_answer(tmp_path):
-    path = table(tmp_path, [], "t,U (kV),P (MW),Q (Mvar),P (MW),Q (Mvar)", ["U", "P", "Q", "P2", "Q2"])
+    path = table(
+        tmp_path, [], "t,U (kV),P (MW),Q (Mvar),P (MW),Q (Mvar)", ["U", "P", "Q", "P2", "Q2"]
+    )
     with pytest.raises(UserError, match=r"columns=\{Q: 3, P: 4\}"):
         tractexp.read(path, columns={"P": 4})

@@ -1,4 +1,6 @@
-"""Where a record ends because its load changes after the dip, and what is said of a load that is lost in it."""
+"""Where a record ends because its load changes after the dip, and what is said of a load that is
+lost in it.
+"""
 
 import re
 
@@ -13,13 +15,17 @@ BEGIN, END = 1.0, 1.15  # s, of the dip
 
 
 def record(course=None, rate=200.0, noise=1e-3, seed=0, sign=1.0):
-    """A dip of 30 % with a slow rest, an overshoot of its load, and a `course` of time that multiplies it."""
+    """A dip of 30 % with a slow rest, an overshoot of its load, and a `course` of time that
+    multiplies it.
+    """
     t, rng = np.arange(int(4 * rate)) / rate, np.random.default_rng(seed)
     after = np.where(t >= END, np.exp(-np.maximum(t - END, 0) / 0.1), 0.0)
     U = np.where((t >= BEGIN) & (t < END), 0.7, 1.0) - 0.08 * after
     P, Q = 0.8 * U**1.5 + 0.3 * after, 0.4 * U**2 + 0.3 * after
     size = 1.0 if course is None else course(t)
-    U, P, Q = (x + noise * rng.standard_normal(len(t)) for x in (U, sign * size * P, sign * size * Q))
+    U, P, Q = (
+        x + noise * rng.standard_normal(len(t)) for x in (U, sign * size * P, sign * size * Q)
+    )
     return Record("made", t, U, P, Q, source="made.csv")
 
 

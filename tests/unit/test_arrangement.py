@@ -1,4 +1,6 @@
-"""Which channels are phases or lines, in what order, in what direction: told while they are alive."""
+"""Which channels are phases or lines, in what order, in what direction: told while
+they are alive.
+"""
 
 import re
 from dataclasses import replace
@@ -43,16 +45,25 @@ def test_what_is_right_is_left_as_it_is():
 class TestLineVoltages:
     @pytest.mark.parametrize(
         "names",
-        [("UAB", "UBC", "UCA"), ("U12", "U23", "U31"), ("U21", "U32", "U13"), ("UL1L2", "UL2L3", "UL3L1")],
+        [
+            ("UAB", "UBC", "UCA"),
+            ("U12", "U23", "U31"),
+            ("U21", "U32", "U13"),
+            ("UL1L2", "UL2L3", "UL3L1"),
+        ],
     )
     def test_are_recognised_by_their_labels(self, names):
         phase = phases(dip(T))
-        record = made(phase - np.roll(phase, -1, axis=0), load(dip(T)), names=[*names, "Ia", "Ib", "Ic"])
+        record = made(
+            phase - np.roll(phase, -1, axis=0), load(dip(T)), names=[*names, "Ia", "Ib", "Ic"]
+        )
         found = arrange_feeder(record, GIVEN)
         assert found.connection == "line_voltages"
         assert "line to line, as their labels say" in found.why[0]
         assert ("U21 as V1 - V2" in found.why[0]) == ("U21" in names)
-        assert power(record, found) == pytest.approx(power(made(phase, load(dip(T))), GIVEN), rel=0.002)
+        assert power(record, found) == pytest.approx(
+            power(made(phase, load(dip(T))), GIVEN), rel=0.002
+        )
 
     def test_given_in_another_order_are_put_right(self):
         phase = phases(dip(T))
@@ -76,8 +87,12 @@ class TestLineVoltages:
 
     def test_sqrt_3_times_others_of_the_file(self):
         phase = phases(dip(T))
-        waves = np.concatenate([wave(T, x) for x in (phase - np.roll(phase, -1, axis=0), load(dip(T)), phase)])
-        record = recording(waves, names=[*PLAIN, "Ua", "Ub", "Uc"], units=[*UNITS, "kV", "kV", "kV"])
+        waves = np.concatenate(
+            [wave(T, x) for x in (phase - np.roll(phase, -1, axis=0), load(dip(T)), phase)]
+        )
+        record = recording(
+            waves, names=[*PLAIN, "Ua", "Ub", "Uc"], units=[*UNITS, "kV", "kV", "kV"]
+        )
         found = arrange_feeder(record, GIVEN)
         assert found.connection == "line_voltages"
         assert "sqrt 3 times" in found.why[0]
@@ -89,7 +104,9 @@ class TestLineVoltages:
 
 
 class TestFrequency:
-    @pytest.mark.parametrize(("declared", "real", "nominal"), [(60, 50.016, 50), (50, 59.93, 60), (50, 16.71, 50 / 3)])
+    @pytest.mark.parametrize(
+        ("declared", "real", "nominal"), [(60, 50.016, 50), (50, 59.93, 60), (50, 16.71, 50 / 3)]
+    )
     def test_declared_wrongly_is_measured(self, declared, real, nominal):
         waves = np.concatenate([wave(T, phases(dip(T)), real), wave(T, load(dip(T)), real)])
         found = tune_frequency(recording(waves, frequency=declared), (0, 1, 2))
@@ -103,23 +120,33 @@ class TestFrequency:
 
     def test_is_told_from_the_part_that_is_alive(self):
         alive = np.where(T < 0.4, 1.0, 1e-4)
-        record = recording(wave(T, phases(KV * alive), 50.02) + noise((3, len(T)), 0.05), frequency=60.0)
+        record = recording(
+            wave(T, phases(KV * alive), 50.02) + noise((3, len(T)), 0.05), frequency=60.0
+        )
         assert tune_frequency(record, (0, 1, 2)).frequency == 50.0
 
 
 class TestOrder:
     def test_labels_that_disagree_are_refused_with_both_powers(self):
         record = made(phases(dip(T)), load(dip(T)), names=["Ua", "Ub", "Uc", "Ia", "Ib", "Ic"])
-        says = r"data.currents are the phases B, C, A where data.voltages are A, B, C, .*data.currents=\[3, 4, 5\], "
-        with pytest.raises(UserError, match=says + r"which gives P = 33 MW, Q = 19.1 Mvar where .* P = -33 MW"):
+        says = (
+            r"data.currents are the phases B, C, A where data.voltages are A, B, C,"
+            r" .*data.currents=\[3, 4, 5\], "
+        )
+        with pytest.raises(
+            UserError, match=says + r"which gives P = 33 MW, Q = 19.1 Mvar where .* P = -33 MW"
+        ):
             arrange_feeder(record, replace(GIVEN, currents=(4, 5, 3)))
 
     @pytest.mark.parametrize("turned", [(1, 2, 0), (2, 0, 1)])
-    def test_rotated_currents_without_labels_are_refused_with_the_order_that_makes_sense(self, turned):
+    def test_rotated_currents_without_labels_are_refused_with_the_order_that_makes_sense(
+        self, turned
+    ):
         record = made(phases(dip(T)), load(dip(T), lag=-0.07)[[*turned]])
         right = [3 + turned.index(k) for k in range(3)]
         with pytest.raises(
-            UserError, match=rf"P and Q make no sense .* data.currents={re.escape(str(right))} gives P = "
+            UserError,
+            match=rf"P and Q make no sense .* data.currents={re.escape(str(right))} gives P = ",
         ):
             arrange_feeder(record, GIVEN)
         arrange_feeder(record, replace(GIVEN, currents=tuple(right)))
@@ -128,13 +155,17 @@ class TestOrder:
     def test_swapped_currents_are_refused(self, turned):
         record = made(phases(dip(T)), load(dip(T))[[*turned]])
         right = [3 + turned.index(k) for k in range(3)]
-        with pytest.raises(UserError, match=rf"two are swapped; data.currents={re.escape(str(right))} gives P = 33 MW"):
+        with pytest.raises(
+            UserError,
+            match=rf"two are swapped; data.currents={re.escape(str(right))} gives P = 33 MW",
+        ):
             arrange_feeder(record, GIVEN)
 
     def test_voltages_in_the_other_order_are_refused(self):
         record = made(phases(dip(T)), load(dip(T)))
         with pytest.raises(
-            UserError, match=r"not in the order a, b, c.* data.voltages=\[0, 1, 2\] data.currents=\[3, 4, 5\]"
+            UserError,
+            match=r"not in the order a, b, c.* data.voltages=\[0, 1, 2\] data.currents=\[3, 4, 5\]",
         ):
             arrange_feeder(record, Feeder((1, 0, 2), (4, 3, 5), "three_phase"))
 
@@ -145,13 +176,15 @@ class TestOrder:
         record = made(volts * sign, amps) if side == "voltages" else made(volts, amps * sign)
         number = 1 if side == "voltages" else 4
         with pytest.raises(
-            UserError, match=rf"data.{side}=.* channel {number} 'x{number} .* has the opposite polarity"
+            UserError,
+            match=rf"data.{side}=.* channel {number} 'x{number} .* has the opposite polarity",
         ):
             arrange_feeder(record, GIVEN)
 
     @pytest.mark.parametrize("order", [(0, 1, 2), (1, 2, 0), (2, 0, 1)])
     def test_a_line_that_is_dead_after_the_trip_keeps_its_order(self, order):
-        alive = np.where(T < 0.3, 1.0, 0.0)  # less than a quarter of the record; then nothing but noise
+        # less than a quarter of the record; then nothing but noise
+        alive = np.where(T < 0.3, 1.0, 0.0)
         record = made(phases(KV * alive, 0.01 * KV), load(KV * np.maximum(alive, 1e-6)) * alive)
         given = Feeder(order, tuple(3 + k for k in order), "three_phase")
         assert arrange_feeder(record, given).voltages == order
@@ -184,7 +217,12 @@ class TestDirection:
         found = arrange_feeder(made(phases(dip(T)), -load(dip(T), exponent=1.6)), GIVEN)
         assert "data.reverse_current=true" in found.why[-1]
         assert "|P| goes as U^1.6 when the voltage falls, as a load's" in found.why[-1]
-        assert arrange_feeder(made(phases(dip(T)), -load(dip(T))), replace(GIVEN, reverse_current=True)).why == ()
+        assert (
+            arrange_feeder(
+                made(phases(dip(T)), -load(dip(T))), replace(GIVEN, reverse_current=True)
+            ).why
+            == ()
+        )
 
     def test_a_braking_train_keeps_its_power(self):
         amps = load(dip(T), lag=np.pi, exponent=0.0)
@@ -201,11 +239,16 @@ class TestDirection:
         assert "power flows both ways" in found.why[-1]
 
     @pytest.mark.parametrize(
-        ("sign", "says"), [(1, "direction is right and this is regeneration"), (-1, "that of a load turned round")]
+        ("sign", "says"),
+        [(1, "direction is right and this is regeneration"), (-1, "that of a load turned round")],
     )
     def test_the_negative_sequence_tells_whatever_power_does(self, sign, says):
         one, two, _ = fault()
-        back = phases(-KA * one / KV * np.exp(-0.1j)) if sign > 0 else -phases(KA * one / KV * np.exp(-0.1j))
+        back = (
+            phases(-KA * one / KV * np.exp(-0.1j))
+            if sign > 0
+            else -phases(KA * one / KV * np.exp(-0.1j))
+        )
         passive = phases(0, 2.0 * KA * two / KV * np.exp(-1.2j))
         found = arrange_feeder(made(phases(one, two), back + sign * passive), GIVEN)
         assert says in found.why[-1]
@@ -218,9 +261,17 @@ class TestDirection:
         assert found.why[-1].startswith("P = -33 MW, Q = -19.1 Mvar: ")
 
     def test_nothing_is_said_of_noise(self):
-        assert arrange_feeder(made(phases(dip(T)), 1e-9 * load(dip(T)) + noise((3, len(T)), 0.01)), GIVEN).why == ()
+        assert (
+            arrange_feeder(
+                made(phases(dip(T)), 1e-9 * load(dip(T)) + noise((3, len(T)), 0.01)), GIVEN
+            ).why
+            == ()
+        )
 
     def test_a_single_phase_feeder_has_a_direction_too(self):
         waves = [wave(T, phases(dip(T)))[0], -wave(T, load(dip(T)))[0]]
         record = recording(waves, names=["U", "I"], units=["kV", "kA"])
-        assert "data.reverse_current=true" in arrange_feeder(record, Feeder((0,), (1,), "single_phase")).why[-1]
+        assert (
+            "data.reverse_current=true"
+            in arrange_feeder(record, Feeder((0,), (1,), "single_phase")).why[-1]
+        )

@@ -1,4 +1,6 @@
-"""SEL compressed event reports that the tests write themselves, from the description in SEL's manuals."""
+"""SEL compressed event reports that the tests write themselves, from the description in SEL's
+manuals.
+"""
 
 from datetime import datetime
 
@@ -28,7 +30,9 @@ def names(*cells):
 
 
 def waves(n, dip=(0.5, 0.7, 0.4), scale=HALF):
-    """(N, 7) columns, instantaneous primary values times `scale`: three currents, their sum, three voltages."""
+    """(N, 7) columns, instantaneous primary values times `scale`: three currents, their sum, three
+    voltages.
+    """
     t = np.arange(n) / (F * PER_CYCLE)
     turn = np.exp(1j * (2 * np.pi * F * t[:, None] - 2 * np.pi / 3 * np.arange(3)))
     depth = np.where((t >= dip[0]) & (t < dip[1]), 1 - dip[2], 1.0)[:, None]
@@ -41,13 +45,26 @@ def report(n=1920, trigger=480, values=None, summary=(), columns=COLUMNS):
     """Lines of a report; the row of the trigger carries the mark, the contact TRIP closes there."""
     values = waves(n) if values is None else values
     peak = np.hypot(*values[[trigger, trigger - PER_CYCLE // 4], :3])
-    told = {"FREQ": F, "SAM/CYC_A": PER_CYCLE, "SAM/CYC_D": 4, "NUM_OF_CYC": n // PER_CYCLE, "EVENT": '"ER"',
-            "IA": f"{peak[0]:.0f}", "IB": f"{peak[1]:.0f}", "IC": f"{peak[2]:.0f}", **dict(summary)}  # fmt: skip
+    told = {
+        "FREQ": F,
+        "SAM/CYC_A": PER_CYCLE,
+        "SAM/CYC_D": 4,
+        "NUM_OF_CYC": n // PER_CYCLE,
+        "EVENT": '"ER"',
+        "IA": f"{peak[0]:.0f}",
+        "IB": f"{peak[1]:.0f}",
+        "IC": f"{peak[2]:.0f}",
+        **dict(summary),
+    }
     lines = ["\x02" + names("FID"), names("FID=SEL-351S-R512-V0-Z105105-D20110429")]
-    lines += [names("MONTH", "DAY", "YEAR", "HOUR", "MIN", "SEC", "MSEC"), row(3, 14, 2023, 15, 9, 26, 535)]
+    lines += [
+        names("MONTH", "DAY", "YEAR", "HOUR", "MIN", "SEC", "MSEC"),
+        row(3, 14, 2023, 15, 9, 26, 535),
+    ]
     lines += [names(*told), row(*told.values()), names(*columns, "TRIG", BITS)]
     for i in range(n):
-        word = "" if i % 8 else f'"{0x84 if i < trigger else 0x94:02X}80"'  # 50P1, 52A... TRIP from the trigger on
+        # 50P1, 52A... TRIP from the trigger on
+        word = "" if i % 8 else f'"{0x84 if i < trigger else 0x94:02X}80"'
         cells = [*(f"{v:.3f}" for v in values[i]), "0", "124.8", "49.98"][: len(columns)]
         lines.append(row(*cells, ">" if i == trigger else "", word))
     return [*lines, names("SETTINGS"), '"Group 1', "CTR = 40", '","1234"', "\x03"]
@@ -70,21 +87,36 @@ def test_the_checksum_is_that_of_the_manual():
 
 def test_a_report_is_read_in_primary_instantaneous_values(write):
     recording = cev.load(write(report()))
-    assert [c.name for c in recording.channels] == ["IA", "IB", "IC", "IG", "VA", "VB", "VC", "VDC", "FREQ"]
+    assert [c.name for c in recording.channels] == [
+        "IA",
+        "IB",
+        "IC",
+        "IG",
+        "VA",
+        "VB",
+        "VC",
+        "VDC",
+        "FREQ",
+    ]
     assert [c.phase for c in recording.channels[:7]] == ["A", "B", "C", "G", "A", "B", "C"]
     [segment] = recording.segments
     assert segment.rate == pytest.approx(F * PER_CYCLE)
-    np.testing.assert_allclose(recording.channels[4].values().max(), np.sqrt(2) * KILOVOLT, rtol=4e-3)
-    np.testing.assert_allclose(recording.channels[0].values().max(), np.sqrt(2) * AMPERE / 1e3, rtol=4e-3)
-    assert recording.channels[7].values()[0] == pytest.approx(0.1248)  # the battery's 124.8 V are not scaled
+    np.testing.assert_allclose(
+        recording.channels[4].values().max(), np.sqrt(2) * KILOVOLT, rtol=4e-3
+    )
+    np.testing.assert_allclose(
+        recording.channels[0].values().max(), np.sqrt(2) * AMPERE / 1e3, rtol=4e-3
+    )
+    # the battery's 124.8 V are not scaled
+    assert recording.channels[7].values()[0] == pytest.approx(0.1248)
     assert (recording.frequency, recording.device) == (50.0, "SEL-351S-R512-V0-Z105105-D20110429")
     assert recording.trigger == pytest.approx(480 / segment.rate)
-    assert recording.start + (datetime(2023, 3, 14, 15, 9, 26, 535000) - recording.start) == datetime(
-        2023, 3, 14, 15, 9, 26, 535000
-    )
-    assert (datetime(2023, 3, 14, 15, 9, 26, 535000) - recording.start).total_seconds() == pytest.approx(
-        recording.trigger, abs=1e-6
-    )
+    assert recording.start + (
+        datetime(2023, 3, 14, 15, 9, 26, 535000) - recording.start
+    ) == datetime(2023, 3, 14, 15, 9, 26, 535000)
+    assert (
+        datetime(2023, 3, 14, 15, 9, 26, 535000) - recording.start
+    ).total_seconds() == pytest.approx(recording.trigger, abs=1e-6)
     assert not [note for note in recording.notes if "checksum" in note or "check the scale" in note]
     assert "CTR = 40" in recording.extra["settings"]
 
@@ -112,15 +144,21 @@ def test_columns_that_are_not_divided_are_known_by_the_summary(write):
     rms = np.hypot(*values[[480, 472], :3]) / np.sqrt(2)
     told = {name: f"{value:.0f}" for name, value in zip(("IA", "IB", "IC"), rms, strict=True)}
     recording = cev.load(write(report(values=values, summary=told)))
-    np.testing.assert_allclose(recording.channels[4].values().max(), np.sqrt(2) * KILOVOLT, rtol=4e-3)
+    np.testing.assert_allclose(
+        recording.channels[4].values().max(), np.sqrt(2) * KILOVOLT, rtol=4e-3
+    )
     assert any("not divided" in note for note in recording.notes)
 
 
 def test_secondary_values_of_a_751_take_the_ratios_of_its_summary(write):
     told = {"PRIM_VAL": '"NO"', "CTR_IA": 40, "PTR_VA": 600}
     recording = cev.load(write(report(summary=told)))
-    np.testing.assert_allclose(recording.channels[1].values().max(), 40 * np.sqrt(2) * AMPERE / 1e3, rtol=4e-3)
-    np.testing.assert_allclose(recording.channels[5].values().max(), 600 * np.sqrt(2) * KILOVOLT, rtol=4e-3)
+    np.testing.assert_allclose(
+        recording.channels[1].values().max(), 40 * np.sqrt(2) * AMPERE / 1e3, rtol=4e-3
+    )
+    np.testing.assert_allclose(
+        recording.channels[5].values().max(), 600 * np.sqrt(2) * KILOVOLT, rtol=4e-3
+    )
 
 
 def test_harmless_faults_are_mended_and_noted(write):
@@ -140,7 +178,9 @@ def test_a_filtered_report_is_no_waveform(write):
 
 
 def filtered(f, per_cycle=4, U=None, told=()):
-    """Lines of a filtered report of a relay that samples by f (N,) [Hz]: phasors after its filter, each step a part."""
+    """Lines of a filtered report of a relay that samples by f (N,) [Hz]: phasors after its filter,
+    each step a part.
+    """
     t = np.concatenate([[0.0], np.cumsum(2 / (f[1:] + f[:-1]))]) / per_cycle
     U = np.where((t >= 0.5) & (t < 0.75), 0.7, 1.0) if U is None else U
     turn = np.exp(1j * (2 * np.pi * np.arange(len(f)) / per_cycle + 0.3))[:, None]
@@ -148,8 +188,17 @@ def filtered(f, per_cycle=4, U=None, told=()):
     V, I = KILOVOLT * U[:, None] * turn.real, AMPERE * (U[:, None] * turn * np.exp(-1j * LAG)).real
     columns = ["IA", "IB", "IC", "VA(kV)", "VB(kV)", "VC(kV)", "FREQ"]
     told = {"FREQ": f"{f[0]:.2f}", "SAM/CYC_A": per_cycle, "EVENT": '"ER"', **dict(told)}
-    lines = [names("FID"), names("FID=SEL-710-R415"), names("MONTH", "DAY", "YEAR", "HOUR", "MIN", "SEC", "MSEC")]
-    lines += [row(3, 14, 2023, 15, 9, 26, 535), names(*told), row(*told.values()), names(*columns, "TRIG", BITS)]
+    lines = [
+        names("FID"),
+        names("FID=SEL-710-R415"),
+        names("MONTH", "DAY", "YEAR", "HOUR", "MIN", "SEC", "MSEC"),
+    ]
+    lines += [
+        row(3, 14, 2023, 15, 9, 26, 535),
+        names(*told),
+        row(*told.values()),
+        names(*columns, "TRIG", BITS),
+    ]
     for k in range(len(f)):
         cells = [*(f"{v:.4f}" for v in (*I[k], *V[k])), f"{f[k]:.2f}"]
         lines.append(row(*cells, ">" if k == len(f) // 3 else "", '"8480"'))
@@ -184,7 +233,9 @@ def test_times_of_a_relay_that_tracks_follow_its_frequency(write):
     np.testing.assert_allclose(table.columns(1), f[1:])
     for k, name in enumerate(table.heading.names):
         if name in ("VA", "IA"):
-            np.testing.assert_allclose(table.columns(k), KILOVOLT if name == "VA" else AMPERE, rtol=1e-4)
+            np.testing.assert_allclose(
+                table.columns(k), KILOVOLT if name == "VA" else AMPERE, rtol=1e-4
+            )
     assert any("follow the frequency in FREQ, 44 to 50 Hz" in note for note in table.notes)
 
 
@@ -192,7 +243,8 @@ def test_a_raw_report_of_a_relay_that_tracks_is_evened(write):
     f = np.round(np.linspace(50, 48, 1920), 2)
     t = np.concatenate([[0.0], np.cumsum(2 / (f[1:] + f[:-1]))]) / PER_CYCLE
     values = waves(1920)
-    values[:, 4] = KILOVOLT * np.cos(2 * np.pi * np.arange(1920) / PER_CYCLE)  # as the relay has it: of its own rate
+    # as the relay has it: of its own rate
+    values[:, 4] = KILOVOLT * np.cos(2 * np.pi * np.arange(1920) / PER_CYCLE)
     lines = report(values=values, summary={"FREQ": 50.0})
     first = next(k for k, line in enumerate(lines) if "TRIG" in line) + 1
     for k in range(1920):
@@ -213,12 +265,15 @@ def test_a_raw_report_of_a_relay_that_tracks_is_evened(write):
 def test_ratings_in_the_settings_are_a_note(write):
     _, lines = filtered(np.full(300, 60.0))
     assert any(
-        "the relay's settings: FLA1 = 250.0, LRA1 = 6.0, CTR1 = 80" in note for note in cev.table(write(lines)).notes
+        "the relay's settings: FLA1 = 250.0, LRA1 = 6.0, CTR1 = 80" in note
+        for note in cev.table(write(lines)).notes
     )
 
 
 def test_phasors_of_a_raw_report_are_refused_with_the_way_to_read_it(write):
-    with pytest.raises(UserError, match=r"32 a cycle: phasors are read from filtered reports of 4 or 8; .*data=sel"):
+    with pytest.raises(
+        UserError, match=r"32 a cycle: phasors are read from filtered reports of 4 or 8; .*data=sel"
+    ):
         cev.table(write(report()))
 
 
@@ -230,12 +285,18 @@ def test_phasors_of_a_raw_report_are_refused_with_the_way_to_read_it(write):
             lambda lines: [line.replace("SAM/CYC_A", "SAM") for line in lines],
             "SAM/CYC_A, the samples in a cycle, is ''",
         ),
-        (lambda lines: [line.replace("49.98,32", "0,32") for line in lines], "FREQ, .* is '0', not a number from 10"),
+        (
+            lambda lines: [line.replace("49.98,32", "0,32") for line in lines],
+            "FREQ, .* is '0', not a number from 10",
+        ),
         (
             lambda lines: [*lines[:20], lines[20].replace(",", ",x", 1), *lines[21:]],
             "line 21: IB 'x.*' is not a number",
         ),
-        (lambda lines: [*lines[:20], "1,2,3", *lines[21:]], "line 21: 3 cells, but 12 columns are named"),
+        (
+            lambda lines: [*lines[:20], "1,2,3", *lines[21:]],
+            "line 21: 3 cells, but 12 columns are named",
+        ),
     ],
 )
 def test_refused(write, change, says):

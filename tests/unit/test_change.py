@@ -40,7 +40,9 @@ def test_a_load_that_swings_for_some_cycles_takes_no_step():
 
 @pytest.mark.parametrize("size", [1.0, 10.0])
 def test_a_fifth_of_the_greatest_power_is_what_small_loads_are_measured_by(size):
-    """Where nearly nothing is drawn, a step by two fifths of that is none: it is 2 % of a fifth of the greatest."""
+    """Where nearly nothing is drawn, a step by two fifths of that is none: it is 2 % of a fifth of
+    the greatest.
+    """
     P = np.concatenate([np.full(50 * N, 1.0), stepped(0.01, 0.014)])
     assert [change.after.real for change in changes(P, size)] == pytest.approx([0.01 * size])
     assert len(changes(stepped(0.01, 0.014), size)) == 2  # by itself it is the greatest

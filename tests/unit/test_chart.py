@@ -32,7 +32,9 @@ def test_a_long_curve_keeps_its_spike():
 def test_equal_names_are_one_entry_of_the_legend():
     chart = Chart("t", ["P", "Q"])
     for panel in (0, 1):
-        chart.line("measured", np.arange(3), np.arange(3), BLUE, panel).shade(0, 1, BLUE, panel, "dip")
+        chart.line("measured", np.arange(3), np.arange(3), BLUE, panel).shade(
+            0, 1, BLUE, panel, "dip"
+        )
     shown = [trace["name"] for trace in chart.plain()["data"] if trace["showlegend"]]
     assert shown == ["measured", "dip"]
 
@@ -46,11 +48,21 @@ def test_panels_fill_the_height_without_overlap():
 
 
 def test_an_axis_takes_names_and_a_short_logarithmic_one_more_than_powers_of_ten():
-    layout = Chart("x", [""], log_x=True).ticks(0, [0, 1], ["a<", "b"]).limits(None, 2e-5, 9e-5).plain()["layout"]
+    layout = (
+        Chart("x", [""], log_x=True)
+        .ticks(0, [0, 1], ["a<", "b"])
+        .limits(None, 2e-5, 9e-5)
+        .plain()["layout"]
+    )
     assert (layout["yaxis"]["tickvals"], layout["yaxis"]["ticktext"]) == ([0, 1], ["a&lt;", "b"])
     assert "dtick" not in layout["xaxis"]
-    assert Chart("x", [""], log_x=True).limits(None, 1, 1e4).plain()["layout"]["xaxis"]["dtick"] == 1
-    assert Chart("", [""]).ticks(None, [0], ["a"], turned=True).plain()["layout"]["xaxis"]["tickangle"] == -90
+    assert (
+        Chart("x", [""], log_x=True).limits(None, 1, 1e4).plain()["layout"]["xaxis"]["dtick"] == 1
+    )
+    assert (
+        Chart("", [""]).ticks(None, [0], ["a"], turned=True).plain()["layout"]["xaxis"]["tickangle"]
+        == -90
+    )
 
 
 def test_a_curve_without_legend_is_named_where_it_is_pointed_at():

@@ -1,4 +1,6 @@
-"""CITATION.cff is what the Citation File Format 1.2.0 asks for, and says what the project says of itself."""
+"""CITATION.cff is what the Citation File Format 1.2.0 asks for, and says what the project says of
+itself.
+"""
 
 import re
 import tomllib
@@ -21,10 +23,28 @@ def test_it_has_what_the_format_requires(cited):
     assert isinstance(cited["title"], str)
     assert cited["type"] in ("software", "dataset")
     known = {
-        "abstract", "authors", "cff-version", "commit", "contact", "date-released", "doi", "identifiers", "keywords",
-        "license", "license-url", "message", "preferred-citation", "references", "repository", "repository-artifact",
-        "repository-code", "title", "type", "url", "version",
-    }  # fmt: skip
+        "abstract",
+        "authors",
+        "cff-version",
+        "commit",
+        "contact",
+        "date-released",
+        "doi",
+        "identifiers",
+        "keywords",
+        "license",
+        "license-url",
+        "message",
+        "preferred-citation",
+        "references",
+        "repository",
+        "repository-artifact",
+        "repository-code",
+        "title",
+        "type",
+        "url",
+        "version",
+    }
     assert cited.keys() <= known
     for people in (cited["authors"], *(reference["authors"] for reference in cited["references"])):
         assert people

@@ -23,7 +23,14 @@ def test_vargha_delaney_is_the_mann_whitney_statistic_per_pair():
 
 @pytest.mark.parametrize(
     ("effect", "size"),
-    [(0.5, "negligible"), (0.55, "negligible"), (0.56, "small"), (0.36, "medium"), (0.71, "large"), (0.0, "large")],
+    [
+        (0.5, "negligible"),
+        (0.55, "negligible"),
+        (0.56, "small"),
+        (0.36, "medium"),
+        (0.71, "large"),
+        (0.0, "large"),
+    ],
 )
 def test_effects_are_called_as_vargha_and_delaney_call_them(effect, size):
     assert st.size_of(effect) == size
@@ -73,7 +80,9 @@ def test_the_groups_are_those_of_demsars_diagram():
         ("+m+cf", "+m", "+cf"),
         ("+cf", "C4.5"),
     )
-    assert st.indifferent(names, ranks, st.critical_difference(4, 14, 0.05)) == (("+m+cf", "+m", "+cf", "C4.5"),)
+    assert st.indifferent(names, ranks, st.critical_difference(4, 14, 0.05)) == (
+        ("+m+cf", "+m", "+cf", "C4.5"),
+    )
     assert st.indifferent(names, (1.0, 5.0, 10.0, 20.0), 2.0) == ()
 
 
@@ -104,6 +113,8 @@ def test_the_bootstrap_interval_of_a_mean_is_about_two_standard_errors():
     values = RNG.normal(3.0, 2.0, size=200)
     low, high = st.bootstrap(values)
     error = values.std(ddof=1) / np.sqrt(200)
-    assert (low, high) == pytest.approx((values.mean() - 1.96 * error, values.mean() + 1.96 * error), abs=0.15 * error)
+    assert (low, high) == pytest.approx(
+        (values.mean() - 1.96 * error, values.mean() + 1.96 * error), abs=0.15 * error
+    )
     assert st.bootstrap(values) == (low, high)
     assert st.bootstrap(np.full(5, 2.0)) == (2.0, 2.0)

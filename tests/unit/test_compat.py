@@ -1,4 +1,6 @@
-"""Our uses of private parts of other packages: each is still needed, works, and is the only one of its kind."""
+"""Our uses of private parts of other packages: each is still needed, works, and is the only one of
+its kind.
+"""
 
 import ast
 import asyncio
@@ -41,7 +43,9 @@ def instantiated(target):
     from omegaconf import OmegaConf
 
     config = OmegaConf.create({"hydra": {"launcher": {"_target_": target}}})
-    return Plugins.instance().instantiate_launcher(hydra_context=None, task_function=None, config=config)
+    return Plugins.instance().instantiate_launcher(
+        hydra_context=None, task_function=None, config=config
+    )
 
 
 def test_hydra_makes_a_launcher_from_elsewhere_only_through_the_door(launcher):
@@ -54,7 +58,9 @@ def test_hydra_makes_a_launcher_from_elsewhere_only_through_the_door(launcher):
         instantiated(f"{launcher.__module__}.Made")
     except RuntimeError as error:
         refused = str(error)
-    assert "not the hydra_plugins package" in refused, MENDED.format("facebookresearch/hydra#3015", "hydra_plugins")
+    assert "not the hydra_plugins package" in refused, MENDED.format(
+        "facebookresearch/hydra#3015", "hydra_plugins"
+    )
     hydra_plugins.admit(launcher)
     try:
         made = instantiated(f"{hydra_plugins.NAMESPACE}.Made")
@@ -90,7 +96,9 @@ def test_what_the_store_hands_out_is_a_copy():
     handed.value = 2
     again = store.load("compat_test/made.yaml").node.value
     store.repo.pop("compat_test")
-    assert again == 1, CHANGED.format("hydra_config_store", "ConfigStore.load hands out the schema itself")
+    assert again == 1, CHANGED.format(
+        "hydra_config_store", "ConfigStore.load hands out the schema itself"
+    )
 
 
 def test_hydra_makes_every_schema_at_once_and_the_door_makes_one_when_it_is_read():
@@ -111,7 +119,9 @@ def test_hydra_makes_every_schema_at_once_and_the_door_makes_one_when_it_is_read
     store.store(group="compat_test", name="eager", node=Settings)
     hydra_config_store.store_later("compat_test", "later", schema)
     try:
-        eager, later = (vars(store.repo["compat_test"][f"{name}.yaml"]) for name in ("eager", "later"))
+        eager, later = (
+            vars(store.repo["compat_test"][f"{name}.yaml"]) for name in ("eager", "later")
+        )
         assert "node" in eager, MENDED.format("Hydra", "hydra_config_store")
         assert "node" not in later
         assert not made
@@ -145,7 +155,9 @@ def test_differential_evolution_goes_a_generation_at_a_time_as_the_public_functi
     stepwise, points = points, []
     seed = "rng" if "rng" in inspect.signature(differential_evolution).parameters else "seed"
     seeded = {seed: np.random.default_rng(2)}
-    made = differential_evolution(valley, bounds, updating="deferred", vectorized=True, **seeded, **settings)
+    made = differential_evolution(
+        valley, bounds, updating="deferred", vectorized=True, **seeded, **settings
+    )
     assert made.nit == count > 5
     assert np.array_equal(np.hstack(stepwise), np.hstack(points[: len(stepwise)]))
 
@@ -225,10 +237,16 @@ def reached(tree):
             if any(p == "externals" or (p.startswith("_") and not p.endswith("__")) for p in parts):
                 yield node.lineno, path
     for node in nodes:
-        if not isinstance(node, ast.Attribute) or not isinstance(node.value, ast.Name) or node.value.id not in foreign:
+        if (
+            not isinstance(node, ast.Attribute)
+            or not isinstance(node.value, ast.Name)
+            or node.value.id not in foreign
+        ):
             continue
         path = f"{foreign[node.value.id]}.{node.attr}"
-        if isinstance(node.ctx, ast.Store) or (node.attr.startswith("_") and not node.attr.endswith("__")):
+        if isinstance(node.ctx, ast.Store) or (
+            node.attr.startswith("_") and not node.attr.endswith("__")
+        ):
             yield node.lineno, path
 
 
@@ -238,8 +256,15 @@ def reached(tree):
         ("import os\nos._exit(1)", ["os._exit"]),
         ("from hydra._internal.utils import x", ["hydra._internal.utils.x"]),
         ("from joblib.externals.loky import x", ["joblib.externals.loky.x"]),
-        ("def f():\n    from hydra import Store\n    Store.__deepcopy__ = 1", ["hydra.Store.__deepcopy__"]),
-        ("from tractexp.sweep import _x\nfrom __future__ import annotations\nimport numpy as np\nnp.__version__", []),
+        (
+            "def f():\n    from hydra import Store\n    Store.__deepcopy__ = 1",
+            ["hydra.Store.__deepcopy__"],
+        ),
+        (
+            "from tractexp.sweep import _x\nfrom __future__ import annotations\nimport numpy as"
+            " np\nnp.__version__",
+            [],
+        ),
     ],
 )
 def test_private_parts_are_recognized(text, found):
@@ -250,5 +275,10 @@ def test_private_parts_of_others_are_used_in_compat_only():
     meant = {"os._exit"}  # documented, whatever its name
     folders = [HERE, HERE.parent / "plugins"]
     files = [p for folder in folders for p in folder.rglob("*.py") if p.parent != HERE / "compat"]
-    found = [f"{p}:{k}: {path}" for p in files for k, path in reached(ast.parse(p.read_text())) if path not in meant]
+    found = [
+        f"{p}:{k}: {path}"
+        for p in files
+        for k, path in reached(ast.parse(p.read_text()))
+        if path not in meant
+    ]
     assert not found, "give each a module in tractexp/compat:\n" + "\n".join(found)

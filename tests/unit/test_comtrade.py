@@ -1,4 +1,6 @@
-"""COMTRADE files read and written: nothing is lost, what is harmless is mended and noted, the rest is refused."""
+"""COMTRADE files read and written: nothing is lost, what is harmless is mended and noted, the rest
+is refused.
+"""
 
 import re
 from datetime import datetime
@@ -60,7 +62,17 @@ def same(a, b):
     assert len(a.channels) == len(b.channels)
     for x, y in zip(a.channels, b.channels, strict=True):
         np.testing.assert_array_equal(x.values(), y.values())
-        for key in ("name", "unit", "quantity", "phase", "circuit", "gain", "offset", "ratio", "skew"):
+        for key in (
+            "name",
+            "unit",
+            "quantity",
+            "phase",
+            "circuit",
+            "gain",
+            "offset",
+            "ratio",
+            "skew",
+        ):
             assert getattr(x, key) == getattr(y, key), key
     for x, y in zip(a.status, b.status, strict=True):
         np.testing.assert_array_equal(x.values(), y.values())
@@ -72,13 +84,22 @@ def same(a, b):
 
 def test_what_the_file_says_is_in_the_recording(pair):
     made = comtrade.load(pair())
-    assert (made.station, made.device, made.frequency, made.samples) == ("Substation", "device", 50.0, 40)
+    assert (made.station, made.device, made.frequency, made.samples) == (
+        "Substation",
+        "device",
+        50.0,
+        40,
+    )
     assert (made.start, made.trigger) == (datetime(2024, 2, 1, 10), 0.005)
     assert made.segments == [Segment(0, 40, 4000.0, 0.0)]
     voltage, current = made.channels[0], made.channels[3]
     assert (voltage.ratio, voltage.quantity, voltage.circuit) == (1100.0, "voltage", "Bus")
     assert voltage.values()[1] == pytest.approx(voltage.raw[1] * 0.01 * 1100)
-    assert (current.ratio, current.skew, current.limits) == (1.0, pytest.approx(12.5e-6), (-32767, 32767))
+    assert (current.ratio, current.skew, current.limits) == (
+        1.0,
+        pytest.approx(12.5e-6),
+        (-32767, 32767),
+    )
     assert current.values()[1] == pytest.approx((current.raw[1] * 0.02 + 0.5) / 1000)
     assert voltage.raw.dtype == np.int16
     assert made.status[0].values().sum() == 19
@@ -99,7 +120,9 @@ def test_round_trip_and_the_independent_reader(pair, tmp_path, kind, name):
     other = package.Comtrade(ignore_warnings=True, use_numpy_arrays=True, use_double_precision=True)
     other.load(*map(str, files))
     for k, channel in enumerate(made.channels):
-        np.testing.assert_allclose(other.analog[k] * channel.ratio * channel.factor, channel.values(), rtol=1e-12)
+        np.testing.assert_allclose(
+            other.analog[k] * channel.ratio * channel.factor, channel.values(), rtol=1e-12
+        )
     np.testing.assert_array_equal(other.status[0], made.status[0].values())
     np.testing.assert_allclose(other.time, made.segments[0].t, atol=1e-12)
 
@@ -108,7 +131,8 @@ def test_binary_samples_stay_views_of_the_file(pair, tmp_path):
     files = comtrade.write(comtrade.load(pair()), tmp_path / "b.cfg")
     made = comtrade.load(files[0])
     assert {c.raw.base is not None and c.raw.dtype == np.int16 for c in made.channels} == {True}
-    assert all(np.shares_memory(made.status[0].raw, s.raw) for s in made.status)  # two channels, one word
+    # two channels, one word
+    assert all(np.shares_memory(made.status[0].raw, s.raw) for s in made.status)
 
 
 def recordings(draw):
@@ -120,13 +144,21 @@ def recordings(draw):
     channels = []
     for k in range(draw(st.integers(1, 4))):
         if kind in ("f4", "f8"):
-            raw = np.array(draw(st.lists(st.floats(-1e9, 1e9, width=32), min_size=n, max_size=n)), kind)
+            raw = np.array(
+                draw(st.lists(st.floats(-1e9, 1e9, width=32), min_size=n, max_size=n)), kind
+            )
             raw[draw(st.integers(0, n - 1))] = draw(st.sampled_from([0.0, np.nan, 99999.0]))
         else:
             info = np.iinfo(kind)
-            raw = np.array(draw(st.lists(st.integers(info.min, info.max), min_size=n, max_size=n)), kind)
-        missing = draw(st.sampled_from([None, float(raw[0]), 99999.0])) if raw[0] == raw[0] else None
-        limits = (0.0, 65535.0) if kind == "u2" else draw(st.sampled_from([None, (-32767.0, 32767.0)]))
+            raw = np.array(
+                draw(st.lists(st.integers(info.min, info.max), min_size=n, max_size=n)), kind
+            )
+        missing = (
+            draw(st.sampled_from([None, float(raw[0]), 99999.0])) if raw[0] == raw[0] else None
+        )
+        limits = (
+            (0.0, 65535.0) if kind == "u2" else draw(st.sampled_from([None, (-32767.0, 32767.0)]))
+        )
         channels.append(
             Channel(
                 draw(word) or f"c{k}",
@@ -145,7 +177,9 @@ def recordings(draw):
         )
     states = [
         StatusChannel(
-            draw(word) or "s", np.array(draw(st.lists(st.integers(0, 1), min_size=n, max_size=n))), normal=k % 2
+            draw(word) or "s",
+            np.array(draw(st.lists(st.integers(0, 1), min_size=n, max_size=n))),
+            normal=k % 2,
         )
         for k in range(draw(st.integers(0, 20)))
     ]
@@ -153,12 +187,21 @@ def recordings(draw):
     cuts = [(0, n, 4000.0, 0.0)] if n < 4 else [(0, half, 4000.0, 0.0), (half, n, 50.0, 0.125)]
     start = draw(st.sampled_from([None, datetime(2024, 2, 29, 23, 59, 59, 999999)]))
     return Recording(
-        "made", channels, [Segment(*cut) for cut in cuts], draw(st.sampled_from([50.0, 60.0, 16.7])), draw(word),
-        draw(word), start, None if start is None else draw(st.sampled_from([None, 0.0, 0.0001])), states,
-    )  # fmt: skip
+        "made",
+        channels,
+        [Segment(*cut) for cut in cuts],
+        draw(st.sampled_from([50.0, 60.0, 16.7])),
+        draw(word),
+        draw(word),
+        start,
+        None if start is None else draw(st.sampled_from([None, 0.0, 0.0001])),
+        states,
+    )
 
 
-@settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 @given(data=st.data())
 def test_a_round_trip_loses_nothing(tmp_path, data):
     made = recordings(data.draw)
@@ -183,24 +226,51 @@ MENDED = {
     "blank line": ([("2,Ub", "\n2,Ub")], "line 4: a blank line is passed over"),
     "lower case and spaces": ([("8,6A,2D", " 8 , 6a , 2 d ")], None),
     "counts swapped": ([("8,6A,2D", "8,2D,6A")], None),
-    "padding": ([("\n1\n4000,40", "\n3\n4000,40\n4000,40\n4000,40")], "lines 14, 15: a sampling rate without samples"),
-    "count of rates": ([("\n1\n4000,40", "\n2\n4000,40")], "line 12: 2 sampling rates announced, 1 present"),
-    "no count of rates": ([("\n1\n4000,40", "\n4000,40")], "line 12: the number of sampling rates is missing"),
-    "no frequency": ([("\n50\n", "\n0\n")], "line 11: the nominal frequency is missing: 50 Hz, unless"),
-    "blank frequency": ([("\n50\n", "\n\n")], "line 12: the nominal frequency is missing: 50 Hz, unless"),
-    "frequency left out": ([("\n50\n", "\n")], "line 11: the nominal frequency is missing: 50 Hz, unless"),
+    "padding": (
+        [("\n1\n4000,40", "\n3\n4000,40\n4000,40\n4000,40")],
+        "lines 14, 15: a sampling rate without samples",
+    ),
+    "count of rates": (
+        [("\n1\n4000,40", "\n2\n4000,40")],
+        "line 12: 2 sampling rates announced, 1 present",
+    ),
+    "no count of rates": (
+        [("\n1\n4000,40", "\n4000,40")],
+        "line 12: the number of sampling rates is missing",
+    ),
+    "no frequency": (
+        [("\n50\n", "\n0\n")],
+        "line 11: the nominal frequency is missing: 50 Hz, unless",
+    ),
+    "blank frequency": (
+        [("\n50\n", "\n\n")],
+        "line 12: the nominal frequency is missing: 50 Hz, unless",
+    ),
+    "frequency left out": (
+        [("\n50\n", "\n")],
+        "line 11: the nominal frequency is missing: 50 Hz, unless",
+    ),
     "no such day": (
         [("01/02/2024,10:00:00.000000", "00/00/2024,10:00:00")],
         "line 14: .* is not a day of the calendar",
     ),
-    "no date": ([("01/02/2024,10:00:00.000000\n01/02/2024,10:00:00.005000\n", "")], "no date of the first sample"),
+    "no date": (
+        [("01/02/2024,10:00:00.000000\n01/02/2024,10:00:00.005000\n", "")],
+        "no date of the first sample",
+    ),
     "empty dates": (
         [("01/02/2024,10:00:00.000000\n01/02/2024,10:00:00.005000", ",\n,")],
         "lines 14, 15: ',' is not a date",
     ),
-    "year first": ([("01/02/2024", "2024/02/01")], "line 14: date '2024/02/01,10:00:00.000000' read as 2024-02-01"),
+    "year first": (
+        [("01/02/2024", "2024/02/01")],
+        "line 14: date '2024/02/01,10:00:00.000000' read as 2024-02-01",
+    ),
     "month first": ([("01/02/2024", "02/28/2024")], "line 14: date .* read as 2024-02-28"),
-    "clock not set": ([("01/02/2024", "01/01/1970"), ("01/02/2024", "01/01/1970")], "line 14: the clock was not set"),
+    "clock not set": (
+        [("01/02/2024", "01/01/1970"), ("01/02/2024", "01/01/1970")],
+        "line 14: the clock was not set",
+    ),
     "no multiplier": ([("ASCII\n1\n", "ASCII\n")], "no time multiplier, 1 taken"),
     "Ctrl-Z": ([("ASCII\n1\n", "ASCII\n1\n\x1a\x1a")], None),
     "kind in lower case": ([("ASCII", " ascii ")], None),
@@ -211,9 +281,18 @@ MENDED = {
     ),
     "no skew, no limits": ([("0.5,12.5,-32767,32767", "0.5,,,")], None),
     "Fortran's exponent": ([("kV,0.01,", "kV,1.0D-02,")], None),
-    "announced binary": ([("ASCII", "BINARY")], "BINARY announced, but a.dat is text and read as ASCII"),
-    "trigger elsewhere": ([("01/02/2024,10:00:00.005", "01/02/2025,10:00:00.005")], "the trigger, .* lies outside"),
-    "one sample too many announced": ([("4000,40", "4000,41")], "holds 40 of the 41 samples announced; those are read"),
+    "announced binary": (
+        [("ASCII", "BINARY")],
+        "BINARY announced, but a.dat is text and read as ASCII",
+    ),
+    "trigger elsewhere": (
+        [("01/02/2024,10:00:00.005", "01/02/2025,10:00:00.005")],
+        "the trigger, .* lies outside",
+    ),
+    "one sample too many announced": (
+        [("4000,40", "4000,41")],
+        "holds 40 of the 41 samples announced; those are read",
+    ),
 }
 
 
@@ -231,7 +310,10 @@ def test_harmless_departures_are_mended_and_noted(pair, case):
 
 
 REFUSED = {
-    "a field lost": ([("1,Ua,A,Bus", "1,Ua,Bus")], "line 3: analog channel 1 of 6 'Ua' has 12 fields, but an analog"),
+    "a field lost": (
+        [("1,Ua,A,Bus", "1,Ua,Bus")],
+        "line 3: analog channel 1 of 6 'Ua' has 12 fields, but an analog",
+    ),
     "a channel twice": (
         [("2,close", "2,close,A,Feeder,1\n2,close")],
         "line 11: '2,close,A,Feeder,1' where the nominal",
@@ -240,9 +322,18 @@ REFUSED = {
         [("\n50\n", "\n-1\n")],
         "line 11: nominal frequency '-1' is not a number between 10 and 100 Hz; write",
     ),
-    "offset": ([("A,0.02,0.5", "A,0.02,1e308")], "line 6: analog channel 4 of 6 'Ia': offset '1e308' is not a number"),
-    "multiplier": ([("kV,0.01", "kV,nan")], "line 3: analog channel 1 of 6 'Ua': multiplier 'nan' is not a number"),
-    "infinite": ([("kV,0.01", "kV,inf")], "multiplier 'inf' is not a number between -1e12 and 1e12; correct it"),
+    "offset": (
+        [("A,0.02,0.5", "A,0.02,1e308")],
+        "line 6: analog channel 4 of 6 'Ia': offset '1e308' is not a number",
+    ),
+    "multiplier": (
+        [("kV,0.01", "kV,nan")],
+        "line 3: analog channel 1 of 6 'Ua': multiplier 'nan' is not a number",
+    ),
+    "infinite": (
+        [("kV,0.01", "kV,inf")],
+        "multiplier 'inf' is not a number between -1e12 and 1e12; correct it",
+    ),
     "no multiplier": ([("kV,0.01", "kV,")], "multiplier '' is not a number"),
     "ratio": (
         [("110,0.1,S", "110,0,S")],
@@ -253,17 +344,32 @@ REFUSED = {
         "line 2: announces 2000000006 channels, but only 15 lines",
     ),
     "no analog": ([("8,6A,2D", "2,0A,2D")], "line 2: announces no analog channel"),
-    "nonsense": ([("8,6A,2D", "8;6A;2D")], "line 2: '8;6A;2D' is not the numbers of channels, as in 8,6A,2D"),
-    "samples": ([("4000,40", "4000,4000000000")], "cut short: 4000000000 samples of 6 analog and 2 status channels"),
+    "nonsense": (
+        [("8,6A,2D", "8;6A;2D")],
+        "line 2: '8;6A;2D' is not the numbers of channels, as in 8,6A,2D",
+    ),
+    "samples": (
+        [("4000,40", "4000,4000000000")],
+        "cut short: 4000000000 samples of 6 analog and 2 status channels",
+    ),
     "endless": ([("4000,40", "4000,9e99")], "line 13: '4000,9e99' is not a sampling rate"),
-    "rate": ([("4000,40", "x,40")], "line 13: 'x,40' is not a sampling rate .Hz. and its last sample, as in 4000,8000"),
-    "mixed rates": ([("\n1\n4000,40", "\n2\n0,20\n4000,40")], "line 13: sampling rates 0, 4000 Hz: a rate of 0 means"),
+    "rate": (
+        [("4000,40", "x,40")],
+        "line 13: 'x,40' is not a sampling rate .Hz. and its last sample, as in 4000,8000",
+    ),
+    "mixed rates": (
+        [("\n1\n4000,40", "\n2\n0,20\n4000,40")],
+        "line 13: sampling rates 0, 4000 Hz: a rate of 0 means",
+    ),
     "falling": (
         [("\n1\n4000,40", "\n2\n4000,30\n4000,20")],
         "line 14: last sample 20 must be above zero, and above 30",
     ),
     "kind": ([("ASCII", "ASC")], "line 16: data file type 'ASC' is not one of ASCII, BINARY"),
-    "cut": ([("1,trip", "trip"), ("ASCII\n1\n", "")], "ends after line 15, before the type of the data file"),
+    "cut": (
+        [("1,trip", "trip"), ("ASCII\n1\n", "")],
+        "ends after line 15, before the type of the data file",
+    ),
     "deleted channel": (
         [("6,Ic,C,Feeder,A,0.02,0.5,12.5,-32767,32767,600,5,P\n", "")],
         "line 8: analog channel 6 of 6",
@@ -317,7 +423,9 @@ def test_bytes_lost_within_binary_data_are_found(pair, tmp_path):
     cfg, dat = comtrade.write(comtrade.load(pair()), tmp_path / "b.cfg")
     content = dat.read_bytes()
     dat.write_bytes(content[:101] + content[102:] + b"\0")
-    with pytest.raises(UserError, match=r"b.dat: sample \d+: its number is \d+ after \d+: the rows are not BINARY"):
+    with pytest.raises(
+        UserError, match=r"b.dat: sample \d+: its number is \d+ after \d+: the rows are not BINARY"
+    ):
         comtrade.load(cfg)
 
 
@@ -328,7 +436,9 @@ def test_sampling_that_follows_the_frequency_becomes_one_even_waveform(pair):
     steps = np.repeat(1 / rates, n // 20)[1:]
     t = np.concatenate([[0], np.cumsum(steps)])
     wave = np.round(30000 * np.sin(2 * np.pi * f * t)).astype(int)
-    told = "\n20\n" + "\n".join(f"{rate!r},{(k + 1) * n // 20}" for k, rate in enumerate(rates.tolist()))
+    told = "\n20\n" + "\n".join(
+        f"{rate!r},{(k + 1) * n // 20}" for k, rate in enumerate(rates.tolist())
+    )
     cells = np.column_stack([np.arange(n) + 1, 0 * wave, *[wave] * 6, 0 * wave, 0 * wave])
     dat = "".join(",".join(map(str, row)) + "\n" for row in cells)
     made = comtrade.load(pair(("\n1\n4000,40", told), dat=dat))
@@ -340,7 +450,10 @@ def test_sampling_that_follows_the_frequency_becomes_one_even_waveform(pair):
 
 def test_rates_that_the_time_stamps_contradict_are_said(pair):
     made = comtrade.load(pair(("4000,40", "2000,40")))
-    assert any("take 0.0195 s at 2000 Hz, but 0.00975 s by their time stamps" in note for note in made.notes)
+    assert any(
+        "take 0.0195 s at 2000 Hz, but 0.00975 s by their time stamps" in note
+        for note in made.notes
+    )
 
 
 def test_the_standard_of_1991(pair):
@@ -348,7 +461,11 @@ def test_the_standard_of_1991(pair):
     cfg += "02/29/92,1:2:3.5\n02/29/92,1:2:3.505\nASCII\n"
     dat = "".join(f"{k + 1},{250 * k},{k},0\r\n" for k in range(40))
     made = comtrade.load(pair(cfg=cfg, dat=dat))
-    assert (made.start, made.channels[0].ratio, made.notes) == (datetime(1992, 2, 29, 1, 2, 3, 500000), 1.0, ())
+    assert (made.start, made.channels[0].ratio, made.notes) == (
+        datetime(1992, 2, 29, 1, 2, 3, 500000),
+        1.0,
+        (),
+    )
 
 
 @pytest.mark.parametrize(
@@ -383,11 +500,16 @@ def test_either_file_of_the_pair_names_the_record(pair, tmp_path):
 
 def test_a_combined_file_without_a_section(tmp_path):
     (tmp_path / "a.cff").write_text("--- file type: CFG ---\n" + CFG)
-    with pytest.raises(UserError, match=r"no section DAT: a \.cff has headings like '--- file type: DAT ---'"):
+    with pytest.raises(
+        UserError, match=r"no section DAT: a \.cff has headings like '--- file type: DAT ---'"
+    ):
         comtrade.load(tmp_path / "a.cff")
     wrong = CFG.replace("\n50\n", "\nx\n")
-    (tmp_path / "a.cff").write_text("--- file type: CFG ---\n" + wrong + "--- file type: DAT ASCII ---\n" + rows())
-    with pytest.raises(UserError, match=r"a\.cff: line 12: nominal frequency 'x'"):  # of the file, not of the section
+    (tmp_path / "a.cff").write_text(
+        "--- file type: CFG ---\n" + wrong + "--- file type: DAT ASCII ---\n" + rows()
+    )
+    # of the file, not of the section
+    with pytest.raises(UserError, match=r"a\.cff: line 12: nominal frequency 'x'"):
         comtrade.load(tmp_path / "a.cff")
 
 
@@ -402,13 +524,17 @@ def test_a_combined_file_without_a_section(tmp_path):
 )
 def test_headings_of_a_combined_file_in_other_spellings(tmp_path, cfg, dat):
     wanted = f"{tmp_path / 'a.cff'}"
-    (tmp_path / "a.cff").write_text(f"--- file type: CFG ---\n{CFG}--- file type: DAT ASCII ---\n{rows()}")
+    (tmp_path / "a.cff").write_text(
+        f"--- file type: CFG ---\n{CFG}--- file type: DAT ASCII ---\n{rows()}"
+    )
     usual = [c.values() for c in comtrade.load(wanted).channels]
     (tmp_path / "a.cff").write_text(f"{cfg}\n{CFG}{dat}\n{rows()}")
     np.testing.assert_array_equal([c.values() for c in comtrade.load(wanted).channels], usual)
 
 
-@pytest.mark.parametrize("heading", ["file type DAT BINARY {}", "file type: DAT BINARY {}", "file type DAT BINARY: {}"])
+@pytest.mark.parametrize(
+    "heading", ["file type DAT BINARY {}", "file type: DAT BINARY {}", "file type DAT BINARY: {}"]
+)
 def test_the_length_of_binary_data_is_found_without_colons(pair, tmp_path, heading):
     made = comtrade.load(pair())
     comtrade.write(made, tmp_path / "a.cff", "BINARY")
@@ -420,7 +546,9 @@ def test_the_length_of_binary_data_is_found_without_colons(pair, tmp_path, headi
     (tmp_path / "b.cff").write_bytes(changed)
     again = comtrade.load(tmp_path / "b.cff")
     whole = comtrade.load(tmp_path / "a.cff")
-    np.testing.assert_array_equal([c.values() for c in again.channels], [c.values() for c in whole.channels])
+    np.testing.assert_array_equal(
+        [c.values() for c in again.channels], [c.values() for c in whole.channels]
+    )
 
 
 def test_what_cannot_be_written_is_refused(pair, tmp_path):
@@ -443,12 +571,16 @@ def test_foreign_files_are_named():
     assert "give the .cfg beside it" in foreign.sentence("x.hdr")
     assert foreign.sentence("x.cfg") == ""
     records = [
-        name for name in ("a.PL4", "b.psout", "c.rec", "d.hdr", "e.zip", "f.pdf", "g.cfg") if foreign.is_record(name)
+        name
+        for name in ("a.PL4", "b.psout", "c.rec", "d.hdr", "e.zip", "f.pdf", "g.cfg")
+        if foreign.is_record(name)
     ]
     assert records == ["a.PL4", "b.psout", "c.rec"]
 
 
-@pytest.mark.parametrize(("unit", "kilo"), [("V", 1e-3), ("kV", 1.0), ("KV", 1.0), ("mV", 1e-6), ("MV", 1e3)])
+@pytest.mark.parametrize(
+    ("unit", "kilo"), [("V", 1e-3), ("kV", 1.0), ("KV", 1.0), ("mV", 1e-6), ("MV", 1e3)]
+)
 def test_a_unit_is_what_its_letters_say_milli_and_mega_apart(unit, kilo):
     channel = Channel("U", np.array([2, -3], np.int16), unit, "voltage")
     np.testing.assert_allclose(channel.values(), [2 * kilo, -3 * kilo])

@@ -1,4 +1,6 @@
-"""Connections: what ideal transformers and theorems say of them, and the way from channels to a record."""
+"""Connections: what ideal transformers and theorems say of them, and the way from channels to a
+record.
+"""
 
 import itertools
 
@@ -19,7 +21,10 @@ PAIRS = ["ab", "bc", "ca", "ba", "cb", "ac"]
 
 
 def arms(name, ratio=1.0, **settings):
-    return [chosen("connection", {"name": name, "arm": arm, "ratio": ratio, **settings}) for arm in ("alpha", "beta")]
+    return [
+        chosen("connection", {"name": name, "arm": arm, "ratio": ratio, **settings})
+        for arm in ("alpha", "beta")
+    ]
 
 
 def every():
@@ -77,7 +82,9 @@ def test_an_arm_has_the_line_voltage_over_the_ratio(both):
 
 @pytest.mark.parametrize("name", TRANSFORMERS)
 def test_what_equal_arms_do_to_the_balance(name):
-    """A quarter cycle apart they draw no negative sequence; on two pairs of phases half of the positive one."""
+    """A quarter cycle apart they draw no negative sequence; on two pairs of phases half of the
+    positive one.
+    """
     both = arms(name, 4.0)
     U = np.array([(arm.voltage() @ BALANCED)[0] for arm in both])
     I = primary(both, U * (0.8 - 0.6j))
@@ -89,7 +96,9 @@ def test_what_equal_arms_do_to_the_balance(name):
 
 @EVERY
 def test_one_arm_alone_is_a_load_between_phases(both):
-    """A single-phase load: its negative sequence is as great as the positive, whatever the transformer."""
+    """A single-phase load: its negative sequence is as great as the positive, whatever the
+    transformer.
+    """
     positive, negative = np.abs(sequences(primary(both, np.array([1.0, 0.0]))[:, None]))[:, 0]
     assert negative == pytest.approx(positive)
 
@@ -103,7 +112,9 @@ def test_the_v_v_arm_currents_are_those_of_the_outer_phases():
 
 
 def test_the_scott_teaser_has_the_third_phase():
-    """U_T = (V_a - (V_b + V_c) / 2) / (sqrt(3)/2), and its current is sqrt(3)/2 of the primary's."""
+    """U_T = (V_a - (V_b + V_c) / 2) / (sqrt(3)/2), and its current is sqrt(3)/2 of
+    the primary's.
+    """
     V, I = no_zero_sequence(4), no_zero_sequence(5)
     main, teaser = arms("scott")
     assert (main.voltage() @ V)[0] == pytest.approx(V[1] - V[2])
@@ -127,7 +138,9 @@ def test_line_voltages_give_the_phase_voltages_but_for_a_zero_sequence(zero):
     assert chosen("connection", "line_voltages").voltage() @ lines == pytest.approx(V)
     assert chosen("connection", "two_line_voltages").voltage() @ lines[:2] == pytest.approx(V)
     turned = {"name": "two_line_voltages", "pairs": ["cb", "ca"]}
-    assert chosen("connection", turned).voltage() @ np.array([-lines[1], lines[2]]) == pytest.approx(V)
+    assert chosen("connection", turned).voltage() @ np.array(
+        [-lines[1], lines[2]]
+    ) == pytest.approx(V)
 
 
 @pytest.mark.parametrize("phases", PAIRS)
@@ -142,7 +155,9 @@ def test_two_current_transformers_give_all_currents_of_a_load_without_neutral(na
 def test_two_wattmeters_read_the_power():
     """Blondel: V_ab I_a* + V_cb I_c* is the power of a three-wire load, whatever its symmetry."""
     V, I = no_zero_sequence(9), no_zero_sequence(10)
-    made = chosen("connection", {"name": "two_line_voltages", "pairs": ["ab", "cb"], "phases": "ac"})
+    made = chosen(
+        "connection", {"name": "two_line_voltages", "pairs": ["ab", "cb"], "phases": "ac"}
+    )
     lines = np.array([V[0] - V[1], V[2] - V[1]])
     phases = made.voltage() @ lines, made.current() @ I[[0, 2]]
     assert phases[0] @ phases[1].conj() == pytest.approx(lines @ I[[0, 2]].conj())
@@ -187,7 +202,12 @@ class Reader(WaveformReader):
 def recording(channels, skew=()):
     """Waves {name: (N,)} in kV and kA, by the first letter of the name."""
     made = [
-        Channel(name, wave, *(("kV", "voltage") if name[0] == "U" else ("kA", "current")), skew=dict(skew).get(name, 0))
+        Channel(
+            name,
+            wave,
+            *(("kV", "voltage") if name[0] == "U" else ("kA", "current")),
+            skew=dict(skew).get(name, 0),
+        )
         for name, wave in channels.items()
     ]
     return Recording("memory", made, [Segment(0, len(made[0].raw), RATE, 0.0)])
@@ -200,23 +220,33 @@ def waves(phasors, t):
 
 
 def test_an_arm_behind_a_v_v_transformer_from_channels_to_a_record(monkeypatch):
-    """110 kV, 27.5 kV arms of 12 + j5 and 3 + j1 MVA: the record of the first is that of its own."""
+    """110 kV, 27.5 kV arms of 12 + j5 and 3 + j1 MVA: the record of the first is
+    that of its own.
+    """
     t = np.arange(round(1.5 * RATE)) / RATE
     both = arms("v_v", 4.0)
     V = 110 / np.sqrt(3) * BALANCED
     U = np.array([(arm.voltage() @ V)[0] for arm in both])
     I = (np.array([12 + 5j, 3 + 1j]) / U).conj()
     seen = [*waves(V, t), *waves(primary(both, I), t)]
-    monkeypatch.setattr(Reader, "made", recording(dict(zip(("Ua", "Ub", "Uc", "Ia", "Ib", "Ic"), seen, strict=True))))
+    monkeypatch.setattr(
+        Reader,
+        "made",
+        recording(dict(zip(("Ua", "Ub", "Uc", "Ia", "Ib", "Ic"), seen, strict=True))),
+    )
     arm = {"name": "v_v", "arm": "alpha", "ratio": 4.0}
-    reader = Reader(path="x.cfg", voltages=["Ua", "Ub", "Uc"], currents=["Ia", "Ib", "Ic"], connection=arm)
+    reader = Reader(
+        path="x.cfg", voltages=["Ua", "Ub", "Uc"], currents=["Ia", "Ib", "Ic"], connection=arm
+    )
     [record] = reader.read().train
     assert record.base.voltage == pytest.approx(27.5, rel=1e-4)
     assert record.base.power == pytest.approx(13.0, rel=1e-4)
     assert (record.P[0], record.Q[0]) == pytest.approx((12 / 13, 5 / 13), rel=1e-4)
     assert record.U2 is None
     assert any("arm alpha of an ideal v_v transformer" in note for note in record.notes)
-    assert any("equivalents, whose parameters are those of no machine" in note for note in record.notes)
+    assert any(
+        "equivalents, whose parameters are those of no machine" in note for note in record.notes
+    )
 
 
 def test_one_voltage_and_one_current_make_a_record(monkeypatch):
@@ -239,7 +269,13 @@ def test_one_voltage_and_one_current_make_a_record(monkeypatch):
 def test_skew_is_corrected_by_channel_and_refused_where_a_phase_is_made_of_several():
     t = np.arange(4000) / RATE
     turned = np.exp(2j * np.pi * 50 * 3e-4)  # sampled 0.3 ms late
-    names = dict(zip(("Ua", "Ub", "Uc", "Ia", "Ib", "Ic"), waves([*BALANCED, *(BALANCED * turned)], t), strict=True))
+    names = dict(
+        zip(
+            ("Ua", "Ub", "Uc", "Ia", "Ib", "Ic"),
+            waves([*BALANCED, *(BALANCED * turned)], t),
+            strict=True,
+        )
+    )
     made = recording(names, skew={name: 3e-4 for name in ("Ia", "Ib", "Ic")})
     feeder = Feeder((0, 1, 2), (3, 4, 5), "three_phase")
     S = phasors_of(made, feeder, made.segments[0], skew=True).S

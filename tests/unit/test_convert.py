@@ -1,4 +1,6 @@
-"""Conversion: what is written and read again is the same, to the last bit or to what the format can hold."""
+"""Conversion: what is written and read again is the same, to the last bit or to what the format can
+hold.
+"""
 
 import json
 from datetime import datetime
@@ -12,36 +14,68 @@ import tractexp
 from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.filetypes.sidecar import read_sidecar
-from tractexp.filetypes.tidy import recording_of, restore_recording, unique, write_record, write_recording
+from tractexp.filetypes.tidy import (
+    recording_of,
+    restore_recording,
+    unique,
+    write_record,
+    write_recording,
+)
 from tractexp.plugin import build
 from tractexp.record import Base, Record
 from tractexp.record.window import Window
 from tractexp.recording import Channel, Recording, Segment, StatusChannel
 
 TABLES = [".csv", ".parquet"]
-NAMES = st.text(st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=12)
+NAMES = st.text(
+    st.characters(codec="utf-8", exclude_categories=("C", "Z")), min_size=1, max_size=12
+)
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 
 
 def a_recording(**changed):
-    """Two segments, integers of two sizes and numbers, status channels, everything a format may tell."""
+    """Two segments, integers of two sizes and numbers, status channels, everything a format may
+    tell.
+    """
     rng = np.random.default_rng(5)
     n = 2400
     wave = np.sin(2 * np.pi * 50 * np.arange(n) / 1200)
     channels = [
-        Channel("UA", (20000 * wave).astype("<i2"), "V", "voltage", "A", "bus 1", 0.0125, 0.3, 1100.0,
-                2e-6, (-32767, 32767), -32768),
-        Channel("IA, feeder", (2e9 * wave).astype("<i4"), "A", "current", "A", gain=1e-7, ratio=300.0),
+        Channel(
+            "UA",
+            (20000 * wave).astype("<i2"),
+            "V",
+            "voltage",
+            "A",
+            "bus 1",
+            0.0125,
+            0.3,
+            1100.0,
+            2e-6,
+            (-32767, 32767),
+            -32768,
+        ),
+        Channel(
+            "IA, feeder", (2e9 * wave).astype("<i4"), "A", "current", "A", gain=1e-7, ratio=300.0
+        ),
         Channel("IA, feeder", rng.normal(size=n), "kA", "current", "B"),
         Channel("电压", rng.normal(size=n).astype("<f4"), "kV", "voltage", "C"),
-    ]  # fmt: skip
+    ]
     status = [
         StatusChannel("trip", (wave > 0).astype(np.uint8), "A", "line", 1),
         StatusChannel("cb", np.arange(n) % 8, bit=2),
     ]
     segments = [Segment(0, 1000, 1200.0, 0.0), Segment(1000, n, 1200.0, 0.9)]
-    known = {"station": "North", "device": "7", "start": datetime(2024, 3, 31, 1, 2, 3, 456789), "trigger": 0.25}
-    known |= {"notes": ["line 3 mended"], "extra": {"format": "X", "stamps": np.arange(5, dtype="<u4")}}
+    known = {
+        "station": "North",
+        "device": "7",
+        "start": datetime(2024, 3, 31, 1, 2, 3, 456789),
+        "trigger": 0.25,
+    }
+    known |= {
+        "notes": ["line 3 mended"],
+        "extra": {"format": "X", "stamps": np.arange(5, dtype="<u4")},
+    }
     return Recording("rec.x", channels, segments, 50.0, status=status, **(known | changed))
 
 
@@ -65,7 +99,7 @@ def same_recording(a, b):
             "missing",
             "form",
         )
-        assert [getattr(x, f) for f in fields] == [getattr(y, f) for f in fields]  # fmt: skip
+        assert [getattr(x, f) for f in fields] == [getattr(y, f) for f in fields]
     for x, y in zip(a.status, b.status, strict=True):
         np.testing.assert_array_equal(x.values(), y.values())
         assert (x.name, x.phase, x.circuit, x.normal) == (y.name, y.phase, y.circuit, y.normal)
@@ -77,7 +111,11 @@ def a_record(n=200, name="there_dip2", **changed):
     rng = np.random.default_rng(7)
     t = 3.3 + np.arange(n) / 300
     U = np.where((t > 3.5) & (t < 3.7), 0.7, 1.0) + 1e-3 * rng.normal(size=n)
-    known = {"f": 50 + rng.normal(size=n), "U2": 0.01 * rng.random(n), "base": Base(27.5, 19.3, 50.0)}
+    known = {
+        "f": 50 + rng.normal(size=n),
+        "U2": 0.01 * rng.random(n),
+        "base": Base(27.5, 19.3, 50.0),
+    }
     known |= {"notes": ("one", "two, three"), "source": "there.cfg dip 2"}
     return Record(name, t, U, rng.random(n), rng.random(n), **(known | changed))
 
@@ -100,7 +138,9 @@ def again(path):
 class TestTables:
     def test_a_record_is_the_same_again(self, tmp_path, ending):
         window = Window("p_class", np.linspace(-0.01, 0.01, 9), np.hanning(9) / np.hanning(9).sum())
-        record = a_record(window=window, more={"P_3": np.random.default_rng(1).random(200), "THD_u": np.ones(200)})
+        record = a_record(
+            window=window, more={"P_3": np.random.default_rng(1).random(200), "THD_u": np.ones(200)}
+        )
         table, sidecar = write_record(record, tmp_path / f"x{ending}")
         made = again(table)
         same_record(record, made)
@@ -127,18 +167,25 @@ class TestTables:
         channels = [
             Channel(
                 data.draw(NAMES),
-                np.array(data.draw(st.lists(st.integers(-32768, 32767), min_size=n, max_size=n)), dtype="<i2"),
-                gain=data.draw(st.floats(1e-9, 1e3)), offset=data.draw(st.floats(-1e3, 1e3)),
+                np.array(
+                    data.draw(st.lists(st.integers(-32768, 32767), min_size=n, max_size=n)),
+                    dtype="<i2",
+                ),
+                gain=data.draw(st.floats(1e-9, 1e3)),
+                offset=data.draw(st.floats(-1e3, 1e3)),
                 missing=data.draw(st.sampled_from([None, -32768])),
             )
             for _ in range(data.draw(st.integers(1, 4)))
-        ]  # fmt: skip
-        channels.append(Channel("x", np.array(data.draw(st.lists(st.floats(), min_size=n, max_size=n)))))
+        ]
+        channels.append(
+            Channel("x", np.array(data.draw(st.lists(st.floats(), min_size=n, max_size=n))))
+        )
         recording = Recording("x", channels, [Segment(0, n, 1000.0, 0.0)])
         table, _ = write_recording(recording, tmp_path_factory.mktemp("any") / f"rec{ending}")
         made = restore_recording(str(table), read_sidecar(str(table)).recording)
         for x, y in zip(recording.channels, made.channels, strict=True):
-            if abs(x.offset) < 1e3 * x.gain * 32768:  # else the offset swallows the digits of a step
+            # else the offset swallows the digits of a step
+            if abs(x.offset) < 1e3 * x.gain * 32768:
                 np.testing.assert_array_equal(x.values(), y.values())
 
 
@@ -147,7 +194,9 @@ def test_a_sidecar_of_another_table_is_refused(tmp_path):
     told = json.loads(sidecar.read_text())
     told["recording"]["channels"].pop()
     sidecar.write_text(json.dumps(told))
-    with pytest.raises(UserError, match=r"has 7 columns where its sidecar names t, 3 channels and 2 status"):
+    with pytest.raises(
+        UserError, match=r"has 7 columns where its sidecar names t, 3 channels and 2 status"
+    ):
         build("data", {"name": "waveforms", "path": str(table)}).recording()
     sidecar.write_text(json.dumps({"recording": {"channels": 3}}))
     with pytest.raises(UserError, match="its sidecar is not as task=convert writes it"):
@@ -171,9 +220,18 @@ class TestCOMTRADE:
                 quantity = {"V": "voltage", "A": "current"}[unit]
                 name = f"{'U' if unit == 'V' else 'I'}{phase}"
                 channels.append(
-                    Channel(name, np.rint(30000 * wave).astype("<i2"), unit, quantity, phase, gain=size / 30000)
+                    Channel(
+                        name,
+                        np.rint(30000 * wave).astype("<i2"),
+                        unit,
+                        quantity,
+                        phase,
+                        gain=size / 30000,
+                    )
                 )
-        made = Recording("made", channels, [Segment(0, 8000, 4000.0, 0.0)], start=datetime(2024, 1, 1))
+        made = Recording(
+            "made", channels, [Segment(0, 8000, 4000.0, 0.0)], start=datetime(2024, 1, 1)
+        )
         return comtrade.write(made, tmp_path / "station.cfg")[0]
 
     def test_to_a_table_and_back_gives_the_same_integers(self, station, tmp_path):
@@ -199,19 +257,31 @@ class TestCOMTRADE:
             same_record(events[0].record, tractexp.read(made.files[0])[0].record)
 
     def test_events_as_comtrade_are_the_waveforms_about_each_dip(self, station, tmp_path):
-        made = tractexp.convert(station, to="comtrade", what="events", folder=tmp_path / "cut", pre=0.3, post=0.5)
+        made = tractexp.convert(
+            station, to="comtrade", what="events", folder=tmp_path / "cut", pre=0.3, post=0.5
+        )
         part, whole = comtrade.load(made.files[0]), comtrade.load(station)
         first = round(part.start.microsecond * 1e-6 * 4000)
-        np.testing.assert_array_equal(part.channels[4].raw, whole.channels[4].raw[first : first + part.samples])
+        np.testing.assert_array_equal(
+            part.channels[4].raw, whole.channels[4].raw[first : first + part.samples]
+        )
         assert 0.99 < part.samples / 4000 < 1.01  # 0.8 s, and 0.1 s on either side
-        assert tractexp.read(made.files[0])[0].depth == pytest.approx(tractexp.read(station)[0].depth, abs=1e-6)
+        assert tractexp.read(made.files[0])[0].depth == pytest.approx(
+            tractexp.read(station)[0].depth, abs=1e-6
+        )
         assert any("cut from" in note for note in part.notes) or part.samples < whole.samples
 
     def test_a_record_becomes_magnitudes_in_kilovolt_and_megawatt(self, tmp_path):
         record = a_record()
         path = tractexp.convert(record, to="comtrade", folder=tmp_path).files[0]
         made = {c.name: c for c in comtrade.load(path).channels}
-        assert {name: c.unit for name, c in made.items()} == {"U": "kV", "P": "MW", "Q": "Mvar", "f": "Hz", "U2": "kV"}
+        assert {name: c.unit for name, c in made.items()} == {
+            "U": "kV",
+            "P": "MW",
+            "Q": "Mvar",
+            "f": "Hz",
+            "U2": "kV",
+        }
         for channel in recording_of(record).channels:
             np.testing.assert_array_equal(made[channel.name].raw, channel.raw)
 
@@ -221,7 +291,8 @@ class TestCOMTRADE:
             ((station, "xls"), "there is no writer 'xls'. Available: cff, comtrade, csv, parquet"),
             (
                 (station, "comtrade"),
-                "station.(cfg|dat) belongs to .*station.cfg, which is converted; give another folder",
+                "station.(cfg|dat) belongs to .*station.cfg, which is converted; give another"
+                " folder",
             ),
             ((table, "parquet"), "dip.json belongs to .*dip.csv, which is converted"),
             ((tmp_path / "none.cfg", "csv"), "none.cfg: there is no such file"),

@@ -1,4 +1,6 @@
-"""Independent items on all cores: forked processes that know all of this one, and tell what they spent."""
+"""Independent items on all cores: forked processes that know all of this one, and tell what they
+spent.
+"""
 
 import multiprocessing
 import os
@@ -20,7 +22,9 @@ forked = pytest.mark.skipif(not cores.FORKS, reason="processes are forked on Lin
 
 
 @pytest.mark.parametrize("number", [1, 3])
-def test_items_are_counted_as_they_end_and_what_they_spend_is_told_part_by_part(number, monkeypatch):
+def test_items_are_counted_as_they_end_and_what_they_spend_is_told_part_by_part(
+    number, monkeypatch
+):
     monkeypatch.setattr(cores, "cores", lambda: number)
     effort, told = Effort(), []
     part, parts = effort.anew(), effort.parts
@@ -48,7 +52,9 @@ def test_items_are_counted_as_they_end_and_what_they_spend_is_told_part_by_part(
 @forked
 def test_an_item_that_has_items_does_them_one_after_the_other(monkeypatch):
     monkeypatch.setattr(joblib, "cpu_count", lambda: 2)
-    pids = each_apart(lambda k: each_apart(lambda _: os.getpid(), [1, 2], Effort()), [1, 2], Effort())
+    pids = each_apart(
+        lambda k: each_apart(lambda _: os.getpid(), [1, 2], Effort()), [1, 2], Effort()
+    )
     assert all(len({*inner}) == 1 for inner in pids)
     assert os.getpid() not in {pid for inner in pids for pid in inner}
 
@@ -65,7 +71,8 @@ def test_an_interrupted_step_waits_for_nobody(monkeypatch):
         yield ended
 
     effort = Effort()
-    others = multiprocessing.active_children()  # an earlier test of a sweep may have left workers that idle
+    # an earlier test of a sweep may have left workers that idle
+    others = multiprocessing.active_children()
     monkeypatch.setattr(cores, "cores", lambda: 2)
     monkeypatch.setattr(effort, "parts", interrupted)
     with pytest.raises(KeyboardInterrupt):
@@ -96,6 +103,8 @@ def test_an_error_of_an_item_is_its_own_and_a_killed_process_is_a_sentence(monke
 
     with pytest.raises(UserError, match="item 1 is not allowed; leave it out"):
         each_apart(refuse, [1, 2], Effort())
-    with pytest.raises(UserError, match="killed, as systems do where memory is short; close other programs"):
+    with pytest.raises(
+        UserError, match="killed, as systems do where memory is short; close other programs"
+    ):
         each_apart(lambda k: os.kill(os.getpid(), signal.SIGKILL), [1, 2], Effort())
     assert each_apart(lambda k: k + 1, [1, 2], Effort()) == [2, 3]

@@ -1,4 +1,6 @@
-"""The documentation holds together: links lead somewhere, every plugin that a person chooses is described."""
+"""The documentation holds together: links lead somewhere, every plugin that a person chooses is
+described.
+"""
 
 import re
 from pathlib import Path
@@ -14,7 +16,8 @@ PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").g
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_every_link_leads_somewhere(page):
     for target in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", page.read_text(encoding="utf-8")):
-        if "://" not in target and not target.startswith("generated/"):  # those the site makes and checks
+        # those the site makes and checks
+        if "://" not in target and not target.startswith("generated/"):
             assert (page.parent / target).exists(), target
 
 
@@ -22,10 +25,14 @@ def test_every_optimizer_effect_and_part_is_described():
     text = "\n".join(page.read_text(encoding="utf-8") for page in PAGES)
     for group in ("optimizer", "effect", "model/motor", "model/static", "format", "data"):
         for name, cls in discover().get(group, {}).items():
-            if cls.__module__.startswith(("tractexp.", "tractexp_plugins.")):  # not what another test registered
+            # not what another test registered
+            if cls.__module__.startswith(("tractexp.", "tractexp_plugins.")):
                 assert f"`{name}`" in text or f"{group}={name}" in text, f"{group} {name}"
 
 
 def test_the_pages_are_read_in_an_afternoon():
     """At most 30,000 words, the bars of tables counted: a fact that comes in pushes one out."""
-    assert sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").glob("*.md")) <= 30_000
+    assert (
+        sum(len(page.read_text(encoding="utf-8").split()) for page in (ROOT / "docs").glob("*.md"))
+        <= 30_000
+    )

@@ -41,7 +41,9 @@ def test_magnitude_within_a_fifth_and_power_within_half_a_percent(estimator, f):
 @EVERY
 @pytest.mark.parametrize("f", np.arange(45.0, 55.5, 2.5))
 def test_steady_state_error_is_below_the_limit_of_one_percent(estimator, f):
-    """60255-118-1, 6.3: M class up to 5 Hz off nominal, P class 2 Hz; total vector error 1 %. It is exact here."""
+    """60255-118-1, 6.3: M class up to 5 Hz off nominal, P class 2 Hz; total vector error 1 %. It is
+    exact here.
+    """
     made = measured(three_phase(f, np.arange(8000) / RATE), estimator)
     assert np.abs(np.abs(made.V1) - 1).max() < 1e-4
     assert np.abs(made.f - f).max() < 0.005  # and frequency 0.005 Hz
@@ -50,7 +52,9 @@ def test_steady_state_error_is_below_the_limit_of_one_percent(estimator, f):
 @pytest.mark.parametrize("harmonic", [2, 3, 5, 13])
 @pytest.mark.parametrize(("estimator", "share"), [("p_class", 0.01), ("m_class", 0.1)])
 def test_single_harmonics_leave_less_than_one_percent(estimator, share, harmonic):
-    """60255-118-1, 6.3: total harmonic distortion of 1 % (P class) or 10 % (M class), total vector error 1 %."""
+    """60255-118-1, 6.3: total harmonic distortion of 1 % (P class) or 10 % (M class), total vector
+    error 1 %.
+    """
     t = np.arange(8000) / RATE
     k = np.arange(3)[:, None]
     x = three_phase(50.0, t)
@@ -60,7 +64,9 @@ def test_single_harmonics_leave_less_than_one_percent(estimator, share, harmonic
 
 @pytest.mark.parametrize("away", [5.0, 15.0])
 def test_out_of_band_signals_are_rejected_by_the_m_class(away):
-    """60255-118-1, 6.3: an interharmonic of 10 %, 25 Hz or more from 50 Hz at 50 phasors a second, leaves 1.3 %."""
+    """60255-118-1, 6.3: an interharmonic of 10 %, 25 Hz or more from 50 Hz at 50 phasors a second,
+    leaves 1.3 %.
+    """
     t = np.arange(12_000) / RATE
     k = np.arange(3)[:, None]
     x = three_phase(50.0, t)
@@ -70,9 +76,13 @@ def test_out_of_band_signals_are_rejected_by_the_m_class(away):
 
 
 @pytest.mark.parametrize("kind", ["magnitude", "phase"])
-@pytest.mark.parametrize(("estimator", "response", "overshoot"), [("p_class", 2 / 50, 0.05), ("m_class", 7 / 50, 0.1)])
+@pytest.mark.parametrize(
+    ("estimator", "response", "overshoot"), [("p_class", 2 / 50, 0.05), ("m_class", 7 / 50, 0.1)]
+)
 def test_steps_are_answered_within_the_limits(estimator, response, overshoot, kind):
-    """60255-118-1, 6.6: a step of 10 % or 10 degrees; response time to within 1 %, delay 1/(4 F_s), overshoot."""
+    """60255-118-1, 6.6: a step of 10 % or 10 degrees; response time to within 1 %, delay 1/(4 F_s),
+    overshoot.
+    """
     t = np.arange(8000) / RATE
     step = np.where(t < 1.0, 1.0, 1.1 if kind == "magnitude" else np.exp(1j * np.deg2rad(10)))
     angle = 2 * np.pi * 50 * t + np.angle(step)
@@ -101,7 +111,8 @@ def test_a_jump_passes_through_the_window_the_record_keeps(estimator):
     kept = chosen("estimator", estimator).window(50.0)
     assert kept.weights.sum() == pytest.approx(1)
     expected = [1 - 0.5 * kept.weights[kept.at + now >= 1.0].sum() for now in made.t]
-    assert np.abs(np.abs(made.V1) - expected).max() < 0.035  # a weight of the shortest window is a twentieth
+    # a weight of the shortest window is a twentieth
+    assert np.abs(np.abs(made.V1) - expected).max() < 0.035
 
 
 @EVERY
@@ -123,14 +134,18 @@ def test_a_window_is_plain_data_and_back():
     window = chosen("estimator", "p_class").window(50.0)
     again = Window.of(window.to_dict())
     assert (again.name, again.at.tolist(), again.weights.tolist()) == (
-        "p_class", window.at.tolist(), window.weights.tolist(),
-    )  # fmt: skip
+        "p_class",
+        window.at.tolist(),
+        window.weights.tolist(),
+    )
 
 
 def test_the_m_class_knows_the_rates_of_the_standard_only():
     with pytest.raises(UserError, match="reporting=7 is none of the standard's rates: 10, 12"):
         chosen("estimator", {"name": "m_class", "reporting": 7})
-    with pytest.raises(UserError, match="no M-class filter for 60 phasors a second at 50 Hz: 10, 25, 50, 100"):
+    with pytest.raises(
+        UserError, match="no M-class filter for 60 phasors a second at 50 Hz: 10, 25, 50, 100"
+    ):
         chosen("estimator", {"name": "m_class", "reporting": 60}).window(50.0)
     with pytest.raises(UserError, match=r"at 16.7 Hz; choose another estimator"):
         chosen("estimator", "m_class").window(16.7)

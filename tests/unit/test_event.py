@@ -32,7 +32,10 @@ def dip(step=1e-3, length=1.0, start=0.3, duration=0.15, depth=0.5, sigma=0.002,
 @pytest.mark.parametrize("step", [1e-3, 5e-3, 10e-3, 20e-3])
 def test_a_clean_cut_dip_is_found_to_the_sample(step, depth):
     event = detect(dip(step=step, start=0.4, duration=0.2, depth=depth))
-    assert (event.t_start, event.t_end) == (pytest.approx(0.4, abs=1e-9), pytest.approx(0.6, abs=1e-9))
+    assert (event.t_start, event.t_end) == (
+        pytest.approx(0.4, abs=1e-9),
+        pytest.approx(0.6, abs=1e-9),
+    )
     assert event.depth == pytest.approx(depth, abs=4 * 0.002)
     assert event.start == round(0.4 / step)
 
@@ -42,7 +45,9 @@ def test_steady_state_and_noise_are_those_of_the_samples_before():
     assert event.steady == slice(1000, 2000)
     error_of_mean, error_of_sigma = 4 * 0.004 / np.sqrt(1000), 4 * 0.004 / np.sqrt(2000)
     np.testing.assert_allclose([event.U0, event.P0, event.Q0], [1.0, 0.8, 0.4], atol=error_of_mean)
-    np.testing.assert_allclose([event.noise_U, event.noise_P, event.noise_Q], 0.004, atol=error_of_sigma)
+    np.testing.assert_allclose(
+        [event.noise_U, event.noise_P, event.noise_Q], 0.004, atol=error_of_sigma
+    )
     assert event.f0 == 50.0
 
 
@@ -92,7 +97,9 @@ def test_slow_recovery_ends_the_dip_when_a_fifth_of_the_depth_is_left():
 def test_a_voltage_that_settles_a_little_lower_has_recovered():
     made = dip(sigma=0.0005)
     U = np.where(made.t >= 0.449, 0.96, made.U)
-    assert detect(Record(name="dip", t=made.t, U=U, P=made.P, Q=made.Q)).t_end == pytest.approx(0.45, abs=0.002)
+    assert detect(Record(name="dip", t=made.t, U=U, P=made.P, Q=made.Q)).t_end == pytest.approx(
+        0.45, abs=0.002
+    )
 
 
 def test_a_noisy_record_without_dip_stays_silent():
@@ -133,7 +140,10 @@ def test_any_noisy_dip_is_found_once_to_two_samples(depth, start, duration, scal
 
 
 def test_no_dip_is_refused_with_the_largest_deviation():
-    with pytest.raises(UserError, match=r"dip.csv: there is no dip: .* falls at most 2 % below it .* must exceed 3 %"):
+    with pytest.raises(
+        UserError,
+        match=r"dip.csv: there is no dip: .* falls at most 2 % below it .* must exceed 3 %",
+    ):
         detect(dip(depth=0.02, sigma=0.0))
 
 
@@ -144,18 +154,24 @@ def test_a_swell_alone_is_refused_and_said():
 
 
 def test_a_record_that_starts_inside_the_dip_is_refused():
-    with pytest.raises(UserError, match=r"the dip starts at sample 1 .*give a record that starts earlier"):
+    with pytest.raises(
+        UserError, match=r"the dip starts at sample 1 .*give a record that starts earlier"
+    ):
         detect(dip(start=-0.05, sigma=0.0))
 
 
 def test_too_few_samples_before_are_refused():
-    with pytest.raises(UserError, match=r"dip.csv: the dip starts at sample 9 \(t = 0.008 s\): .* at least 10 samples"):
+    with pytest.raises(
+        UserError,
+        match=r"dip.csv: the dip starts at sample 9 \(t = 0.008 s\): .* at least 10 samples",
+    ):
         detect(dip(start=0.008, sigma=0.0))
 
 
 def test_a_record_shorter_than_the_dip_is_refused():
     with pytest.raises(
-        UserError, match=r"dip.csv: the record is shorter than the dip: it ends at t = 0.999 s with U = "
+        UserError,
+        match=r"dip.csv: the record is shorter than the dip: it ends at t = 0.999 s with U = ",
     ):
         detect(dip(start=0.9, duration=0.5))
 
@@ -214,7 +230,9 @@ class TestSwells:
         assert detect(made).depth == pytest.approx(0.4, abs=0.01)
 
     def test_alone_is_refused_by_its_name(self):
-        with pytest.raises(UserError, match=r"falls at most .* it rises by 15.* % .*: a swell is not fitted"):
+        with pytest.raises(
+            UserError, match=r"falls at most .* it rises by 15.* % .*: a swell is not fitted"
+        ):
             detect(levels((1.0, 1.5, 1.15)))
 
 
@@ -223,18 +241,23 @@ class TestWhatIsNoDip:
 
     def test_an_interruption(self):
         with pytest.raises(
-            UserError, match=r"the voltage is gone from t = 1 to 1.4 s \(U falls to .*\): an interruption"
+            UserError,
+            match=r"the voltage is gone from t = 1 to 1.4 s \(U falls to .*\): an interruption",
         ):
             detect(levels((1.0, 1.4, 0.01), sigma=1e-5))
 
     def test_a_dead_line(self):
-        with pytest.raises(UserError, match=r"the voltage is gone from t = 1 s on .*: the line is dead"):
+        with pytest.raises(
+            UserError, match=r"the voltage is gone from t = 1 s on .*: the line is dead"
+        ):
             detect(levels((1.0, 9.0, 0.01), sigma=1e-5))
 
     def test_an_open_pole(self):
         U2 = np.zeros(8000)
         U2[1000:6000] = 0.365
-        with pytest.raises(UserError, match=r"U2 is 57.9 % of U for 5 s at t = 1 s, .*: one pole is open"):
+        with pytest.raises(
+            UserError, match=r"U2 is 57.9 % of U for 5 s at t = 1 s, .*: one pole is open"
+        ):
             detect(levels((1.0, 6.0, 0.63), length=8.0, sigma=0.0, U2=U2))
 
     def test_a_fault_of_one_phase_is_one(self):
@@ -243,7 +266,9 @@ class TestWhatIsNoDip:
         assert detect(levels((1.0, 1.2, 0.7), U2=U2)).depth == pytest.approx(0.3, abs=0.01)
 
     def test_a_tap_step_down(self):
-        with pytest.raises(UserError, match=r"falls by 5 % at t = 1 s and stays there for the 3 s .*: a step"):
+        with pytest.raises(
+            UserError, match=r"falls by 5 % at t = 1 s and stays there for the 3 s .*: a step"
+        ):
             detect(levels((1.0, 9.0, 0.95)))
 
     def test_a_ramp(self):
@@ -262,8 +287,12 @@ class TestWhatIsNoDip:
         dead = Record(name="made", t=made.t, U=made.U, P=made.P, Q=made.Q, f=f).check()
         with pytest.raises(UserError, match="the line is dead"):
             detect(dead)
-        with pytest.raises(UserError, match=r"f = 70 is more than 20 % off the nominal 50 Hz at a voltage of 1"):
-            Record(name="made", t=made.t, U=made.U, P=made.P, Q=made.Q, f=np.where(made.t < 1, 70.0, f)).check()
+        with pytest.raises(
+            UserError, match=r"f = 70 is more than 20 % off the nominal 50 Hz at a voltage of 1"
+        ):
+            Record(
+                name="made", t=made.t, U=made.U, P=made.P, Q=made.Q, f=np.where(made.t < 1, 70.0, f)
+            ).check()
 
 
 class TestDirection:
@@ -275,7 +304,11 @@ class TestDirection:
 
     def test_regeneration(self):
         made = dip(sigma=0.0)
-        told = describe(detect(Record(name="made", t=made.t, U=made.U, P=-0.5 + 0 * made.P, Q=0.02 + 0 * made.Q)))
+        told = describe(
+            detect(
+                Record(name="made", t=made.t, U=made.U, P=-0.5 + 0 * made.P, Q=0.02 + 0 * made.Q)
+            )
+        )
         assert "regeneration (a braking train)" in told
         assert "reverse_current" not in told
 
@@ -305,13 +338,20 @@ class TestFuse:
 
     @pytest.mark.parametrize(("left", "U2"), [(2 / 3, 1 / 3), (1e-3, None)])
     def test_it_is_refused_by_its_name(self, left, U2):
-        with pytest.raises(UserError, match="while the current stays as it was: a fuse of the voltage transformers"):
+        with pytest.raises(
+            UserError, match="while the current stays as it was: a fuse of the voltage transformers"
+        ):
             detect(self.record(left, U2))
 
     def test_a_fault_of_one_phase_that_moves_the_current_by_a_tenth_is_none(self):
-        made = self.record(np.where(np.arange(3000) < 1270, 0.46, 1.0), np.where(np.arange(3000) < 1270, 0.26, 1e-3))
+        made = self.record(
+            np.where(np.arange(3000) < 1270, 0.46, 1.0),
+            np.where(np.arange(3000) < 1270, 0.26, 1e-3),
+        )
         swings = 1 - 0.03 - 0.06 * np.cos(2 * np.pi * (made.t - 1.0) / 0.27) * (made.t >= 1.0)
-        assert detect(replace(made, P=made.P * swings, Q=made.Q * swings)).end == pytest.approx(1270, abs=10)
+        assert detect(replace(made, P=made.P * swings, Q=made.Q * swings)).end == pytest.approx(
+            1270, abs=10
+        )
 
     def test_a_fault_that_lasts_to_the_end_is_none(self):
         made = self.record(0.79, 0.21)
@@ -330,16 +370,25 @@ def test_a_voltage_beyond_all_measure_ends_in_no_warning():
     t = np.arange(800) / 200
     U = np.where((t >= 2) & (t < 2.15), 0.7, 1.0)
     U[500], U[600] = 1e30, 1e30
-    assert detect(Record("made", t, U, 0.8 * np.ones(800), 0.4 * np.ones(800))).depth == pytest.approx(0.3)
+    assert detect(
+        Record("made", t, U, 0.8 * np.ones(800), 0.4 * np.ones(800))
+    ).depth == pytest.approx(0.3)
 
 
 @pytest.mark.parametrize("size", [0.1, 110.0])
 def test_dips_and_swells_are_the_same_in_any_unit_of_voltage(size):
-    """A swell that rises slowly, two dips, and a long rise that ends in a dip, which is no swell."""
+    """A swell that rises slowly, two dips, and a long rise that ends in a dip, which
+    is no swell.
+    """
     t = np.arange(9000) / 1000
     U = 1 + 0.0005 * np.random.default_rng(3).standard_normal(9000)
     U[600:700] += np.minimum(0.005 * np.arange(100), 0.1)
-    for first, stop, change in ((1500, 1600, -0.05), (2500, 2700, -0.6), (4000, 7000, 0.1), (7000, 7200, -0.3)):
+    for first, stop, change in (
+        (1500, 1600, -0.05),
+        (2500, 2700, -0.6),
+        (4000, 7000, 0.1),
+        (7000, 7200, -0.3),
+    ):
         U[first:stop] += change
     lower, higher = falls(t, U)
     assert [start for start, _ in lower] == [1500, 2500, 7000]
@@ -351,7 +400,9 @@ def test_dips_and_swells_are_the_same_in_any_unit_of_voltage(size):
 def test_the_end_of_a_dip_that_never_ends_is_that_of_the_record():
     t = np.arange(1000) / 1000
     U = np.where(t < 0.5, 1.0, 0.6)
-    (dip,) = dips.cut_dips([Record("long", t, U, 0.8 * U, 0.3 * U, source="long.csv")], "long.csv", 1.0, 10.0)
+    (dip,) = dips.cut_dips(
+        [Record("long", t, U, 0.8 * U, 0.3 * U, source="long.csv")], "long.csv", 1.0, 10.0
+    )
     assert (dip.start, dip.end) == (0.5, t[-1])
 
 
@@ -363,9 +414,12 @@ def test_a_load_without_active_power_before_its_dip_has_no_level():
 
 
 def test_one_base_beside_a_record_of_which_nobody_said_the_mva():
-    """Both are in the unit of one file then: 5 per unit of it are 2.5 of a record that has 2 of them as its own."""
+    """Both are in the unit of one file then: 5 per unit of it are 2.5 of a record that has 2 of
+    them as its own.
+    """
     own = OwnBase(power=50.0, file_power=10.0, in_mva=True)
     there = SimpleNamespace(
-        base=SimpleNamespace(power=2.0), file_base=SimpleNamespace(power=1.0, in_mva=False, origin="")
+        base=SimpleNamespace(power=2.0),
+        file_base=SimpleNamespace(power=1.0, in_mva=False, origin=""),
     )
     assert own.over(there) == 2.5

@@ -1,4 +1,6 @@
-"""Feeders proposed from channels of any number: by names, by angles, by buses, by Kirchhoff's law."""
+"""Feeders proposed from channels of any number: by names, by angles, by buses, by
+Kirchhoff's law.
+"""
 
 import numpy as np
 import pytest
@@ -15,7 +17,11 @@ from tractexp.recording.recording import Channel
 T = np.arange(3200) / 3200
 V = wave(T, phases(dip(T)))
 I = wave(T, load(dip(T)))
-NAMES = {6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"], 5: ["Uab", "Ubc", "Ia", "Ib", "Ic"], 4: ["Uab", "Ubc", "Ia", "Ic"]}
+NAMES = {
+    6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"],
+    5: ["Uab", "Ubc", "Ia", "Ib", "Ic"],
+    4: ["Uab", "Ubc", "Ia", "Ic"],
+}
 
 
 @pytest.mark.parametrize(
@@ -28,7 +34,10 @@ NAMES = {6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"], 5: ["Uab", "Ubc", "Ia", "Ib
         (("U1", "U2", "U3"), ("I1", "I2", "I3")),
         (("F5-VA", "F6-VB", "F7-VC"), ("F1-IA", "F2-IB", "F3-IC")),
         (("1-Ua", "2-Ub", "3-Uc"), ("4-Ia", "5-Ib", "6-Ic")),
-        (("Ua_1СШ-110", "Ub_1СШ-110", "Uc_1СШ-110"), ("Ia_1СШ-110_ВЛ3", "Ib_1СШ-110_ВЛ3", "Ic_1СШ-110_ВЛ3")),
+        (
+            ("Ua_1СШ-110", "Ub_1СШ-110", "Uc_1СШ-110"),
+            ("Ia_1СШ-110_ВЛ3", "Ib_1СШ-110_ВЛ3", "Ic_1СШ-110_ВЛ3"),
+        ),
         (("Uа", "Uв", "Uс"), ("Iа", "Iв", "Iс")),  # Cyrillic letters
         (("1号母线Ua", "1号母线Ub", "1号母线Uc"), ("馈线3_Ia", "馈线3_Ib", "馈线3_Ic")),
         (("BUS 2 Van", "BUS 2 Vbn", "BUS 2 Vcn"), ("LINE Ia [A]", "LINE Ib [A]", "LINE Ic [A]")),
@@ -48,7 +57,11 @@ NAMES = {6: ["Uab", "Ubc", "Uca", "Ia", "Ib", "Ic"], 5: ["Uab", "Ubc", "Ia", "Ib
 def test_three_phases_are_found_whatever_they_are_called(volts, amps):
     made = recording(np.concatenate([V, I]), names=[*volts, *amps], units=["kV"] * 3 + ["kA"] * 3)
     [feeder] = propose(made)
-    assert (feeder.voltages, feeder.currents, feeder.connection) == ((0, 1, 2), (3, 4, 5), "three_phase")
+    assert (feeder.voltages, feeder.currents, feeder.connection) == (
+        (0, 1, 2),
+        (3, 4, 5),
+        "three_phase",
+    )
     assert feeder.loaded
 
 
@@ -67,14 +80,20 @@ def test_phases_belong_together_though_one_lacks_a_number():
 
 def test_channels_without_names_are_put_in_the_order_of_their_angles():
     waves = [V[0], V[2], V[1], *I]
-    [feeder] = propose(recording(waves, names=[f"ch{k}" for k in range(6)], units=["kV"] * 3 + ["kA"] * 3))
+    [feeder] = propose(
+        recording(waves, names=[f"ch{k}" for k in range(6)], units=["kV"] * 3 + ["kA"] * 3)
+    )
     assert feeder.voltages == (0, 2, 1)
 
 
 @pytest.mark.parametrize("name", ["3U0", "VN", "Un", "3Uo_1СШ", "零序电压", "Vo"])
 def test_residual_voltages_are_left_out(name):
     zero = wave(T, np.full((1, len(T)), 2.0 + 0j))
-    made = recording([*V, *zero, *I], names=["Ua", "Ub", "Uc", name, "Ia", "Ib", "Ic"], units=["kV"] * 4 + ["kA"] * 3)
+    made = recording(
+        [*V, *zero, *I],
+        names=["Ua", "Ub", "Uc", name, "Ia", "Ib", "Ic"],
+        units=["kV"] * 4 + ["kA"] * 3,
+    )
     [feeder] = propose(made)
     assert (feeder.voltages, feeder.currents) == ((0, 1, 2), (4, 5, 6))
 
@@ -97,7 +116,17 @@ def test_each_feeder_has_the_voltages_of_its_own_bus():
 
 def test_where_names_do_not_tell_the_bus_the_currents_do():
     other = dip(T, start=0.2, end=0.3, depth=0.3)
-    names = ["Ua north", "Ub north", "Uc north", "Ua south", "Ub south", "Uc south", "Ia X", "Ib X", "Ic X"]
+    names = [
+        "Ua north",
+        "Ub north",
+        "Uc north",
+        "Ua south",
+        "Ub south",
+        "Uc south",
+        "Ia X",
+        "Ib X",
+        "Ic X",
+    ]
     [feeder] = propose(recording([*V, *wave(T, phases(other)), *wave(T, load(other))], names=names))
     assert feeder.voltages == (3, 4, 5)
     assert "follow these voltages best" in feeder.why[1]
@@ -112,7 +141,11 @@ class TestWhichVoltages:
 
     @pytest.mark.parametrize("dead", [noise((3, len(T)), 1e-4), 5e-4 * V, np.zeros_like(V)])
     def test_a_load_has_no_dead_voltages_whatever_their_name(self, dead):
-        names = [*(f"bus U{p}" for p in "abc"), *(f"QF2 U{p}" for p in "abc"), *(f"QF1 I{p}" for p in "abc")]
+        names = [
+            *(f"bus U{p}" for p in "abc"),
+            *(f"QF2 U{p}" for p in "abc"),
+            *(f"QF1 I{p}" for p in "abc"),
+        ]
         (feeder,) = self.two(dead, names=names)
         assert (feeder.voltages, feeder.loaded) == ((0, 1, 2), True)
         assert "the only ones alive" in feeder.why[1]
@@ -146,7 +179,10 @@ class TestWhichVoltages:
         assert "110 kV, P = 33 MW" in found[0].question
 
     def test_names_that_say_it_are_believed(self):
-        names = [*(f"{side} U{p}" for side in ("HV", "LV") for p in "abc"), *(f"LV I{p}" for p in "abc")]
+        names = [
+            *(f"{side} U{p}" for side in ("HV", "LV") for p in "abc"),
+            *(f"LV I{p}" for p in "abc"),
+        ]
         (feeder,) = self.two(wave(T, phases(0.25 * dip(T))), names=names)
         assert (feeder.voltages, feeder.question) == ((3, 4, 5), "")
 
@@ -170,7 +206,11 @@ def test_marks_may_stand_after_a_word_before_a_digit_and_twice(names):
     (feeder,) = propose(recording([*V, *uneven], names=names, units=["kV"] * 3 + ["kA"] * 3))
     assert (feeder.voltages, feeder.currents) == ((0, 1, 2), (3, 4, 5))
     (feeder,) = propose(
-        recording(np.array([*V, *uneven])[turn], names=[names[i] for i in turn], units=["kV"] * 3 + ["kA"] * 3)
+        recording(
+            np.array([*V, *uneven])[turn],
+            names=[names[i] for i in turn],
+            units=["kV"] * 3 + ["kA"] * 3,
+        )
     )
     assert (feeder.voltages, feeder.currents) == ((0, 2, 1), (3, 5, 4))
     assert order([Channel(name, np.zeros(3)) for name in names[3:]]) == ((0, 1, 2), False)
@@ -196,7 +236,11 @@ def test_line_voltages_and_two_of_them_and_two_transformers():
     [both] = propose(recording([*lines[:2], I[0], I[2]], names=["Uab", "Ubc", "Ia", "Ic"]))
     assert both.connection == {"name": "two_line_voltages", "phases": "ac"}
     whole = phasors_of(made := recording([*V, *I]), propose(made)[0], made.segments[0])
-    for feeder, waves in ((three, [*lines, *I]), (two, [*lines[:2], *I]), (both, [*lines[:2], I[0], I[2]])):
+    for feeder, waves in (
+        (three, [*lines, *I]),
+        (two, [*lines[:2], *I]),
+        (both, [*lines[:2], I[0], I[2]]),
+    ):
         seen = phasors_of(recording(waves, names=NAMES[len(waves)]), feeder, made.segments[0])
         np.testing.assert_allclose(seen.S, whole.S, rtol=1e-6)
 
@@ -205,7 +249,11 @@ def test_a_phase_column_of_numbers_says_nothing():
     lines = V - np.roll(V, -1, axis=0)
     names, labels = ["I1", "I2", "I3", "U21", "U32", "Vo"], ["7", "8", "9", "0", "1", "6"]
     [feeder] = propose(recording([*I, *lines[:2], 0 * V[0]], names=names, labels=labels))
-    assert (feeder.voltages, feeder.currents, feeder.connection) == ((3, 4), (0, 1, 2), "two_line_voltages")
+    assert (feeder.voltages, feeder.currents, feeder.connection) == (
+        (3, 4),
+        (0, 1, 2),
+        "two_line_voltages",
+    )
 
 
 def test_one_voltage_and_one_current_are_a_single_phase_feeder():
@@ -223,7 +271,9 @@ def test_one_voltage_and_one_current_are_a_single_phase_feeder():
     ],
 )
 def test_the_two_arms_of_a_traction_substation_are_two_feeders(names):
-    found = propose(recording([V[0], V[1], I[0], I[1]], names=names, units=["kV", "kV", "kA", "kA"]))
+    found = propose(
+        recording([V[0], V[1], I[0], I[1]], names=names, units=["kV", "kV", "kA", "kA"])
+    )
     assert [(f.voltages, f.currents, f.connection) for f in found] == [
         ((0,), (2,), "single_phase"),
         ((1,), (3,), "single_phase"),
@@ -252,7 +302,12 @@ def test_currents_of_a_bus_add_up_to_nothing():
 def test_a_bus_tie_is_left_out_of_the_sum():
     found = station(tie=True)
     assert "without tie: a bus tie, or one of another bus" in found["tie"].why[-1]
-    assert {name: f.loaded for name, f in found.items()} == {"T1": True, "T2": True, "L1": True, "tie": False}
+    assert {name: f.loaded for name, f in found.items()} == {
+        "T1": True,
+        "T2": True,
+        "L1": True,
+        "tie": False,
+    }
 
 
 @pytest.mark.parametrize("name", ["Bus coupler", "220kV母联", "ШСВ-220", "Sectionalizer 1"])
@@ -269,8 +324,17 @@ def test_the_load_of_the_greatest_active_power_is_recommended():
     from tractexp.report import look_console
 
     def entry(name, P, Q):
-        event = {"kind": "dip", "dip": 1, "start": 1.0, "duration": 0.2, "depth": 0.3, "worth": True, "why": "",
-                 "P_after": P, "Q_after": Q}  # fmt: skip
+        event = {
+            "kind": "dip",
+            "dip": 1,
+            "start": 1.0,
+            "duration": 0.2,
+            "depth": 0.3,
+            "worth": True,
+            "why": "",
+            "P_after": P,
+            "Q_after": Q,
+        }
         return {"name": name, "events": [event], "command": f"fit {name}"}
 
     feeders = [entry("cable", 1.0, -98.0), entry("load", 20.0, 8.0), entry("aside", 5.0, 2.0)]
@@ -279,12 +343,18 @@ def test_the_load_of_the_greatest_active_power_is_recommended():
 
 def test_a_transformer_whose_polarity_is_reversed_is_found_by_the_sum():
     found = station(reverse=("T2",), tie=False)
-    assert {name: f.reverse_current for name, f in found.items()} == {"T1": False, "T2": True, "L1": False}
+    assert {name: f.reverse_current for name, f in found.items()} == {
+        "T1": False,
+        "T2": True,
+        "L1": False,
+    }
 
 
 def test_unloaded_feeders_come_last_and_say_so():
     names = ["Ua", "Ub", "Uc", *(f"{bay} I{p}" for bay in ("spare", "used") for p in "abc")]
-    used, spare = propose(recording([*V, *(1e-3 * I), *I], names=names, units=["kV"] * 3 + ["kA"] * 6))
+    used, spare = propose(
+        recording([*V, *(1e-3 * I), *I], names=names, units=["kV"] * 3 + ["kA"] * 6)
+    )
     assert (used.currents, used.loaded) == ((6, 7, 8), True)
     assert (spare.currents, spare.loaded) == ((3, 4, 5), False)
     assert "unloaded" in spare.why[-1]
@@ -330,15 +400,23 @@ def test_the_transformers_of_the_220_kv_station(shared_data):
     assert by_currents[8, 9, 10].voltages == (4, 5, 6)
     assert by_currents[16, 17, 18].voltages == (0, 1, 2)
     assert "the currents of 6 feeders add up to 0.1" in by_currents[8, 9, 10].why[-1]
-    assert [f.loaded for f in found] == [True] * 6 + [False] * 2  # the bus coupler, and a line without load
+    # the bus coupler, and a line without load
+    assert [f.loaded for f in found] == [True] * 6 + [False] * 2
     assert "a bus coupler, as its name says" in by_currents[24, 25, 26].why[-1]
 
 
 def test_the_feeders_of_the_110_kv_station(shared_data):
-    found = {f.currents: f for f in propose(comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg"))}
+    found = {
+        f.currents: f
+        for f in propose(comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg"))
+    }
     assert len(found) == 11
-    assert [names for names, f in found.items() if f.reverse_current] == [(39, 40, 41)]  # AT1, as is known of the file
-    assert "the currents of 5 feeders add up to 1.7 % of their magnitudes once this" in found[39, 40, 41].why[-1]
+    # AT1, as is known of the file
+    assert [names for names, f in found.items() if f.reverse_current] == [(39, 40, 41)]
+    assert (
+        "the currents of 5 feeders add up to 1.7 % of their magnitudes once this"
+        in found[39, 40, 41].why[-1]
+    )
     assert found[15, 16, 17].voltages == (4, 5, 6)
     assert found[19, 20, 21].voltages == (0, 1, 2)
     assert not found[23, 24, 25].loaded
@@ -346,9 +424,13 @@ def test_the_feeders_of_the_110_kv_station(shared_data):
 
 def test_a_reader_asks_which_voltages_a_load_has(tmp_path):
     whole = recording(
-        [*V, *wave(T, phases(0.25 * dip(T))), *I], names=TestWhichVoltages.NAMES, units=["kV"] * 6 + ["kA"] * 3
+        [*V, *wave(T, phases(0.25 * dip(T))), *I],
+        names=TestWhichVoltages.NAMES,
+        units=["kV"] * 6 + ["kA"] * 3,
     )
     comtrade.write(whole, tmp_path / "sides.cfg", "ASCII", 1999)
-    with pytest.raises(UserError, match=r"cannot be told: .*110 kV, P = 33.* or .*27.5 kV, P = .*choose one: "):
+    with pytest.raises(
+        UserError, match=r"cannot be told: .*110 kV, P = 33.* or .*27.5 kV, P = .*choose one: "
+    ):
         tractexp.read(tmp_path / "sides.cfg")
     assert len(tractexp.look(tmp_path / "sides.cfg").feeders) == 2

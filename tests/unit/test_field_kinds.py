@@ -1,4 +1,6 @@
-"""Kinds of field records: short or several-rate ones, railways, direct voltages, secondary values, unknown units."""
+"""Kinds of field records: short or several-rate ones, railways, direct voltages, secondary values,
+unknown units.
+"""
 
 import numpy as np
 import pytest
@@ -26,8 +28,12 @@ def station(t, dips):
     I = np.conj((20 * u**1.5 + 8j * u**2) / (3 * V))
     rows = np.concatenate([waves(V * TURN, t), waves(I * TURN, t, seed=1)])
     units = ["kV"] * 3 + ["kA"] * 3
-    return [(f"{x}{p}", unit, row) for (x, p), unit, row in zip(
-        [*(("U", p) for p in "ABC"), *(("I", p) for p in "ABC")], units, rows, strict=True)]  # fmt: skip
+    return [
+        (f"{x}{p}", unit, row)
+        for (x, p), unit, row in zip(
+            [*(("U", p) for p in "ABC"), *(("I", p) for p in "ABC")], units, rows, strict=True
+        )
+    ]
 
 
 def written(tmp_path, t, channels, segments=None, f=50.0, trigger=None, side="P"):
@@ -36,11 +42,15 @@ def written(tmp_path, t, channels, segments=None, f=50.0, trigger=None, side="P"
         gain = np.abs(x).max() / 30000
         quantity = "voltage" if name.upper().startswith("U") else "current"
         made.append(Channel(name, np.round(x / gain).astype(np.int16), unit, quantity, gain=gain))
-    recording = Recording("made", made, segments or [Segment(0, len(t), RATE, 0.0)], f, "s", "r", trigger=trigger)
+    recording = Recording(
+        "made", made, segments or [Segment(0, len(t), RATE, 0.0)], f, "s", "r", trigger=trigger
+    )
     path = next(p for p in comtrade.write(recording, tmp_path / "a.cfg") if p.suffix == ".cfg")
     if side != "P":
         lines = path.read_text().splitlines()
-        path.write_text("\n".join(line[:-1] + side if line.endswith(",P") else line for line in lines) + "\n")
+        path.write_text(
+            "\n".join(line[:-1] + side if line.endswith(",P") else line for line in lines) + "\n"
+        )
     return path
 
 
@@ -108,7 +118,9 @@ class TestRailways:
     I = np.conj((12 * u**1.5 + 4j * u**2) / V)
 
     def loads(self, tmp_path, *channels, f=50.0):
-        rows = [(name, "kV" if name[0] == "U" else "kA", waves(z, self.t, f)[0]) for name, z in channels]
+        rows = [
+            (name, "kV" if name[0] == "U" else "kA", waves(z, self.t, f)[0]) for name, z in channels
+        ]
         seen, first = look(written(tmp_path, self.t, rows, f=f))
         return [x for x in seen.feeders if x["loaded"]], first
 
@@ -138,7 +150,9 @@ class TestRailways:
     def test_of_opposite_voltages_it_is_the_sum_of_both_powers(self):
         each = chosen("connection", "autotransformer")
         V, I = np.array([27.5, -27.5]), np.array([0.3 - 0.1j, -0.2 + 0.05j])
-        assert (each.voltage() @ V)[0] * np.conj(each.current() @ I)[0] == pytest.approx(V @ I.conj())
+        assert (each.voltage() @ V)[0] * np.conj(each.current() @ I)[0] == pytest.approx(
+            V @ I.conj()
+        )
 
     @pytest.mark.parametrize("volts", [750, 1500, 3000])
     def test_a_direct_voltage_is_said_to_be_one(self, tmp_path, volts):
@@ -156,7 +170,8 @@ class TestRailways:
 def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
     t = np.arange(0, 2, 1 / RATE)
     rows = [
-        (name, unit[1:], x * 1e3 / (1100 if unit == "kV" else 120)) for name, unit, x in station(t, [(1.0, 0.2, 0.3)])
+        (name, unit[1:], x * 1e3 / (1100 if unit == "kV" else 120))
+        for name, unit, x in station(t, [(1.0, 0.2, 0.3)])
     ]
     path = written(tmp_path, t, rows, side="S")
     seen, first = look(path)
@@ -171,7 +186,10 @@ def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
 
 def test_an_unknown_unit_leaves_a_record_unexamined_and_never_quiet(tmp_path):
     t = np.arange(0, 2, 1 / RATE)
-    rows = [(name, "V/kV" if unit == "kV" else unit, x) for name, unit, x in station(t, [(1.0, 0.2, 0.3)])]
+    rows = [
+        (name, "V/kV" if unit == "kV" else unit, x)
+        for name, unit, x in station(t, [(1.0, 0.2, 0.3)])
+    ]
     path = written(tmp_path, t, rows)
     seen, first = look(path)
     assert first.startswith("not examined: ")
@@ -190,7 +208,10 @@ def test_a_bus_tells_the_fault_that_its_circuits_end_at_different_instants(tmp_p
     for number, S, opens in ((1, 20 + 8j, 1.10), (2, -18 - 6j, 1.16)):
         I = np.conj(S / 3 / E**2) * V
         I[0] *= np.where(fault & (t < opens), 60.0, np.where(fault, 0.0, 1.0))
-        rows += [(f"I{number} L{p}", "kA", x) for p, x in zip("ABC", waves(I, t, seed=number), strict=True)]
+        rows += [
+            (f"I{number} L{p}", "kA", x)
+            for p, x in zip("ABC", waves(I, t, seed=number), strict=True)
+        ]
     seen, _ = look(written(tmp_path, t, rows))
     [bus] = [line for line in str(seen.summary()).splitlines() if line.strip().startswith("bus 1")]
     assert "dip at 0.99" in bus

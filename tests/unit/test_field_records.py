@@ -1,6 +1,8 @@
-"""What was found when real files were read, case by case: made again as files, read as a user would.
+"""What was found when real files were read, case by case: made again as files, read as a user
+would.
 
-A case is a load of known admittance behind known voltages, three phases, sampled and written as COMTRADE.
+A case is a load of known admittance behind known voltages, three phases, sampled and written as
+COMTRADE.
 """
 
 import numpy as np
@@ -31,7 +33,9 @@ def waves(X, t, f):
     return np.sqrt(2) * np.real(X * np.exp(2j * np.pi * f * t))
 
 
-def station(tmp_path, V, I, t, f=50.0, *, declared=50.0, names=None, labels=None, name="station.cfg"):
+def station(
+    tmp_path, V, I, t, f=50.0, *, declared=50.0, names=None, labels=None, name="station.cfg"
+):
     """The path of a file with voltages (K, N) and currents [kV, kA, complex RMS]."""
     values = np.concatenate([waves(V, t, f), waves(I, t, f)])
     names = names or ["Ua", "Ub", "Uc", "Ia", "Ib", "Ic"]
@@ -41,11 +45,22 @@ def station(tmp_path, V, I, t, f=50.0, *, declared=50.0, names=None, labels=None
         gain = np.abs(x).max() / 30000 or 1.0
         unit, quantity = ("kV", "voltage") if k < len(V) else ("kA", "current")
         channels.append(
-            Channel(names[k], np.round(x / gain).astype(np.int16), unit, quantity, labels[k], gain=gain,
-                    limits=(-32767, 32767))
-        )  # fmt: skip
-    recording = Recording("made", channels, [Segment(0, len(t), RATE, 0.0)], declared, "station", "recorder")
-    return next(path for path in comtrade.write(recording, tmp_path / name) if path.suffix == ".cfg")
+            Channel(
+                names[k],
+                np.round(x / gain).astype(np.int16),
+                unit,
+                quantity,
+                labels[k],
+                gain=gain,
+                limits=(-32767, 32767),
+            )
+        )
+    recording = Recording(
+        "made", channels, [Segment(0, len(t), RATE, 0.0)], declared, "station", "recorder"
+    )
+    return next(
+        path for path in comtrade.write(recording, tmp_path / name) if path.suffix == ".cfg"
+    )
 
 
 def seconds(length=2.0):
@@ -82,7 +97,9 @@ def test_three_phases_are_read_with_or_without_channels(tmp_path):
 
 
 class TestLineVoltages:
-    """A: channels between the phases, taken for phase voltages, gave 398 kV and a power turned by 30 degrees."""
+    """A: channels between the phases, taken for phase voltages, gave 398 kV and a power turned by
+    30 degrees.
+    """
 
     @pytest.mark.parametrize(
         ("names", "labels"),
@@ -97,7 +114,9 @@ class TestLineVoltages:
         t = seconds()
         V = phasors(t, (1.0, 1.2, [0.7, 0.7, 0.7]))
         lines = V - np.roll(V, -1, axis=0)
-        path = station(tmp_path, lines, Y * V, t, names=[*names, "Ia", "Ib", "Ic"], labels=[*labels, *PHASES])
+        path = station(
+            tmp_path, lines, Y * V, t, names=[*names, "Ia", "Ib", "Ic"], labels=[*labels, *PHASES]
+        )
         event = only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
         is_right(event)
         assert any("line" in note for note in event.record.notes)
@@ -108,27 +127,41 @@ class TestLineVoltages:
         lines = (V - np.roll(V, -1, axis=0))[:2]
         names, labels = ["UAB", "UBC", "Ia", "Ib", "Ic"], ["AB", "BC", *PHASES]
         is_right(
-            only(station(tmp_path, lines, Y * V, t, names=names, labels=labels), voltages=[0, 1], currents=[2, 3, 4])
+            only(
+                station(tmp_path, lines, Y * V, t, names=names, labels=labels),
+                voltages=[0, 1],
+                currents=[2, 3, 4],
+            )
         )
 
     def test_a_residual_beside_them_is_no_third_one(self, tmp_path):
         t = seconds()
         V = phasors(t, DIP)
         lines = np.array([V[0] - V[1], V[1] - V[2], V.mean(axis=0)])
-        path = station(tmp_path, lines, Y * V, t, names=["U21", "U32", "V0", "I1", "I2", "I3"], labels=[""] * 6)
-        with pytest.raises(UserError, match=r"channel 2 'V0' is the residual .*: voltages=\[0, 1\]"):
+        path = station(
+            tmp_path, lines, Y * V, t, names=["U21", "U32", "V0", "I1", "I2", "I3"], labels=[""] * 6
+        )
+        with pytest.raises(
+            UserError, match=r"channel 2 'V0' is the residual .*: voltages=\[0, 1\]"
+        ):
             only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
         is_right(only(path, voltages=[0, 1], currents=[3, 4, 5]))
         is_right(only(path))
         path = station(tmp_path, lines, Y * V, t, names=[*"abcdef"], labels=[""] * 6)
-        with pytest.raises(UserError, match=r"50 % of the positive one: .* are not the voltages of one bus"):
+        with pytest.raises(
+            UserError, match=r"50 % of the positive one: .* are not the voltages of one bus"
+        ):
             only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
 
 
 def test_b_the_frequency_that_is_measured_counts_not_the_one_that_is_declared(tmp_path):
     t = seconds()
     V = phasors(t, DIP)
-    event = only(station(tmp_path, V, Y * V, t, f=50.016, declared=60.0), voltages=[0, 1, 2], currents=[3, 4, 5])
+    event = only(
+        station(tmp_path, V, Y * V, t, f=50.016, declared=60.0),
+        voltages=[0, 1, 2],
+        currents=[3, 4, 5],
+    )
     is_right(event)
     assert event.record.base.frequency == 50
     assert event.f0 == pytest.approx(50.016, abs=2e-3)
@@ -146,7 +179,9 @@ def test_d_currents_in_another_order_never_pass_for_a_load(tmp_path, order):
     """Rotated, P was -30 MW instead of 69, with a word on a reversed current only."""
     t = seconds()
     V = phasors(t, DIP)
-    path = station(tmp_path, V, (Y * V)[[*order]], t, labels=["", "", "", "", "", ""], names=[*"uvwxyz"])
+    path = station(
+        tmp_path, V, (Y * V)[[*order]], t, labels=["", "", "", "", "", ""], names=[*"uvwxyz"]
+    )
     currents = [3 + order.index(k) for k in range(3)]
     with pytest.raises(UserError) as refused:
         only(path, voltages=[0, 1, 2], currents=[3, 4, 5])
@@ -159,12 +194,17 @@ def test_d_a_reversed_transformer_is_told_from_regeneration(tmp_path):
     V = phasors(t, DIP)
     event = only(station(tmp_path, V, -Y * V, t), voltages=[0, 1, 2], currents=[3, 4, 5])
     assert any("data.reverse_current=true" in note for note in event.record.notes)
-    braking = 3 * -70 / (9 * np.conj(V)) * (1 + 0j)  # constant power back into the network, as a converter feeds it
+    # constant power back into the network, as a converter feeds it
+    braking = 3 * -70 / (9 * np.conj(V)) * (1 + 0j)
     event = only(station(tmp_path, V, braking, t), voltages=[0, 1, 2], currents=[3, 4, 5])
-    assert any("regeneration (a braking train), no reversed current" in note for note in event.record.notes)
+    assert any(
+        "regeneration (a braking train), no reversed current" in note for note in event.record.notes
+    )
 
 
-@pytest.mark.parametrize("settings", [{}, {"voltages": [0, 1, 2], "currents": [3, 4, 5]}], ids=["proposed", "named"])
+@pytest.mark.parametrize(
+    "settings", [{}, {"voltages": [0, 1, 2], "currents": [3, 4, 5]}], ids=["proposed", "named"]
+)
 def test_what_is_found_of_order_and_direction_is_said_once_in_a_look(tmp_path, settings):
     t = seconds()
     V = phasors(t, DIP)

@@ -1,4 +1,6 @@
-"""What kind of event a voltage shows, on made waveforms of many shapes; and silence where nothing happens."""
+"""What kind of event a voltage shows, on made waveforms of many shapes; and silence where nothing
+happens.
+"""
 
 import re
 
@@ -70,7 +72,11 @@ def test_an_unbalanced_fault_is_a_dip_with_its_negative_sequence(seed):
     start, _, depth = shape(rng)
     t = grid(2.0)
     during = (t >= start) & (t < start + 0.1)
-    one, two, zero = KV * (1 - depth * during / 3), -KV * depth * during / 3, -KV * depth * during / 3
+    one, two, zero = (
+        KV * (1 - depth * during / 3),
+        -KV * depth * during / 3,
+        -KV * depth * during / 3,
+    )
     [event] = seen(t, phases(one, two, zero), load(one, two), seed=seed)
     assert (event.kind, event.worth) == ("dip", True)
     assert event.depth == pytest.approx(depth / 3, abs=0.01)
@@ -118,7 +124,9 @@ def test_a_ramp_takes_its_time(change):
 
 
 def test_ramps_that_follow_each_other_are_one():
-    """Three of 5 % each, 3 s apart: one, from the first to where the last is nearly over, as deep as it is then."""
+    """Three of 5 % each, 3 s apart: one, from the first to where the last is nearly over, as deep
+    as it is then.
+    """
     t = grid(16.0)
     V = KV * (1 - sum(0.05 * np.clip((t - start) / 1.5, 0, 1) for start in (2, 6.5, 11)))
     [ramp] = seen(t, phases(V), load(V))
@@ -151,7 +159,10 @@ def test_a_line_that_is_energised_was_dead():
     V = KV * np.where(t < 0.8, 0.0002, 1.0)
     events = seen(t, phases(V), load(V))
     assert [event.kind for event in events] == ["dead line"]
-    assert (events[0].start, events[0].end) == (pytest.approx(0.01, abs=0.02), pytest.approx(0.8, abs=0.06))
+    assert (events[0].start, events[0].end) == (
+        pytest.approx(0.01, abs=0.02),
+        pytest.approx(0.8, abs=0.06),
+    )
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -183,7 +194,8 @@ def test_an_open_pole_that_the_voltage_hardly_shows():
 def test_swings_of_a_lost_generator_are_one_pole_slip(period, depth):
     t = grid(4.5 * period + 1)
     angle = 2 * np.pi * np.clip(t - 0.5, 0, None) / period
-    V = KV * ((1 - depth / 2) + depth / 2 * np.exp(1j * angle))  # two networks that slip against each other
+    # two networks that slip against each other
+    V = KV * ((1 - depth / 2) + depth / 2 * np.exp(1j * angle))
     events = seen(t, phases(V), load(V))
     slips = [event for event in events if event.kind == "pole slip"]
     assert len(slips) == 1
@@ -210,7 +222,11 @@ def test_the_inrush_of_a_transformer(seed):
     rng = np.random.default_rng(500 + seed)
     turned = 2 * np.pi * 50 * t + np.array([[0], [-2 * np.pi / 3], [2 * np.pi / 3]])
     on = t >= 0.9
-    lobes = np.maximum(np.cos(turned + rng.uniform(0, 6)) - 0.35, 0) * on * np.exp(-np.clip(t - 0.9, 0, None) / 0.4)
+    lobes = (
+        np.maximum(np.cos(turned + rng.uniform(0, 6)) - 0.35, 0)
+        * on
+        * np.exp(-np.clip(t - 0.9, 0, None) / 0.4)
+    )
     V = KV * np.ones(len(t))
     extra = np.concatenate([np.zeros_like(lobes), 3 * KA * lobes])
     [event] = seen(t, phases(V), load(V), extra=extra, seed=seed)
@@ -245,7 +261,8 @@ def test_silence_where_nothing_happens(seed, f, sigma):
 
 
 @pytest.mark.parametrize(
-    ("rate", "nominal"), [(600.0, 50.0), (1000.0, 50.0), (960.0, 60.0), (12800.0, 60.0), (500.0, 50 / 3)]
+    ("rate", "nominal"),
+    [(600.0, 50.0), (1000.0, 50.0), (960.0, 60.0), (12800.0, 60.0), (500.0, 50 / 3)],
 )
 def test_at_any_rate_and_nominal_frequency(rate, nominal):
     t = grid(2.0, rate)
@@ -258,7 +275,9 @@ def test_at_any_rate_and_nominal_frequency(rate, nominal):
 def test_single_phase_feeders_have_happenings_too():
     t = grid(2.0)
     V = 27.5 * np.where((t >= 0.9) & (t < 1.2), 0.75, 1.0)
-    record = recording([*wave(t, V[None]), *wave(t, 0.3 * np.exp(-0.4j) * V[None] / 27.5)], names=["U", "I"])
+    record = recording(
+        [*wave(t, V[None]), *wave(t, 0.3 * np.exp(-0.4j) * V[None] / 27.5)], names=["U", "I"]
+    )
     [event] = of(record, Feeder((0,), (1,), "single_phase"))
     assert (event.kind, event.worth) == ("dip", True)
     assert np.isnan(event.U2)
@@ -291,7 +310,10 @@ class TestOfRecords:
         U[1000:1150] -= 0.4
         [event] = happenings_of(self.record(U))
         assert (event.kind, event.worth) == ("dip", True)
-        assert (event.start, event.end) == (pytest.approx(1.0, abs=0.02), pytest.approx(1.15, abs=0.02))
+        assert (event.start, event.end) == (
+            pytest.approx(1.0, abs=0.02),
+            pytest.approx(1.15, abs=0.02),
+        )
         assert event.before == (pytest.approx(0.8, rel=0.01), pytest.approx(0.4, rel=0.01))
 
     def test_an_open_pole_by_its_negative_sequence(self):
@@ -314,7 +336,9 @@ class TestOfRecords:
         swell = np.where((t > 2) & (t < 2.5), 1.12, 1.0)
         tap = np.where(t > 2, 0.95, 1.0)
         for U, kind in ((swell, "swell"), (tap, "step")):
-            assert [event.kind for event in happenings_of(self.record(U + noise(n, 5e-4), step=step))] == [kind]
+            assert [
+                event.kind for event in happenings_of(self.record(U + noise(n, 5e-4), step=step))
+            ] == [kind]
 
 
 def test_the_two_dips_of_the_220_kv_station(shared_data):
@@ -323,7 +347,13 @@ def test_the_two_dips_of_the_220_kv_station(shared_data):
     events = []
     for segment in record.waveforms():
         phasors = phasors_of(record, feeder, segment)
-        events += happenings(FeederWaves.of(record, feeder, segment)[:, :], segment.rate, segment.start, 50.0, phasors)
+        events += happenings(
+            FeederWaves.of(record, feeder, segment)[:, :],
+            segment.rate,
+            segment.start,
+            50.0,
+            phasors,
+        )
     assert [(event.kind, event.worth) for event in events] == [("dip", True)] * 2
     assert [event.depth for event in events] == pytest.approx([0.131, 0.127], abs=0.003)
 
@@ -362,7 +392,9 @@ class TestLoadsAndFuses:
         P = 3 * KV * KA * np.cos(np.pi / 6)
         np.testing.assert_allclose([events[1].before[0], events[1].after[0]], P, rtol=0.01)
 
-    @pytest.mark.parametrize(("lost", "back"), [((0,), 9.0), ((1, 2), 9.0), ((0, 1, 2), 9.0), ((0, 1, 2), 1.7)])
+    @pytest.mark.parametrize(
+        ("lost", "back"), [((0,), 9.0), ((1, 2), 9.0), ((0, 1, 2), 9.0), ((0, 1, 2), 1.7)]
+    )
     def test_a_voltage_that_is_lost_while_the_currents_stay_is_a_fuse(self, lost, back):
         t = grid(3.0)
         left = np.ones((3, len(t)))
@@ -385,5 +417,7 @@ class TestLoadsAndFuses:
         left = np.ones((3, len(t)))
         left[0, fault] = 0.05
         V = phases(KV + 0 * t) * left
-        [event] = seen(t, V, load(KV + 0 * t) * np.where(fault, np.array([[0.3], [0.9], [1.1]]), 1.0))
+        [event] = seen(
+            t, V, load(KV + 0 * t) * np.where(fault, np.array([[0.3], [0.9], [1.1]]), 1.0)
+        )
         assert event.kind == "dip"

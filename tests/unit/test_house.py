@@ -17,7 +17,11 @@ def floors() -> dict[str, int]:
     """{room: its floor}, from the sentence that tells contributors."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     (told,) = re.findall(r"Imports go down these floors only: (.*?)\. ", " ".join(text.split()))
-    return {room: k for k, floor in enumerate(told.split(" < ")) for room in re.findall(r"`(\w+)`", floor)}
+    return {
+        room: k
+        for k, floor in enumerate(told.split(" < "))
+        for room in re.findall(r"`(\w+)`", floor)
+    }
 
 
 FLOORS = floors()
@@ -25,7 +29,9 @@ FLOORS = floors()
 
 @functools.cache
 def modules(path: Path) -> list[tuple[str, bool]]:
-    """The modules that a file imports by their full names, each with whether its annotations alone need it."""
+    """The modules that a file imports by their full names, each with whether its annotations alone
+    need it.
+    """
     found, nodes = [], [(ast.parse(path.read_text(encoding="utf-8")), False)]
     while nodes:
         node, typed = nodes.pop()
@@ -33,17 +39,31 @@ def modules(path: Path) -> list[tuple[str, bool]]:
             found += [(alias.name, typed) for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             whole = node.module == "tractexp"
-            found += [(f"tractexp.{alias.name}", typed) for alias in node.names] if whole else [(node.module, typed)]
-        elif isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
-            nodes += [(child, True) for child in node.body] + [(child, typed) for child in node.orelse]
+            found += (
+                [(f"tractexp.{alias.name}", typed) for alias in node.names]
+                if whole
+                else [(node.module, typed)]
+            )
+        elif (
+            isinstance(node, ast.If)
+            and isinstance(node.test, ast.Name)
+            and node.test.id == "TYPE_CHECKING"
+        ):
+            nodes += [(child, True) for child in node.body] + [
+                (child, typed) for child in node.orelse
+            ]
         elif not isinstance(node, ast.expr):  # which holds no import
             nodes += [(child, typed) for child in ast.iter_child_nodes(node)]
     return found
 
 
 def imported(path: Path) -> set[str]:
-    """Rooms of the package that a module imports, within functions too, but not for its annotations only."""
-    return {n.split(".")[1] for n, typed in modules(path) if n.startswith("tractexp.") and not typed}
+    """Rooms of the package that a module imports, within functions too, but not for its annotations
+    only.
+    """
+    return {
+        n.split(".")[1] for n, typed in modules(path) if n.startswith("tractexp.") and not typed
+    }
 
 
 @pytest.mark.parametrize("room", sorted({*FLOORS} - {"__main__"}))
@@ -67,12 +87,15 @@ def test_nothing_imports_the_studies():
 
 
 def test_plugins_of_ours_import_what_a_plugin_of_others_may():
-    """`tractexp.extend` and what is below it; of their own folder what starts with an underscore."""
+    """`tractexp.extend` and what is below it; of their own folder what starts with
+    an underscore.
+    """
     imports = {
         f"{path.relative_to(ROOT)}: {name}"
         for path in (ROOT / "plugins").rglob("*.py")
         for name, _ in modules(path)
-        if name.split(".")[0] in ("tractexp", "tractexp_plugins") and name.split(".")[:2] != ["tractexp", "extend"]
+        if name.split(".")[0] in ("tractexp", "tractexp_plugins")
+        and name.split(".")[:2] != ["tractexp", "extend"]
     }
     assert imports == set()
 
@@ -86,8 +109,13 @@ def test_one_module_starts_another_python():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.Attribute) and ast.unparse(node) == "sys.executable"
     }
-    # a script that needs no other module of ours, and what may be another program's Python: both say -P themselves
-    assert named == {"tractexp/interpreter.py", "tractexp/filetypes/workbook.py", "plugins/formats/andes.py"}
+    # a script that needs no other module of ours, and what may be another program's Python: both
+    # say -P themselves
+    assert named == {
+        "tractexp/interpreter.py",
+        "tractexp/filetypes/workbook.py",
+        "plugins/formats/andes.py",
+    }
     for name in named:
         assert '"-P"' in (ROOT / name).read_text(encoding="utf-8")
 

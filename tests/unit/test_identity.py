@@ -11,25 +11,36 @@ from tractexp.record.identity import UNKNOWN, Identity, describe_identities, dis
 from tractexp.record.record import LOAD
 
 SOURCE = {
-    "station": "North", "device": "R1", "load": "T2", "voltages": "Ua, Ub, Uc", "currents": "Ia, Ib, Ic",
+    "station": "North",
+    "device": "R1",
+    "load": "T2",
+    "voltages": "Ua, Ub, Uc",
+    "currents": "Ia, Ib, Ic",
     "time": "2023-05-12T19:45:25",
-}  # fmt: skip
+}
 
 
 def record(number=1, **changes):
     t = np.arange(400) / 500
     U = np.where((t > 0.3) & (t < 0.5), 0.7, 1.0)
     made = Record(
-        f"north_dip{number}", t, U, U**2, 0.5 * U**2, base=Base(110.0, 30.2, 50.0, LOAD),
-        source=f"north.cfg dip {number}", identity=SOURCE,
-    )  # fmt: skip
+        f"north_dip{number}",
+        t,
+        U,
+        U**2,
+        0.5 * U**2,
+        base=Base(110.0, 30.2, 50.0, LOAD),
+        source=f"north.cfg dip {number}",
+        identity=SOURCE,
+    )
     return dataclasses.replace(made, **changes)
 
 
 def test_an_identity_says_all_that_is_known_in_one_line():
     told = str(Identity.at(record()))
     assert told == (
-        "north.cfg dip 1; station North; device R1; load T2; voltages Ua, Ub, Uc; currents Ia, Ib, Ic;"
+        "north.cfg dip 1; station North; device R1; load T2; voltages Ua, Ub, Uc; currents Ia, Ib,"
+        " Ic;"
         " time 2023-05-12T19:45:25; per unit of 110 kV and 30.2 MVA"
     )
 
@@ -49,7 +60,9 @@ def test_a_base_that_nobody_told_is_said_to_be_unknown():
 
 def test_what_is_unknown_of_several_records_is_said_once_with_those_it_concerns():
     known = Identity.at(record())
-    one, other = (Identity.at(record(base=Base(), identity={}, source=f"{name}.csv")) for name in "ab")
+    one, other = (
+        Identity.at(record(base=Base(), identity={}, source=f"{name}.csv")) for name in "ab"
+    )
     assert describe_identities([one, one]) == [f"a.csv; {UNKNOWN}"]
     assert describe_identities([one, other]) == ["a.csv", "b.csv", f"{UNKNOWN} of each"]
     assert describe_identities([one, known, other])[-1] == f"{UNKNOWN} of a.csv, b.csv"
@@ -66,7 +79,9 @@ def test_dips_of_one_recording_are_one_load():
 
 def test_the_console_says_of_each_recording_once_what_it_is_of():
     lines = [*describe_records([detect(record(1)), detect(record(2))], [])]
-    assert [line for line in lines if "MVA" in line] == [f"  record: {Identity.at(record()).recording}"]
+    assert [line for line in lines if "MVA" in line] == [
+        f"  record: {Identity.at(record()).recording}"
+    ]
     assert lines[0].startswith("fit: north_dip1")
 
 

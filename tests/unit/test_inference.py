@@ -1,4 +1,6 @@
-"""The arithmetic that identifications and investigations share: intervals, errors of what is free, goodness of fit."""
+"""The arithmetic that identifications and investigations share: intervals, errors of what is free,
+goodness of fit.
+"""
 
 import numpy as np
 import pytest
@@ -24,7 +26,7 @@ def test_an_interval_is_cut_at_the_bounds_and_is_none_without_an_error():
     assert np.isnan(ParameterEstimate(SHARE, 0.5, np.nan).interval).all()
 
 
-def test_the_standard_error_of_a_coordinate_is_that_of_the_inverse_and_of_one_that_changes_nothing_infinite():
+def test_a_standard_error_is_that_of_the_inverse_and_of_a_coordinate_changing_nothing_infinite():
     root = np.array([[2.0, 1.0, 0.0], [0.0, 4.0, 0.0]])
     known = np.sqrt(np.diag(np.linalg.inv(root[:, :2].T @ root[:, :2])))
     assert free_standard_errors(root) == pytest.approx([*known, np.inf])
@@ -42,7 +44,10 @@ def test_a_fit_is_as_good_as_its_most_significant_test_corrected_for_their_numbe
 
 
 def test_what_draws_leave_is_no_surprise_and_ten_times_as_much_is():
-    draws = {"sum": np.random.default_rng(3).chisquare(20, 400), "largest": np.random.default_rng(4).random((400, 5))}
+    draws = {
+        "sum": np.random.default_rng(3).chisquare(20, 400),
+        "largest": np.random.default_rng(4).random((400, 5)),
+    }
     usual = {"sum": np.array([20.0]), "largest": np.full((1, 5), 0.5)}
     p = compare_with_draws(usual, draws)
     assert 0.3 < p["sum"] < 0.6
@@ -61,6 +66,8 @@ def test_a_column_counts_in_the_scale_that_is_given_for_it():
 
 
 def test_the_box_of_two_has_the_coordinates_of_the_first_before_those_of_the_other():
-    both = join_boxes(Box(np.zeros(2), np.ones(2), ("a", "b")), Box(np.array([-1.0]), np.array([3.0]), ("P0[1]",)))
+    both = join_boxes(
+        Box(np.zeros(2), np.ones(2), ("a", "b")), Box(np.array([-1.0]), np.array([3.0]), ("P0[1]",))
+    )
     assert both.names == ("a", "b", "P0[1]")
     assert both.from_unit(np.array([0.5, 1.0, 0.5])).tolist() == [0.5, 1.0, 1.0]

@@ -1,4 +1,6 @@
-"""The best linear network of few poles: planted networks come back, and what is no network is a sentence."""
+"""The best linear network of few poles: planted networks come back, and what is no network is a
+sentence.
+"""
 
 from dataclasses import replace
 
@@ -15,23 +17,30 @@ from tractexp.record import Record, detect
 from tractexp.record.synthetic import synthetic_event
 
 RATE, F0 = 3200.0, 50.0
-POLES = np.array([-18 + 2j * np.pi * (47 - F0), -45 + 2j * np.pi * (3 - F0)])  # a rotor's and a stator's, in the frame
+# a rotor's and a stator's, in the frame
+POLES = np.array([-18 + 2j * np.pi * (47 - F0), -45 + 2j * np.pi * (3 - F0)])
 SHARES, C = np.array([2.5 - 3.0j, -0.4 + 1.5j]), 2e-4 + 1e-4j
 P0, Q0 = 0.9, 0.3
 
 
 def voltage(start=640, samples=1600, depth=0.3, negative=0.1, duration=0.06):
-    """A dip's space vector (N,) in the frame [pu]: the positive sequence with a jump of its angle, and the negative."""
+    """A dip's space vector (N,) in the frame [pu]: the positive sequence with a jump of its angle,
+    and the negative.
+    """
     t = (np.arange(samples) - start) / RATE
     there = np.clip(t / 0.002, 0, 1) - np.clip((t - duration) / 0.002, 0, 1)
     return 1 - there * (depth * np.exp(0.3j) + negative * np.exp(-4j * np.pi * F0 * t))
 
 
 def planted(v, poles, shares, step=1 / RATE):
-    """What a network draws (N,) in the frame, by its definition: C du/dt and each pole's share of s / (s - p)."""
+    """What a network draws (N,) in the frame, by its definition: C du/dt and each pole's share of s
+    / (s - p).
+    """
     u = v - 1
     i = (P0 - 1j * Q0) * v + C * np.gradient(u, step)
-    return i + sum(g * (u + p * compute_pole_response(u, p, step)) for g, p in zip(shares, poles, strict=True))
+    return i + sum(
+        g * (u + p * compute_pole_response(u, p, step)) for g, p in zip(shares, poles, strict=True)
+    )
 
 
 def in_waves(v, i, start=640):
@@ -52,7 +61,9 @@ def poles_of(box):
 
 
 def in_phasors(u, power, rate=200.0, start=100):
-    """An event of a voltage's deviation (N,) and of P + jQ's (N,) [pu], before which nothing happens."""
+    """An event of a voltage's deviation (N,) and of P + jQ's (N,) [pu], before which nothing
+    happens.
+    """
     t = np.arange(len(u)) / rate
     return detect(Record("made", t, 1 + u, P0 + power.real, Q0 + power.imag))
 
@@ -69,14 +80,18 @@ def test_a_pole_responds_as_scipy_simulates_it(pole):
     a, b = pole.real, pole.imag
     system = signal.StateSpace([[a, -b], [b, a]], np.eye(2), np.eye(2), np.zeros((2, 2)))
     _, x, _ = signal.lsim(system, np.stack([u.real, u.imag], axis=1), np.arange(len(u)) / RATE)
-    np.testing.assert_allclose(compute_pole_response(u, pole, 1 / RATE), x[:, 0] + 1j * x[:, 1], atol=1e-12)
+    np.testing.assert_allclose(
+        compute_pole_response(u, pole, 1 / RATE), x[:, 0] + 1j * x[:, 1], atol=1e-12
+    )
 
 
 def test_a_planted_network_comes_back_from_waves():
     v = voltage()
     boxes = black_boxes(WAVES, [in_waves(v, planted(v, POLES, SHARES))], most=2)
     np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
-    np.testing.assert_allclose(sorted(boxes[2].networks[0].coefficients, key=abs), [C, *SHARES[::-1]], rtol=1e-5)
+    np.testing.assert_allclose(
+        sorted(boxes[2].networks[0].coefficients, key=abs), [C, *SHARES[::-1]], rtol=1e-5
+    )
 
 
 def test_what_noise_leaves_of_the_poles_is_what_their_covariance_says():
@@ -179,7 +194,9 @@ def test_the_time_of_the_dip_does_not_matter():
 
 
 def test_a_single_phase_has_a_network_of_its_own():
-    """Of its one current: conductance and R-L, whose pole is real in the phase. What the start shook up is over."""
+    """Of its one current: conductance and R-L, whose pole is real in the phase. What the start
+    shook up is over.
+    """
     before, start, n = 1280, 1920, 2880
     t = np.arange(n) / RATE
     v = np.concatenate([np.ones(before), voltage(negative=0.0)]) * np.exp(2j * np.pi * F0 * t)
@@ -187,7 +204,9 @@ def test_a_single_phase_has_a_network_of_its_own():
     u = v.real + 1j * np.concatenate([v.imag[:quarter], v.real[:-quarter]])
     i = (0.6 * u + 100 * compute_pole_response(u, -30.0, 1 / RATE)).real
     I = 2 * np.mean((i * np.exp(-2j * np.pi * F0 * t))[before:start])
-    made = synthetic_event("made", t, u * np.exp(-2j * np.pi * F0 * t), (1.0, I.real, -I.imag), F0, start, start + 190)
+    made = synthetic_event(
+        "made", t, u * np.exp(-2j * np.pi * F0 * t), (1.0, I.real, -I.imag), F0, start, start + 190
+    )
     i[:before] = np.nan
     currents = np.stack([i, np.full(n, np.nan), np.full(n, np.nan)])
     event = replace(made, phases=1, currents=currents, lead=before, steady=slice(before, start))
@@ -204,7 +223,9 @@ def test_what_is_periodic_before_the_dip_goes_on():
     v, t = voltage(), np.arange(1600) / RATE
     own = 0.05 * np.exp(-4j * np.pi * F0 * t) + 0.03 * np.exp(2j * np.pi * 6 * F0 * t)
     driven = 0.02 * np.exp(-2j * np.pi * 6 * F0 * t)
-    boxes = black_boxes(WAVES, [event := in_waves(v + driven, planted(v, POLES, SHARES) + own)], most=2)
+    boxes = black_boxes(
+        WAVES, [event := in_waves(v + driven, planted(v, POLES, SHARES) + own)], most=2
+    )
     np.testing.assert_allclose(poles_of(boxes[2]), POLES, rtol=1e-6)
     calculated = WAVES.outputs(event, [boxes[2].networks[0].response(WAVES.ports(event)[0])])
     np.testing.assert_allclose(calculated[:2], event.currents[:2], atol=1e-6)
@@ -245,13 +266,18 @@ def test_a_short_record_has_fewer_poles_or_is_refused():
     assert len(black_boxes(PHASORS, [in_phasors(u, 2 * u + 0j)])) == 1
     event = in_phasors(power_dip(), power_dip() + 0j)
     few = replace(event, start=event.record.samples - 6)
-    with pytest.raises(UserError, match=r"made: 6 samples from the dip on are too few .* needs 10; take a record that"):
+    with pytest.raises(
+        UserError,
+        match=r"made: 6 samples from the dip on are too few .* needs 10; take a record that",
+    ):
         best(PHASORS, [few], [])
 
 
 def test_a_constant_voltage_tells_nothing():
     event = in_waves(np.ones(1600), np.ones(1600))
-    with pytest.raises(UserError, match="the voltage of made does not change, and a network is known by"):
+    with pytest.raises(
+        UserError, match="the voltage of made does not change, and a network is known by"
+    ):
         best(WAVES, [event], [])
 
 

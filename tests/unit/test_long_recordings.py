@@ -1,4 +1,6 @@
-"""Recordings of hundreds of megabytes stay on the disk, and what is measured of them is read a block at a time."""
+"""Recordings of hundreds of megabytes stay on the disk, and what is measured of them is read a
+block at a time.
+"""
 
 import tracemalloc
 from dataclasses import replace
@@ -48,14 +50,24 @@ def peak(call):
 @pytest.mark.parametrize("name", ["a.cfg", "a.cff"])
 @pytest.mark.parametrize("kind", ["BINARY", "BINARY32", "FLOAT32"])
 def test_a_large_file_is_mapped(long, tmp_path, monkeypatch, kind, name):
-    whole = np.array([np.round(c.raw * 50) for c in long.channels]).astype("<f4" if kind == "FLOAT32" else "<i4")
-    made = replace(long, channels=[replace(c, raw=x, gain=0.02) for c, x in zip(long.channels, whole, strict=True)])
-    made = replace(made, channels=[replace(c, raw=c.raw.astype("<i2")) for c in made.channels] if kind == "BINARY" else
-                   made.channels)  # fmt: skip
+    whole = np.array([np.round(c.raw * 50) for c in long.channels]).astype(
+        "<f4" if kind == "FLOAT32" else "<i4"
+    )
+    made = replace(
+        long,
+        channels=[replace(c, raw=x, gain=0.02) for c, x in zip(long.channels, whole, strict=True)],
+    )
+    made = replace(
+        made,
+        channels=[replace(c, raw=c.raw.astype("<i2")) for c in made.channels]
+        if kind == "BINARY"
+        else made.channels,
+    )
     paths = comtrade.write(made, tmp_path / name, kind)
     size = sum(path.stat().st_size for path in paths)
     monkeypatch.setattr(comtrade_samples, "LARGE", size // 2)
-    assert peak(lambda: comtrade.load(tmp_path / name)) < size  # time stamps and numbers of samples are looked at
+    # time stamps and numbers of samples are looked at
+    assert peak(lambda: comtrade.load(tmp_path / name)) < size
     read = comtrade.load(tmp_path / name)
     assert all(mapped(c.raw) for c in read.channels)
     np.testing.assert_array_equal(read.channels[4].raw, made.channels[4].raw)
@@ -66,9 +78,13 @@ def test_a_large_file_is_mapped(long, tmp_path, monkeypatch, kind, name):
 def test_loads_are_measured_a_block_at_a_time(long):
     reader = build("data", {"name": "comtrade", "path": "made.cfg"})
     whole = sum(c.raw.nbytes for c in long.channels)
-    assert peak(lambda: overview(reader, long)) < 1.1 * whole  # all the waveforms at once took four times as much
+    # all the waveforms at once took four times as much
+    assert peak(lambda: overview(reader, long)) < 1.1 * whole
     [shown] = overview(reader, long)
-    assert [(e.what.kind, round(e.what.start), e.worth) for e in shown.events] == [("dip", 20, True), ("dip", 40, True)]
+    assert [(e.what.kind, round(e.what.start), e.worth) for e in shown.events] == [
+        ("dip", 20, True),
+        ("dip", 40, True),
+    ]
 
 
 def test_quality_takes_little_more_than_the_channel(long):
@@ -87,7 +103,9 @@ def test_loads_of_one_bus_share_what_was_tracked(long):
 
 def test_waves_are_the_sums_that_the_connection_says(long):
     part = replace(long.segments[0], stop=1000)
-    lines = FeederWaves.of(long, replace(FEEDER, connection="line_voltages", reverse_current=True), part)
+    lines = FeederWaves.of(
+        long, replace(FEEDER, connection="line_voltages", reverse_current=True), part
+    )
     assert lines.shape == (6, 1000)
     channels = np.array([c.raw[:1000] for c in long.channels])
     np.testing.assert_allclose(lines[:, :], lines.sums @ channels, atol=1e-12)

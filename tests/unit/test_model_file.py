@@ -1,4 +1,6 @@
-"""A model's file may come from a stranger: values of a model are read, anything else is refused in a sentence."""
+"""A model's file may come from a stranger: values of a model are read, anything else is refused in
+a sentence.
+"""
 
 import pytest
 
@@ -37,14 +39,23 @@ def test_a_file_of_a_model_is_read_for_python(write):
 
 
 def test_a_file_may_begin_with_a_shipped_choice(write):
-    content = read_choice("model", str(write("defaults: [third_order_zip, _self_]\nfixed: {C: 0.9}\n")))
-    assert content == {"motor": {"name": "electromechanical"}, "static": {"name": "zip"}, "fixed": {"C": 0.9}}
+    content = read_choice(
+        "model", str(write("defaults: [third_order_zip, _self_]\nfixed: {C: 0.9}\n"))
+    )
+    assert content == {
+        "motor": {"name": "electromechanical"},
+        "static": {"name": "zip"},
+        "fixed": {"C": 0.9},
+    }
 
 
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("hydra: {callbacks: {x: {_target_: numpy.testing.measure}}}", "'hydra' is no key of a model"),
+        (
+            "hydra: {callbacks: {x: {_target_: numpy.testing.measure}}}",
+            "'hydra' is no key of a model",
+        ),
         ("defaults: [/hydra/launcher@hydra.launcher: x]", "its defaults have"),
         ("defaults: ['override /optimizer: pso']", "its defaults have override /optimizer"),
         ("defaults: [{/model/motor: electromechanical}]", "its defaults have"),
@@ -54,7 +65,10 @@ def test_a_file_may_begin_with_a_shipped_choice(write):
         ("effects: ['???']", "no references to others"),
         ("effects: !!python/object/apply:os.system [ls]", "not the YAML of a model"),
         ("a: &a [1]\nb: *a", "alias"),
-        ("fixed: " + "[" * (DEEPEST_VALUES + 5) + "]" * (DEEPEST_VALUES + 5), f"more than {DEEPEST_VALUES} levels"),
+        (
+            "fixed: " + "[" * (DEEPEST_VALUES + 5) + "]" * (DEEPEST_VALUES + 5),
+            f"more than {DEEPEST_VALUES} levels",
+        ),
         ("fixed: " + "[" * 100_000, f"more than {DEEPEST_VALUES} levels"),
         ("fixed: {1: 2}", "keys are names"),
         ("- a list", "must hold keys and values"),

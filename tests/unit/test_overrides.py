@@ -1,4 +1,6 @@
-"""Names of files and channels on the command line as they stand: what Hydra reads of them is what was meant."""
+"""Names of files and channels on the command line as they stand: what Hydra reads of them is what
+was meant.
+"""
 
 import shlex
 
@@ -8,13 +10,33 @@ from nasty import NASTY
 from omegaconf import OmegaConf
 
 from tractexp.errors import UserError
-from tractexp.overrides import build_typed_command, format_assignment, override, overrides, survey_of
+from tractexp.overrides import (
+    build_typed_command,
+    format_assignment,
+    override,
+    overrides,
+    survey_of,
+)
 
 FILES = [
-    "站北.cfg", "name (1).cfg", "a=b.cfg", "Ф1 #2.cfg", "{x}.cfg", "it's.cfg", "~/x.cfg", "[1].cfg", "a b.cfg",
+    "站北.cfg",
+    "name (1).cfg",
+    "a=b.cfg",
+    "Ф1 #2.cfg",
+    "{x}.cfg",
+    "it's.cfg",
+    "~/x.cfg",
+    "[1].cfg",
+    "a b.cfg",
     "C:\\x\\y.cfg",
-    'say "so".cfg', "100%.cfg", "back\\'slash.cfg", "plain.cfg", "folder/plain-2.cfg", "null (copy).csv", "ends[1]",
-]  # fmt: skip
+    'say "so".cfg',
+    "100%.cfg",
+    "back\\'slash.cfg",
+    "plain.cfg",
+    "folder/plain-2.cfg",
+    "null (copy).csv",
+    "ends[1]",
+]
 
 
 def read(argument):
@@ -27,7 +49,9 @@ def test_a_path_is_read_as_it_stands(name):
 
 
 @pytest.mark.parametrize("name", ["a,b.cfg", "[1,2].csv", "{a: b}"])
-def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(tmp_path, monkeypatch, name):
+def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(
+    tmp_path, monkeypatch, name
+):
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).touch()
     assert str(read(override(f"data.path={name}"))) == name
@@ -36,11 +60,15 @@ def test_a_file_that_is_there_is_meant_though_hydra_would_read_something_else(tm
 @pytest.mark.parametrize(
     "names",
     [
-        ["UA(kV)", "UB(kV)", "UC(kV)"], ["母线 Ua", "母线 Ub", "母线 Uc"],
-        ["Ia_2СШ-110_ВЛ_ВЛ2", "x", "y"], ["a b.csv", "站.csv"],
-        ["it's", "5'"], ["Ia [A]", "Ib [A]", "Ic [A]"], ["f(a,b)", "g"],
+        ["UA(kV)", "UB(kV)", "UC(kV)"],
+        ["母线 Ua", "母线 Ub", "母线 Uc"],
+        ["Ia_2СШ-110_ВЛ_ВЛ2", "x", "y"],
+        ["a b.csv", "站.csv"],
+        ["it's", "5'"],
+        ["Ia [A]", "Ib [A]", "Ic [A]"],
+        ["f(a,b)", "g"],
     ],
-)  # fmt: skip
+)
 def test_a_list_of_names_is_read_as_it_stands(names):
     assert read(override(f"data.voltages=[{','.join(names)}]")) == names
 
@@ -51,9 +79,20 @@ def test_numbers_of_channels_stay_numbers_beside_names():
 
 @pytest.mark.parametrize(
     "argument",
-    ["seed=3", "data=csv", "data.path='a b.cfg'", "data.train=[a.csv,'b c.csv']", "data.pre=0.5", "-m", "~data.pre",
-     "data.estimator={name: p_class}", "optimizer=issa,pso", "data.train=[[1],[2]]", "data.path="],
-)  # fmt: skip
+    [
+        "seed=3",
+        "data=csv",
+        "data.path='a b.cfg'",
+        "data.train=[a.csv,'b c.csv']",
+        "data.pre=0.5",
+        "-m",
+        "~data.pre",
+        "data.estimator={name: p_class}",
+        "optimizer=issa,pso",
+        "data.train=[[1],[2]]",
+        "data.path=",
+    ],
+)
 def test_what_hydra_reads_is_left_alone(argument):
     assert override(argument) == argument
 
@@ -72,7 +111,9 @@ def composed(words):
         yield OmegaConf.to_container(OmegaConf.create({"a": read(word)}), resolve=True)["a"]
 
 
-@pytest.mark.parametrize("name", [name for name in NASTY if name and name.isprintable() and name != "???"])
+@pytest.mark.parametrize(
+    "name", [name for name in NASTY if name and name.isprintable() and name != "???"]
+)
 def test_a_command_that_is_printed_means_the_name_that_it_holds(name):
     printed = shlex.split(build_typed_command({"name": "csv", "path": name, "train": [name, "b"]}))
     assert [*composed(printed[1:])] == ["csv", name, [name, "b"]]
@@ -87,7 +128,9 @@ def test_a_name_that_cannot_be_printed_is_refused_in_one_line(name):
     assert len(str(refused.value).splitlines()) == 1
 
 
-def test_an_interpolation_that_is_typed_stays_one_but_not_where_a_file_is_called_so(tmp_path, monkeypatch):
+def test_an_interpolation_that_is_typed_stays_one_but_not_where_a_file_is_called_so(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("PLACE", "there")
     name = "${oc.env:PLACE} (1).csv"

@@ -1,4 +1,6 @@
-"""One vocabulary of phases: whatever a table or a recording calls them, 110 kV, 20 MW and 8 Mvar come out."""
+"""One vocabulary of phases: whatever a table or a recording calls them, 110 kV, 20 MW and 8 Mvar
+come out.
+"""
 
 import numpy as np
 import pytest
@@ -33,7 +35,15 @@ def slow(seconds=20.0, rate=50.0):
 
 
 def read(path, header, columns):
-    np.savetxt(path, np.array(columns).T, delimiter=",", header=header, comments="", fmt="%.5f", encoding="utf-8")
+    np.savetxt(
+        path,
+        np.array(columns).T,
+        delimiter=",",
+        header=header,
+        comments="",
+        fmt="%.5f",
+        encoding="utf-8",
+    )
     event = tractexp.read(path)[0]
     base = event.record.base
     return (base.voltage, event.P0 * base.power, event.Q0 * base.power), event.record.notes
@@ -60,7 +70,9 @@ def test_columns_of_magnitudes(tmp_path, order):
         assert got == pytest.approx(SIZE, rel=0.01), names
     for form in GROUND:
         name = form.format(order[0])
-        got, _ = read(tmp_path / "a.csv", f"t,{name} (kV),P (MW),Q (Mvar)", [t, U / np.sqrt(3), P, Q])
+        got, _ = read(
+            tmp_path / "a.csv", f"t,{name} (kV),P (MW),Q (Mvar)", [t, U / np.sqrt(3), P, Q]
+        )
         assert got == pytest.approx(SIZE, rel=0.01), name
 
 
@@ -74,7 +86,10 @@ def test_phasors_of_line_voltages(tmp_path, order, form):
     for kept in ([0, 1, 2], [0, 1]):  # two say the third
         header, columns = "t", [t]
         voltages = [(names[k], "kV", lines[k]) for k in kept]
-        for name, unit, z in (*voltages, *((f"I {mark}", "kA", I[k]) for k, mark in enumerate(order))):
+        for name, unit, z in (
+            *voltages,
+            *((f"I {mark}", "kA", I[k]) for k, mark in enumerate(order)),
+        ):
             header += f",{name} mag ({unit}),{name} ang (deg)"
             columns += [np.abs(z), np.degrees(np.angle(z))]
         got, _ = read(tmp_path / "a.csv", header, columns)
@@ -90,25 +105,42 @@ def test_channels_of_a_recording(tmp_path, order):
     I = np.conj((20 + 8j) / (3 * 110 / np.sqrt(3)) * u) * turn
     for form in ("U {}-{}", "V{}{}", "U_{}_{}", "U{}-U{}"):
         names = [form.format(*pair) for pair in pairs(order)] + [f"I {mark}" for mark in order]
-        values = np.sqrt(2) * np.real(np.concatenate([V - V[[1, 2, 0]], I]) * np.exp(2j * np.pi * 50 * t))
+        values = np.sqrt(2) * np.real(
+            np.concatenate([V - V[[1, 2, 0]], I]) * np.exp(2j * np.pi * 50 * t)
+        )
         channels = [
-            Channel(name, np.round(x / np.abs(x).max() * 30000).astype(np.int16), "kV" if k < 3 else "kA",
-                    "voltage" if k < 3 else "current", gain=np.abs(x).max() / 30000)
+            Channel(
+                name,
+                np.round(x / np.abs(x).max() * 30000).astype(np.int16),
+                "kV" if k < 3 else "kA",
+                "voltage" if k < 3 else "current",
+                gain=np.abs(x).max() / 30000,
+            )
             for k, (name, x) in enumerate(zip(names, values, strict=True))
-        ]  # fmt: skip
+        ]
         made = Recording("made", channels, [Segment(0, len(t), 1600.0, 0.0)], 50.0, "s", "r")
         path = next(p for p in comtrade.write(made, tmp_path / "a.cfg") if p.suffix == ".cfg")
         event = tractexp.read(path)[0]
         base = event.record.base
-        assert (base.voltage, event.P0 * base.power, event.Q0 * base.power) == pytest.approx(SIZE, rel=0.01), names
+        assert (base.voltage, event.P0 * base.power, event.Q0 * base.power) == pytest.approx(
+            SIZE, rel=0.01
+        ), names
 
 
 def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
     t, U, P, Q = slow()
     I = 1000 * np.hypot(P, Q) / (np.sqrt(3) * U)
-    got, notes = read(tmp_path / "a.csv", "t,Voltage (kV),Current (A),P (MW),Q (Mvar)", [t, U / np.sqrt(3), I, P, Q])
+    got, notes = read(
+        tmp_path / "a.csv",
+        "t,Voltage (kV),Current (A),P (MW),Q (Mvar)",
+        [t, U / np.sqrt(3), I, P, Q],
+    )
     assert got == pytest.approx(SIZE, rel=0.01)
     assert any("P and Q are the product" in note for note in notes)
-    got, notes = read(tmp_path / "a.csv", "t,Ua (kV),Ub (kV),Uc (kV),P (MW),Q (Mvar)", [t, U, U, U, P, Q])
+    got, notes = read(
+        tmp_path / "a.csv", "t,Ua (kV),Ub (kV),Uc (kV),P (MW),Q (Mvar)", [t, U, U, U, P, Q]
+    )
     assert got == pytest.approx(SIZE, rel=0.01)
-    assert any("110 kV is near a nominal voltage, and times sqrt(3) near none" in note for note in notes)
+    assert any(
+        "110 kV is near a nominal voltage, and times sqrt(3) near none" in note for note in notes
+    )

@@ -1,4 +1,6 @@
-"""Phasors of synthetic three-phase waveforms against the amplitudes and angles they were made of."""
+"""Phasors of synthetic three-phase waveforms against the amplitudes and angles they
+were made of.
+"""
 
 import numpy as np
 import pytest
@@ -48,13 +50,17 @@ def test_tracking_follows_a_ramp_of_frequency(f):
     angle = 2 * np.pi * (f * t + slope * t**2 / 2)
     voltages = np.cos(angle - 2 * np.pi / 3 * np.arange(3)[:, None])
     middle = (t > 0.1) & (t < 0.9)
-    np.testing.assert_allclose(track(voltages, rate, 50.0)[middle], (f + slope * t)[middle], atol=1e-3)
+    np.testing.assert_allclose(
+        track(voltages, rate, 50.0)[middle], (f + slope * t)[middle], atol=1e-3
+    )
 
 
 def test_harmonics_and_offset_vanish_at_nominal_frequency():
     t = seconds(3200.0)
     k = np.arange(3)[:, None]
-    distorted = waves(PHASES, 50.0, t) + 2 + 5 * np.cos(5 * (2 * np.pi * 50 * t - 2 * np.pi / 3 * k))
+    distorted = (
+        waves(PHASES, 50.0, t) + 2 + 5 * np.cos(5 * (2 * np.pi * 50 * t - 2 * np.pi / 3 * k))
+    )
     X = fundamental(distorted, 3200.0, 50.0, inside(3200.0, len(t)))
     np.testing.assert_allclose(X, PHASES[:, None] * np.ones(X.shape[1]), rtol=1e-11)
 
@@ -63,24 +69,32 @@ def test_harmonics_and_offset_vanish_at_nominal_frequency():
 def test_five_percent_fifth_harmonic_off_nominal_leaks_less_than_a_thousandth(f):
     t = seconds(3200.0)
     k = np.arange(3)[:, None]
-    distorted = waves(PHASES, f, t) + 5 * np.sqrt(2) * np.cos(5 * (2 * np.pi * f * t - 2 * np.pi / 3 * k))
+    distorted = waves(PHASES, f, t) + 5 * np.sqrt(2) * np.cos(
+        5 * (2 * np.pi * f * t - 2 * np.pi / 3 * k)
+    )
     X = fundamental(distorted, 3200.0, f, inside(3200.0, len(t)))
     assert np.abs(X - PHASES[:, None]).max() < 1e-3 * 100
 
 
 def test_plain_window_of_nominal_length_would_leak_far_more():
-    """Negative control: the accuracy above comes from the adapted window, not from an easy signal."""
+    """Negative control: the accuracy above comes from the adapted window, not from an
+    easy signal.
+    """
     f, N = 51.7, 64
     x = waves(PHASES[:1], f, seconds(3200.0))[0]
     n = np.arange(N)
-    plain = np.array([x[i : i + N] @ np.exp(-2j * np.pi * n / N) for i in range(400)]) * np.sqrt(2) / N
+    plain = (
+        np.array([x[i : i + N] @ np.exp(-2j * np.pi * n / N) for i in range(400)]) * np.sqrt(2) / N
+    )
     assert np.ptp(np.abs(plain)) > 1.0
 
 
 def test_sequences_are_separated():
     a = np.exp(2j * np.pi / 3)
     V1, V2 = 3.0 - 1.0j, 0.4 + 0.2j
-    positive, negative = sequences(np.array([[V1 + V2], [a**2 * V1 + a * V2], [a * V1 + a**2 * V2]]))
+    positive, negative = sequences(
+        np.array([[V1 + V2], [a**2 * V1 + a * V2], [a * V1 + a**2 * V2]])
+    )
     np.testing.assert_allclose([positive[0], negative[0]], [V1, V2], rtol=1e-14)
 
 
@@ -88,7 +102,11 @@ def test_sequences_are_separated():
 def test_power_is_three_v_conjugate_i_and_positive_when_consumed(f):
     lag = np.exp(-1j * np.deg2rad(30))
     balanced = np.exp(-2j * np.pi / 3 * np.arange(3))
-    made = measure(waves(np.concatenate([100 * balanced, 0.2 * lag * balanced]), f, seconds(3200.0)), 3200.0, 50.0)
+    made = measure(
+        waves(np.concatenate([100 * balanced, 0.2 * lag * balanced]), f, seconds(3200.0)),
+        3200.0,
+        50.0,
+    )
     np.testing.assert_allclose(made.S, 60 * np.exp(1j * np.deg2rad(30)), rtol=1e-7)
     np.testing.assert_allclose(made.f, f, atol=1e-5)
     np.testing.assert_allclose(np.abs(made.V2), 0, atol=1e-5)
@@ -140,7 +158,9 @@ def test_a_waveform_must_span_its_estimators_window_and_one_phasor_more():
 
 
 def three_phase(f, t, lag=0.5, distortion=0.0, noise=0.0, seed=0):
-    """Waves (6, N) of 1 kV and 1 kA, with this share of third, fifth and seventh harmonic together, and noise."""
+    """Waves (6, N) of 1 kV and 1 kA, with this share of third, fifth and seventh harmonic together,
+    and noise.
+    """
     rng, k = np.random.default_rng(seed), np.arange(3)[:, None]
     x = []
     for angle in (0.0, -lag):
@@ -157,10 +177,14 @@ def test_phasors_do_not_depend_on_the_blocks_they_are_measured_in(block):
     """A jump of the angle, a dip and a ramp of frequency lie across the cuts."""
     t = seconds(4000.0, 2.0)
     turned = 0.3 * (t > 0.7) + np.pi * 0.8 * t**2
-    x = three_phase(50.3, t + turned / (2 * np.pi * 50.3), 0.4, 0.03, 1e-3) * np.where(abs(t - 1.1) < 0.2, 0.4, 1.0)
+    x = three_phase(50.3, t + turned / (2 * np.pi * 50.3), 0.4, 0.03, 1e-3) * np.where(
+        abs(t - 1.1) < 0.2, 0.4, 1.0
+    )
     whole, cut = (measure(x, 4000.0, 50.0, harmonics=(3, 5), block=n) for n in (1 << 20, block))
     for name in ("t", "V", "I", "f"):
-        np.testing.assert_allclose(getattr(cut, name), getattr(whole, name), rtol=1e-9, atol=1e-9, err_msg=name)
+        np.testing.assert_allclose(
+            getattr(cut, name), getattr(whole, name), rtol=1e-9, atol=1e-9, err_msg=name
+        )
     for name, values in whole.more.items():
         np.testing.assert_allclose(cut.more[name], values, rtol=1e-7, atol=1e-9, err_msg=name)
 

@@ -25,7 +25,9 @@ def test_a_page_with_charts_is_small_and_one_without_carries_no_library(tmp_path
 
 
 def test_the_part_keeps_its_license_its_lines_and_bars_and_no_map(whole):
-    part = gzip.decompress(base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', script())[1])).decode()
+    part = gzip.decompress(
+        base64.b64decode(re.search(r'run\("([\w+/=]+)"\)', script())[1])
+    ).decode()
     assert part.startswith(plotly.select_needed_modules(whole))
     assert part[:200] == whole[:200]
     assert "Licensed under the MIT license" in part[:200]

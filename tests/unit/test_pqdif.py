@@ -25,7 +25,9 @@ def waves(count=COUNT, rate=RATE):
     t = np.arange(count) / rate
     turn = np.exp(1j * (2 * np.pi * F * t - 2 * np.pi / 3 * np.arange(3)[:, None]))
     depth = np.sqrt(2) * np.where((t >= 0.4) & (t < 0.6), 0.7, 1.0)
-    return np.vstack([1e3 * KILOVOLT * turn.real * depth, AMPERE * (turn * np.exp(-1j * LAG)).real * depth])
+    return np.vstack(
+        [1e3 * KILOVOLT * turn.real * depth, AMPERE * (turn * np.exp(-1j * LAG)).real * depth]
+    )
 
 
 DEFINITIONS = [
@@ -39,7 +41,9 @@ def instances(values=None, rate=RATE):
     values = waves() if values is None else values
     scales = [SCALE["V"]] * 3 + [SCALE["A"]] * 3
     return [
-        made.instance(k, 0 if k else [1, len(row), 1 / rate], np.round((row - 7) / scale), scale, 7.0)
+        made.instance(
+            k, 0 if k else [1, len(row), 1 / rate], np.round((row - 7) / scale), scale, 7.0
+        )
         for k, (row, scale) in enumerate(zip(values, scales, strict=True))
     ]
 
@@ -63,8 +67,9 @@ def write(tmp_path):
 def test_waveforms_are_read_in_volts_and_amperes_at_their_times(write, compressed):
     recording = pqdif.load(write(waveform_file(compressed=compressed)))
     assert [(c.name, c.unit, c.quantity, c.phase) for c in recording.channels] == [
-        *((f"V{m}", "V", "voltage", m) for m in "ABC"), *((f"I{m}", "A", "current", m) for m in "ABC")
-    ]  # fmt: skip
+        *((f"V{m}", "V", "voltage", m) for m in "ABC"),
+        *((f"I{m}", "A", "current", m) for m in "ABC"),
+    ]
     for channel, row, step in zip(recording.channels, waves(), [2.0] * 3 + [0.05] * 3, strict=True):
         np.testing.assert_allclose(channel.raw, row, atol=0.51 * step)
         np.testing.assert_allclose(channel.values(), 1e-3 * channel.raw)
@@ -89,8 +94,11 @@ def test_transformer_ratios_are_applied_where_the_settings_say_so(write):
     ratios = dict.fromkeys(range(3), (110e3, 100.0)) | dict.fromkeys(range(3, 6), (600.0, 5.0))
     peaks = {}
     for use in (True, False):
-        content = [made.source(*DEFINITIONS), made.settings(ratios=ratios, use=use),
-                   made.observation(START, *instances())]  # fmt: skip
+        content = [
+            made.source(*DEFINITIONS),
+            made.settings(ratios=ratios, use=use),
+            made.observation(START, *instances()),
+        ]
         recording = pqdif.load(write(made.file(content)))
         peaks[use] = [recording.channels[k].values().max() for k in (0, 3)]
     np.testing.assert_allclose(peaks[True], [1100 * peaks[False][0], 120 * peaks[False][1]])
@@ -99,7 +107,9 @@ def test_transformer_ratios_are_applied_where_the_settings_say_so(write):
 def test_runs_of_steps_are_segments_of_their_rates(write):
     times = [2, 400, 1 / 6400, 300, 1 / 800]
     rows = [made.instance(k, times, np.arange(700) % 50, dtype="<f4") for k in range(6)]
-    recording = pqdif.load(write(made.file([made.source(*DEFINITIONS), made.observation(START, *rows)])))
+    recording = pqdif.load(
+        write(made.file([made.source(*DEFINITIONS), made.observation(START, *rows)]))
+    )
     assert [s.rate for s in recording.segments] == pytest.approx([6400, 800], rel=1e-6)
     assert recording.segments[1].start == pytest.approx(400 / 6400, abs=2 / 800)
     np.testing.assert_array_equal(recording.channels[2].raw, np.arange(700) % 50)
@@ -122,7 +132,10 @@ def test_observations_are_segments_at_their_distance_and_others_are_left_out_wit
 
 def test_currents_at_half_the_rate_are_brought_together_with_the_voltages(write):
     values = waves()
-    slow = [made.instance(k, [1, COUNT // 2, 2 / RATE], values[k, ::2], dtype="<f4") for k in range(3, 6)]
+    slow = [
+        made.instance(k, [1, COUNT // 2, 2 / RATE], values[k, ::2], dtype="<f4")
+        for k in range(3, 6)
+    ]
     records = [made.source(*DEFINITIONS), made.observation(START, *instances()[:3], *slow)]
     recording = pqdif.load(write(made.file(records)))
     [segment] = recording.segments
@@ -135,25 +148,41 @@ def test_currents_at_half_the_rate_are_brought_together_with_the_voltages(write)
 def test_times_in_cycles_are_of_the_nominal_frequency(write):
     definitions = [made.definition(f"V{mark}", phase, "V", time="cycles") for phase, mark in PHASES]
     rows = [made.instance(k, [1, COUNT, F / RATE], waves()[k] / 2, 2.0) for k in range(3)]
-    content = made.file([made.source(*definitions), made.settings(50.0), made.observation(START, *rows)])
+    content = made.file(
+        [made.source(*definitions), made.settings(50.0), made.observation(START, *rows)]
+    )
     recording = pqdif.load(write(content))
     assert recording.segments[0].rate == pytest.approx(RATE, rel=1e-6)
     assert any("taken of 50 Hz" in note for note in recording.notes)
 
 
 def log_file(units=("V", "V", "V", "W", "var", "Hz"), times=None, more=()):
-    """Logs of RMS voltages to ground, total P and Q, f, every 10 ms, with a dip to 0.7 from 3 to 3.2 s."""
+    """Logs of RMS voltages to ground, total P and Q, f, every 10 ms, with a dip to 0.7 from 3 to
+    3.2 s.
+    """
     t = np.arange(1000) / 100
     U = np.where((t >= 3) & (t < 3.2), 0.7, 1.0)
     columns = [15e3 * U, 15e3 * U, 15e3 * U, 12e6 * U**1.5, 4e6 * U**2, np.full(1000, 49.98)]
-    marks = [("RMS A", 1), ("RMS B", 2), ("RMS C", 3), ("Total P", 13), ("Total Q", 13), ("Frequency", 0)]
-    what = {"W": "a6b31ae1-b451-11d1-ae17-0060083a2628", "var": "a6b31ae4-b451-11d1-ae17-0060083a2628",
-            "Hz": "07ef68af-9ff5-11d2-b30b-006008b37183"}  # fmt: skip
+    marks = [
+        ("RMS A", 1),
+        ("RMS B", 2),
+        ("RMS C", 3),
+        ("Total P", 13),
+        ("Total Q", 13),
+        ("Frequency", 0),
+    ]
+    what = {
+        "W": "a6b31ae1-b451-11d1-ae17-0060083a2628",
+        "var": "a6b31ae4-b451-11d1-ae17-0060083a2628",
+        "Hz": "07ef68af-9ff5-11d2-b30b-006008b37183",
+    }
     definitions = [
         made.definition(name, phase, unit, "log", scaled=False, characteristic=what.get(unit))
         for (name, phase), unit in zip(marks, units, strict=True)
     ]
-    rows = [made.instance(k, times or [1, 1000, 0.01], v, dtype="<f8") for k, v in enumerate(columns)]
+    rows = [
+        made.instance(k, times or [1, 1000, 0.01], v, dtype="<f8") for k, v in enumerate(columns)
+    ]
     return made.file([made.source(*definitions), made.observation(START, *rows), *more])
 
 
@@ -163,7 +192,10 @@ def test_logs_of_rms_values_and_powers_are_a_table(write):
     [event] = tractexp.read(str(path))
     assert event.record.base.voltage == pytest.approx(np.sqrt(3) * 15, rel=1e-6)
     assert event.record.base.power == pytest.approx(np.hypot(12, 4), rel=1e-6)
-    assert pytest.approx((12 / np.hypot(12, 4), 4 / np.hypot(12, 4)), rel=1e-6) == (event.P0, event.Q0)
+    assert pytest.approx((12 / np.hypot(12, 4), 4 / np.hypot(12, 4)), rel=1e-6) == (
+        event.P0,
+        event.Q0,
+    )
     assert event.depth == pytest.approx(0.3, rel=1e-6)
     assert event.t_start == pytest.approx(3.0, abs=0.011)
     np.testing.assert_allclose(event.record.f, 49.98)
@@ -177,7 +209,11 @@ def test_a_file_of_one_kind_says_how_the_other_is_read(write):
 
 
 def test_a_truncated_file_is_read_as_far_as_it_goes(write):
-    two = [made.source(*DEFINITIONS), made.observation(START, *instances()), made.observation(START, *instances())]
+    two = [
+        made.source(*DEFINITIONS),
+        made.observation(START, *instances()),
+        made.observation(START, *instances()),
+    ]
     whole = made.file(two)
     recording = pqdif.load(write(whole[:-100]))
     assert len(recording.segments) == 1
@@ -194,10 +230,24 @@ def changed(content, at, raw):
         (lambda: b"", "no PQDIF file"),
         (lambda: b"PK\3\4" + bytes(200), "no PQDIF file"),
         (lambda: waveform_file()[:200], "no waveforms"),
-        (lambda: changed(waveform_file(), waveform_file().rindex(b"PQDIF"), b"XXXXX"), "is no header of a record"),
-        (lambda: changed(waveform_file(), len(waveform_file()) - 400, bytes(300)), "compressed body is damaged"),
-        (lambda: changed(waveform_file(compressed=False), 64, struct.pack("<i", 10**6)), "more than fit into"),
-        (lambda: made.file([made.source(*DEFINITIONS[:2]), made.observation(START, *instances())]), "channel 2 is obs"),
+        (
+            lambda: changed(waveform_file(), waveform_file().rindex(b"PQDIF"), b"XXXXX"),
+            "is no header of a record",
+        ),
+        (
+            lambda: changed(waveform_file(), len(waveform_file()) - 400, bytes(300)),
+            "compressed body is damaged",
+        ),
+        (
+            lambda: changed(waveform_file(compressed=False), 64, struct.pack("<i", 10**6)),
+            "more than fit into",
+        ),
+        (
+            lambda: made.file(
+                [made.source(*DEFINITIONS[:2]), made.observation(START, *instances())]
+            ),
+            "channel 2 is obs",
+        ),
         (lambda: log_file(times=[1, 10**9, 1e-3]), "1000000000 of them, for 1000 values"),
         (lambda: log_file(times=[10**6, 1, 1]), "does not say how many"),
     ],
@@ -212,7 +262,7 @@ def test_damaged_files_are_refused_with_a_sentence(write, content, says):
     ("module", "name", "limit", "says"),
     [
         (pqdif_records, "LARGEST", 50_000, "hold more than 0 MB decompressed"),
-        (pqdif_channels, "MOST", 30_000, "stand for more than 30,000 values"),
+        (pqdif_channels, "MOST_UNPACKED_VALUES", 30_000, "stand for more than 30,000 values"),
     ],
 )
 def test_what_is_unpacked_is_bounded(write, monkeypatch, module, name, limit, says):
@@ -224,7 +274,8 @@ def test_what_is_unpacked_is_bounded(write, monkeypatch, module, name, limit, sa
 def test_a_collection_that_holds_itself_ends(write):
     content = bytearray(waveform_file(compressed=False))
     at = 64 + struct.unpack_from("<i", content, 36)[0] + 64  # the body of the data source
-    struct.pack_into("<i", content, at + 4 + 28 + 20, 0)  # its channel definitions are the body itself
+    # its channel definitions are the body itself
+    struct.pack_into("<i", content, at + 4 + 28 + 20, 0)
     struct.pack_into("<16s", content, at + 4 + 28, made.guid("b48d858d", "f5f5"))
     with pytest.raises(UserError, match=r"is observed, and 0 are defined|more than fit"):
         pqdif.load(write(bytes(content)))
@@ -271,7 +322,9 @@ def test_zeros_between_records_and_at_the_end_are_no_loss(write):
 @pytest.mark.parametrize("of", ["compressed", "body"])
 @pytest.mark.parametrize("sum_of", [zlib.crc32, zlib.adler32])
 @pytest.mark.parametrize("compressed", [True, False])
-def test_every_checksum_that_writers_use_is_accepted_and_another_is_told(write, compressed, sum_of, of):
+def test_every_checksum_that_writers_use_is_accepted_and_another_is_told(
+    write, compressed, sum_of, of
+):
     data, starts = four_observations(compressed=compressed)
     for k, at in enumerate(starts):
         header, size = struct.unpack_from("<ii", data, at + 32)

@@ -12,41 +12,78 @@ from tractexp import plugin, provenance
     [
         ([], ["task=discrepancy"], "tractexp task=discrepancy"),
         (["data=tibet", "seed=3"], ["task=plan"], "tractexp task=plan data=tibet"),
-        (["data=a", "data.train=[b c]"], ["task=plan", "data=d"], "tractexp task=plan data=d 'data.train=[b c]'"),
-        (["model/static=zip", "domain=waves", "optimizer=pso"], ["task=plan"],
-         "tractexp task=plan model/static=zip domain=waves"),
-        (["--config-dir", "conf", "model=own"], ["task=plan"], "tractexp task=plan --config-dir conf model=own"),
+        (
+            ["data=a", "data.train=[b c]"],
+            ["task=plan", "data=d"],
+            "tractexp task=plan data=d 'data.train=[b c]'",
+        ),
+        (
+            ["model/static=zip", "domain=waves", "optimizer=pso"],
+            ["task=plan"],
+            "tractexp task=plan model/static=zip domain=waves",
+        ),
+        (
+            ["--config-dir", "conf", "model=own"],
+            ["task=plan"],
+            "tractexp task=plan --config-dir conf model=own",
+        ),
         (["-m", "data=a,b"], ["task=plan"], "tractexp task=plan"),  # several in one line
     ],
-)  # fmt: skip
+)
 def test_records_and_load_of_a_run_are_repeated(monkeypatch, arguments, settings, expected):
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
     assert provenance.build_again_command(*settings) == expected
 
 
 def test_an_extended_model_is_fitted_to_the_records_of_its_run(monkeypatch):
-    arguments = ["--config-dir", "old", "data=archive", "data.path=my records", "model=old", "model.fixed.C=0.8"]
+    arguments = [
+        "--config-dir",
+        "old",
+        "data=archive",
+        "data.path=my records",
+        "model=old",
+        "model.fixed.C=0.8",
+    ]
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
     command = provenance.build_again_command("--config-dir", "conf", "model=extended", of=("data",))
-    assert command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
+    assert (
+        command == "tractexp --config-dir conf model=extended data=archive 'data.path=my records'"
+    )
 
 
 def test_a_long_command_is_told_by_the_folder_of_its_run(monkeypatch, tmp_path):
-    arguments = ["data=comtrade", "data.path=station.cfg", "data.train=[1]", "data.validate=[2]", "domain=waves"]
+    arguments = [
+        "data=comtrade",
+        "data.path=station.cfg",
+        "data.train=[1]",
+        "data.validate=[2]",
+        "domain=waves",
+    ]
     monkeypatch.setattr(provenance, "_started", ["tractexp", *arguments])
     monkeypatch.setattr(provenance, "_placed", [])
     monkeypatch.chdir(tmp_path)
     provenance.remember_folder(tmp_path / "outputs" / "run")
-    assert provenance.build_again_command("task=discrepancy") == "tractexp again outputs/run task=discrepancy"
-    assert provenance.build_again_command("model=extended", of=("data",)).startswith("tractexp model=extended data=comtrade")
+    assert (
+        provenance.build_again_command("task=discrepancy")
+        == "tractexp again outputs/run task=discrepancy"
+    )
+    assert provenance.build_again_command("model=extended", of=("data",)).startswith(
+        "tractexp model=extended data=comtrade"
+    )
     monkeypatch.setattr(provenance, "_started", ["tractexp", "data=tibet"])
-    assert provenance.build_again_command("task=discrepancy") == "tractexp task=discrepancy data=tibet"
+    assert (
+        provenance.build_again_command("task=discrepancy") == "tractexp task=discrepancy data=tibet"
+    )
 
 
-@pytest.mark.parametrize(("package", "line"), [("tractexp_plugins", 2), ("tractexp.api", 0), ("", 0)])
+@pytest.mark.parametrize(
+    ("package", "line"), [("tractexp_plugins", 2), ("tractexp.api", 0), ("", 0)]
+)
 def test_a_plugin_that_fails_is_named_by_file_and_line(tmp_path, package, line):
     """Not what fails in a task of our own, nor in what is no plugin."""
-    folder = Path(next((p.__path__[0] for p in plugin.packages() if p.__name__ == package), tmp_path))
+    folder = Path(
+        next((p.__path__[0] for p in plugin.packages() if p.__name__ == package), tmp_path)
+    )
     file, scope = folder / "breakaway_load.py", {}
     exec(compile("def edit():\n    return sympy.tanh(1)\n", str(file), "exec"), scope)
     with pytest.raises(NameError) as failed:

@@ -34,23 +34,34 @@ def write(folder, case, names, columns, each=10):
 
 def powers():
     return [("Vrms", "kV"), ("P", "MW"), ("Q", "MVAR"), ("Speed", "")], [
-        27.5 * DEPTH, 12 * DEPTH**1.5, 4 * DEPTH**2, np.ones(len(T))
-    ]  # fmt: skip
+        27.5 * DEPTH,
+        12 * DEPTH**1.5,
+        4 * DEPTH**2,
+        np.ones(len(T)),
+    ]
 
 
 def test_powers_are_read_by_their_names_and_units(tmp_path):
     [path] = write(tmp_path, "load case", *powers())
     assert reader_of(str(path)).name == "csv"
     [event] = tractexp.read(str(path))
-    assert (event.record.base.voltage, event.record.base.power) == pytest.approx((27.5, np.hypot(12, 4)))
-    assert pytest.approx((12 / np.hypot(12, 4), 4 / np.hypot(12, 4)), rel=1e-9) == (event.P0, event.Q0)
+    assert (event.record.base.voltage, event.record.base.power) == pytest.approx(
+        (27.5, np.hypot(12, 4))
+    )
+    assert pytest.approx((12 / np.hypot(12, 4), 4 / np.hypot(12, 4)), rel=1e-9) == (
+        event.P0,
+        event.Q0,
+    )
     assert event.depth == pytest.approx(0.3)
     assert event.t_start == pytest.approx(0.5, abs=2 * STEP)
 
 
 @pytest.mark.parametrize("each", [10, 4])
 def test_waveforms_of_vectors_in_several_files_are_one_recording(tmp_path, each):
-    volts, amperes = 15 * np.sqrt(2) * TURN.real * DEPTH, 0.3 * np.sqrt(2) * (TURN * np.exp(-0.4j)).real * DEPTH
+    volts, amperes = (
+        15 * np.sqrt(2) * TURN.real * DEPTH,
+        0.3 * np.sqrt(2) * (TURN * np.exp(-0.4j)).real * DEPTH,
+    )
     names = [*((f"Vabc:{k}", "kV") for k in (1, 2, 3)), *((f"Iabc:{k}", "kA") for k in (1, 2, 3))]
     paths = write(tmp_path, "emt", names, [*volts, *amperes], each)
     assert len(paths) == (2 if each == 4 else 1)
@@ -64,7 +75,9 @@ def test_waveforms_of_vectors_in_several_files_are_one_recording(tmp_path, each)
 def test_a_file_without_its_names_is_refused_with_where_they_would_be(tmp_path):
     [path] = write(tmp_path, "case", *powers())
     (tmp_path / "case.inf").unlink()
-    with pytest.raises(UserError, match=r"PSCAD writes them to case\.inf beside it, which is not there"):
+    with pytest.raises(
+        UserError, match=r"PSCAD writes them to case\.inf beside it, which is not there"
+    ):
         tractexp.read(str(path))
 
 
@@ -82,7 +95,8 @@ def test_a_file_of_another_run_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "content", [b"", b"title\n", b"\0\1\2\3" * 50, b"title\n a b c\n", b"t\n 0 1 2 3 4\n 1e-3 1 x 3 4\n"]
+    "content",
+    [b"", b"title\n", b"\0\1\2\3" * 50, b"title\n a b c\n", b"t\n 0 1 2 3 4\n 1e-3 1 x 3 4\n"],
 )
 def test_damaged_files_end_in_a_sentence(tmp_path, content):
     [path] = write(tmp_path, "case", *powers())

@@ -41,7 +41,9 @@ def test_noise_of_a_lowpass_is_coloured_and_a_differenced_one_blue(seed):
 @pytest.mark.parametrize("f", [48.7, 50.0, 51.3])
 def test_neither_frequency_nor_drift_nor_harmonics_pass_for_noise(f):
     x = wave(T, KV * np.linspace(1, 1.002, len(T))[None], f)[0]
-    x += 0.03 * KV * np.sqrt(2) * np.cos(2 * np.pi * 5 * f * T) + 0.04 * KV * np.sqrt(2) * np.cos(2 * np.pi * 7 * f * T)
+    x += 0.03 * KV * np.sqrt(2) * np.cos(2 * np.pi * 5 * f * T) + 0.04 * KV * np.sqrt(2) * np.cos(
+        2 * np.pi * 7 * f * T
+    )
     made = of(x + KV * noise(len(T), 1e-4))
     assert made.thd == pytest.approx(0.05, rel=0.02)
     assert made.noise == pytest.approx(1e-4 * KV, rel=0.2)
@@ -88,7 +90,12 @@ def test_an_unclipped_wave_is_not_clipped(rate):
     t = np.arange(round(2 * rate)) / rate
     for f in (16.7, 50.0, 60.0):
         assert of(np.sqrt(2) * KV * np.cos(2 * np.pi * f * t), rate).clipped == 0
-        assert of(np.round(30000 * np.cos(2 * np.pi * f * t)).astype(np.int16), rate, gain=0.01).clipped < 1e-3
+        assert (
+            of(
+                np.round(30000 * np.cos(2 * np.pi * f * t)).astype(np.int16), rate, gain=0.01
+            ).clipped
+            < 1e-3
+        )
 
 
 def test_clipping_at_the_limits_of_the_converter():
@@ -119,7 +126,12 @@ def test_jitter_and_holes_of_the_time_stamps():
 
 
 @pytest.mark.parametrize(
-    ("rate", "says"), [(100.0, "no waveform"), (600.0, "too slow for waves"), (4000.0, "fit for phasors and for waves")]
+    ("rate", "says"),
+    [
+        (100.0, "no waveform"),
+        (600.0, "too slow for waves"),
+        (4000.0, "fit for phasors and for waves"),
+    ],
 )
 def test_what_a_rate_is_fit_for(rate, says):
     t = np.arange(round(2 * rate)) / rate
@@ -143,7 +155,9 @@ def test_channels_of_the_220_kv_station(shared_data):
 
 
 class TestCalm:
-    """Quality is that of the state before anything happens, however short it is and whatever comes after it."""
+    """Quality is that of the state before anything happens, however short it is and whatever comes
+    after it.
+    """
 
     def faulted(self, start, factor, decay, seed=0):
         after = start <= T
@@ -167,7 +181,9 @@ class TestCalm:
         values = 0.35 / KV * CLEAN * fault + np.where(after, 10 * np.exp(-(T - start) / 0.06), 0.0)
         channel = Channel("Ia", values + 3e-4 * noise(len(T), 1.0, 1), "kA", "current")
         made = quality(
-            Recording("made.cfg", [channel], [Segment(0, len(T), RATE, 0.0)]), 0, Segment(0, len(T), RATE, 0)
+            Recording("made.cfg", [channel], [Segment(0, len(T), RATE, 0.0)]),
+            0,
+            Segment(0, len(T), RATE, 0),
         )
         assert made.level == pytest.approx(0.35, rel=5e-3)
         assert made.noise == pytest.approx(3e-4, rel=0.5)

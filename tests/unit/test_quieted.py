@@ -11,7 +11,9 @@ NOISE = 1e-3
 
 
 def dip(share=0.5):
-    """A departure from the periodic course: positive and negative sequence that come and go at once."""
+    """A departure from the periodic course: positive and negative sequence that come and go at
+    once.
+    """
     there = (T > 0.2) & (T < 0.3)
     return there * (share * np.exp(2j * np.pi * F * T) + 0.2 * np.exp(-2j * np.pi * F * T))
 
@@ -24,9 +26,13 @@ def noise(seed):
 def test_what_turns_with_the_voltage_either_way_is_kept_whole():
     for way in (1, -1):
         turning = 0.3 * np.exp(2j * np.pi * way * F * T)
-        np.testing.assert_allclose(NoiseFilter.at(RATE, F)(turning, 2 * NOISE**2)[50:-50], turning[50:-50], atol=1e-7)
+        np.testing.assert_allclose(
+            NoiseFilter.at(RATE, F)(turning, 2 * NOISE**2)[50:-50], turning[50:-50], atol=1e-7
+        )
     slow = 0.1 * np.exp(-T / 0.05 + 2j * np.pi * F * T)
-    np.testing.assert_allclose(NoiseFilter.at(RATE, F)(slow, 2 * NOISE**2)[50:-50], slow[50:-50], atol=2e-5)
+    np.testing.assert_allclose(
+        NoiseFilter.at(RATE, F)(slow, 2 * NOISE**2)[50:-50], slow[50:-50], atol=2e-5
+    )
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
@@ -45,14 +51,16 @@ def test_an_edge_stays_where_it_is():
     assert off.max() < 5 * NOISE
     assert np.sqrt(np.mean(off[700:900] ** 2)) < 0.6 * NOISE * np.sqrt(2)
     sums = np.cumsum(NoiseFilter.at(RATE, F)(clean, 2 * NOISE**2) - clean) / RATE
-    assert np.abs(sums).max() < 1e-5  # s: an error of the flux, whose noise is 1e-3 s / sqrt(RATE) = 2e-5 s and grows
+    # s: an error of the flux, whose noise is 1e-3 s / sqrt(RATE) = 2e-5 s and grows
+    assert np.abs(sums).max() < 1e-5
 
 
 def test_what_is_louder_than_noise_is_no_noise():
     ring = 0.05 * np.exp(-T / 0.1) * np.exp(2j * np.pi * 900 * T)
     off = np.abs(NoiseFilter.at(RATE, F)(ring, 2 * NOISE**2) - ring)
     assert off[50:300].max() < 0.05 * 0.05
-    np.testing.assert_allclose(NoiseFilter.at(RATE, F)(dip(), 0.0), dip(), atol=1e-12)  # without noise nothing changes
+    # without noise nothing changes
+    np.testing.assert_allclose(NoiseFilter.at(RATE, F)(dip(), 0.0), dip(), atol=1e-12)
 
 
 def test_a_coarse_record_is_left_as_it_is():

@@ -1,4 +1,6 @@
-"""Names that somebody else chose are text wherever they stand: one list of nasty ones, every language."""
+"""Names that somebody else chose are text wherever they stand: one list of nasty ones, every
+language.
+"""
 
 import ast
 import csv
@@ -82,13 +84,22 @@ def test_markdown_has_the_name_in_one_line_and_ends_no_block(name):
 
 @pytest.mark.parametrize(
     ("text", "cell"),
-    [("=1+1", "'=1+1"), ("@SUM(A1)", "'@SUM(A1)"), ("-2+3", "'-2+3"), ("\t=1", "'\t=1"), ("a=1", "a=1"), ("", "")],
+    [
+        ("=1+1", "'=1+1"),
+        ("@SUM(A1)", "'@SUM(A1)"),
+        ("-2+3", "'-2+3"),
+        ("\t=1", "'\t=1"),
+        ("a=1", "a=1"),
+        ("", ""),
+    ],
 )
 def test_a_spreadsheet_takes_no_cell_for_a_formula(text, cell):
     assert quoting.cell(text) == cell
 
 
-@pytest.mark.parametrize("name", [name for name in NASTY if name.isprintable()] + ["a\nb", "a\r\nb", "\t"])
+@pytest.mark.parametrize(
+    "name", [name for name in NASTY if name.isprintable()] + ["a\nb", "a\r\nb", "\t"]
+)
 def test_a_row_of_csv_keeps_the_name_in_its_cell(name):
     ((first, second),) = csv.reader(io.StringIO(f"{quoting.csv(name)},1\r\n", newline=""))
     assert (first.removeprefix("'") if first != name else first, second) == (name, "1")

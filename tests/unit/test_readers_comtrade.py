@@ -25,8 +25,20 @@ def waveforms(t, f, dips):
     return np.sqrt(2) * np.concatenate([volts, amperes]).real * scale
 
 
-def write(folder, values, rates, kind="BINARY", side="P", encoding="utf-8", names=NAMES, units="VA", stamps=0.0):
-    """A COMTRADE 1999 pair. `rates` [(Hz, last sample)]; side S stores values on a 110000:100, 600:5 secondary."""
+def write(
+    folder,
+    values,
+    rates,
+    kind="BINARY",
+    side="P",
+    encoding="utf-8",
+    names=NAMES,
+    units="VA",
+    stamps=0.0,
+):
+    """A COMTRADE 1999 pair. `rates` [(Hz, last sample)]; side S stores values on a 110000:100,
+    600:5 secondary.
+    """
     ratios = [(110000.0, 100.0)] * 3 + [(600.0, 5.0)] * 3
     primary = np.array([p / s if side == "S" else 1.0 for p, s in ratios])
     stored = values / primary[:, None]
@@ -35,7 +47,9 @@ def write(folder, values, rates, kind="BINARY", side="P", encoding="utf-8", name
     lines = ["Umspannwerk,recorder,1999", "8,6A,2D"]
     for i, (label, (p, s)) in enumerate(zip(names, ratios, strict=True)):
         unit = units[0] if i < 3 else units[1]
-        lines.append(f"{i + 1},{label},{'ABC'[i % 3]},,{unit},{gain[i]:.12g},0,0,-32767,32767,{p},{s},{side}")
+        lines.append(
+            f"{i + 1},{label},{'ABC'[i % 3]},,{unit},{gain[i]:.12g},0,0,-32767,32767,{p},{s},{side}"
+        )
     lines += [
         "1,trip,,,0",
         "2,close,,,0",
@@ -47,8 +61,12 @@ def write(folder, values, rates, kind="BINARY", side="P", encoding="utf-8", name
     (folder / "station.cfg").write_bytes(("\r\n".join(lines) + "\r\n").encode(encoding))
     n = raw.shape[1]
     if kind == "ASCII":
-        rows = np.column_stack([np.arange(1, n + 1), np.zeros(n, int), raw.T, np.zeros((n, 2), int)])
-        (folder / "station.dat").write_text("\n".join(",".join(map(str, row)) for row in rows) + "\n")
+        rows = np.column_stack(
+            [np.arange(1, n + 1), np.zeros(n, int), raw.T, np.zeros((n, 2), int)]
+        )
+        (folder / "station.dat").write_text(
+            "\n".join(",".join(map(str, row)) for row in rows) + "\n"
+        )
     else:
         row = np.dtype([("n", "<u4"), ("t", "<u4"), ("a", "<i2", 6), ("d", "<u2")])
         table = np.zeros(n, row)
@@ -58,7 +76,13 @@ def write(folder, values, rates, kind="BINARY", side="P", encoding="utf-8", name
 
 
 def settings(path, **changed):
-    return {"name": "comtrade", "path": str(path), "voltages": [0, 1, 2], "currents": [3, 4, 5], **changed}
+    return {
+        "name": "comtrade",
+        "path": str(path),
+        "voltages": [0, 1, 2],
+        "currents": [3, 4, 5],
+        **changed,
+    }
 
 
 def read(path, **changed):
@@ -82,18 +106,26 @@ def test_what_was_written_is_read_back(tmp_path, kind, side, f):
     event = detect(record)
     assert record.base.voltage == pytest.approx(110, rel=1e-4)
     assert record.base.power == pytest.approx(abs(S0), rel=1e-4)
-    np.testing.assert_allclose([event.U0, event.P0, event.Q0], [1, np.cos(LAG), np.sin(LAG)], atol=2e-4)
+    np.testing.assert_allclose(
+        [event.U0, event.P0, event.Q0], [1, np.cos(LAG), np.sin(LAG)], atol=2e-4
+    )
     assert event.f0 == pytest.approx(f, abs=1e-3)
     assert event.depth == pytest.approx(0.4, abs=1e-3)
-    assert event.t_start == pytest.approx(0.5, abs=0.011)  # a one-cycle window first feels it half a cycle before
-    np.testing.assert_allclose((record.P + 1j * record.Q) / record.U**2, np.exp(1j * LAG), atol=0.06)
+    # a one-cycle window first feels it half a cycle before
+    assert event.t_start == pytest.approx(0.5, abs=0.011)
+    np.testing.assert_allclose(
+        (record.P + 1j * record.Q) / record.U**2, np.exp(1j * LAG), atol=0.06
+    )
 
 
 def test_dips_are_numbered_and_share_one_base(two_dips):
     events = read(two_dips)
     assert [r.name for r in (*events.train, *events.validate)] == ["station_dip1", "station_dip2"]
     first, second = detect(events.train[0]), detect(events.validate[0])
-    assert (first.depth, second.depth) == (pytest.approx(0.4, abs=1e-3), pytest.approx(0.2, abs=1e-3))
+    assert (first.depth, second.depth) == (
+        pytest.approx(0.4, abs=1e-3),
+        pytest.approx(0.2, abs=1e-3),
+    )
     assert events.train[0].base == events.validate[0].base
     assert events.train[0].t[-1] < 1.3
     assert events.validate[0].t[0] > 0.7
@@ -112,7 +144,9 @@ def test_channels_by_name_are_the_channels_by_number(two_dips):
 
 
 def test_a_reversed_current_changes_the_sign_of_the_power(two_dips):
-    np.testing.assert_array_equal(read(two_dips, reverse_current=True).train[0].P, -read(two_dips).train[0].P)
+    np.testing.assert_array_equal(
+        read(two_dips, reverse_current=True).train[0].P, -read(two_dips).train[0].P
+    )
 
 
 def test_window_lengths_are_kept(two_dips):
@@ -125,17 +159,29 @@ def test_window_lengths_are_kept(two_dips):
 def test_names_in_another_encoding_are_found(tmp_path):
     t = np.arange(4800) / 3200
     names = ["母线Ua", "母线Ub", "母线Uc", "主变Ia", "主变Ib", "主变Ic"]
-    path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4)]), [(3200, 4800)], encoding="gbk", names=names)
+    path = write(
+        tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4)]), [(3200, 4800)], encoding="gbk", names=names
+    )
     assert read(path, voltages=names[:3], currents=names[3:]).train[0].samples > 1000
 
 
 def test_segments_of_different_rates_never_share_a_window(tmp_path):
-    """A waveform, peak magnitudes at 50 Hz, then a waveform at half the rate: phasors stay clean at every edge."""
+    """A waveform, peak magnitudes at 50 Hz, then a waveform at half the rate: phasors stay clean at
+    every edge.
+    """
     parts, rates, start = [], [], 0.0
-    for rate, n, dips in ((3200, 3200, [(0.5, 0.6, 0.4)]), (50, 40, []), (1600, 1600, [(2.3, 2.4, 0.3)])):
+    for rate, n, dips in (
+        (3200, 3200, [(0.5, 0.6, 0.4)]),
+        (50, 40, []),
+        (1600, 1600, [(2.3, 2.4, 0.3)]),
+    ):
         t = start + np.arange(n) / rate
         wave = waveforms(t, 50.0, dips)
-        parts.append(wave if rate > 50 else np.repeat(np.abs(waveforms(np.zeros(1), 50.0, []))[:, :1], n, axis=1))
+        parts.append(
+            wave
+            if rate > 50
+            else np.repeat(np.abs(waveforms(np.zeros(1), 50.0, []))[:, :1], n, axis=1)
+        )
         rates.append((rate, (rates[-1][1] if rates else 0) + n))
         start = t[-1]
     path = write(tmp_path, np.concatenate(parts, axis=1), rates)
@@ -161,7 +207,10 @@ def test_a_gap_between_time_stamps_begins_a_segment(tmp_path):
     t = np.arange(6000) / 4000
     path = write(tmp_path, waveforms(t, 50.0, []), [(0, 6000)], stamps=np.where(t > 1, t + 0.01, t))
     recording = comtrade.load(path)
-    assert [(s.first, s.stop, s.rate) for s in recording.segments] == [(0, 4001, 4000.0), (4001, 6000, 4000.0)]
+    assert [(s.first, s.stop, s.rate) for s in recording.segments] == [
+        (0, 4001, 4000.0),
+        (4001, 6000, 4000.0),
+    ]
     assert recording.segments[1].start == pytest.approx(1.01025)
     assert "a new segment begins at 1.01025 s" in recording.notes[0]
 
@@ -180,15 +229,30 @@ class TestRefused:
             ({"path": ""}, "data.path is missing"),
             ({"train": []}, "data.train is empty"),
             ({"train": [1], "validate": [1]}, "name dip 1 twice"),
-            ({"train": [3]}, "there is no dip 3; the file has 2; dips that can be used: 1 at .*, 2 at"),
+            (
+                {"train": [3]},
+                "there is no dip 3; the file has 2; dips that can be used: 1 at .*, 2 at",
+            ),
             ({"validate": [0]}, "there is no dip 0"),
-            ({"voltages": [0, 1]}, r"data.voltages=\[0, 1\] must name three channels.* 0 'Ua' \[V\], 1 'Ub'"),
+            (
+                {"voltages": [0, 1]},
+                r"data.voltages=\[0, 1\] must name three channels.* 0 'Ua' \[V\], 1 'Ub'",
+            ),
             ({"currents": []}, r"data.currents=\[\] must name three channels"),
             ({"voltages": [0, 1, 1]}, "names a channel twice"),
-            ({"voltages": [0, 1, 6]}, "there is no channel 6 in .*station.cfg, which has 6, counted from 0"),
+            (
+                {"voltages": [0, 1, 6]},
+                "there is no channel 6 in .*station.cfg, which has 6, counted from 0",
+            ),
             ({"voltages": ["Ua", "Ub", "Ud"]}, "has no analog channel 'Ud'; did you mean 'U"),
-            ({"voltages": [3, 4, 5]}, "data.voltages: channel 3 'Ia' of .* is in A; choose voltages"),
-            ({"currents": [4, 5, 3]}, "data.currents are the phases B, C, A where data.voltages are A, B, C"),
+            (
+                {"voltages": [3, 4, 5]},
+                "data.voltages: channel 3 'Ia' of .* is in A; choose voltages",
+            ),
+            (
+                {"currents": [4, 5, 3]},
+                "data.currents are the phases B, C, A where data.voltages are A, B, C",
+            ),
             (
                 {"voltages": [1, 0, 2], "currents": [4, 3, 5]},
                 "data.voltages=.* the phases are not in the order a, b, c",
@@ -204,11 +268,19 @@ class TestRefused:
         ("old", "new", "says"),
         [
             ("8,6A,2D", "9,6A,2D", "line 2: announces 9 channels but 6 analog and 2 status ones"),
-            ("8,6A,2D", "9,7A,2D", "line 9: analog channel 7 of 7 'trip' has 5 fields, but an analog channel has 13"),
+            (
+                "8,6A,2D",
+                "9,7A,2D",
+                "line 9: analog channel 7 of 7 'trip' has 5 fields, but an analog channel has 13",
+            ),
             ("3200,6400", "3200,0", "line 13: last sample 0 must be above zero"),
             ("3200,6400", "-1,6400", "line 13: sampling rate '-1' is not between 0 and 1e9 Hz"),
             ("BINARY", "BINARY99", "data file type 'BINARY99' is not one of ASCII, BINARY"),
-            ("3200,6400", "3200,9000", "cut short: 9000 samples .* take 198000 bytes, and the file has 140800"),
+            (
+                "3200,6400",
+                "3200,9000",
+                "cut short: 9000 samples .* take 198000 bytes, and the file has 140800",
+            ),
             ("3200,6400", "400,6400", "sampled at 400 Hz: no waveform"),
         ],
     )
@@ -223,7 +295,8 @@ class TestRefused:
         dat = two_dips.with_suffix(".dat")
         dat.write_bytes(dat.read_bytes()[:100_000])
         with pytest.raises(
-            UserError, match=r"station.dat: cut short: 6400 samples .* take 140800 bytes, and .* 100000"
+            UserError,
+            match=r"station.dat: cut short: 6400 samples .* take 140800 bytes, and .* 100000",
         ):
             read(two_dips)
 
@@ -241,47 +314,61 @@ class TestRefused:
         dat = path.with_suffix(".dat")
         dat.write_text(dat.read_text().replace("\n7,", "\n7,x", 1))
         with pytest.raises(
-            UserError, match=r"station.dat: line 7: time stamp 'x0' is not a number, up to 1e38; correct it"
+            UserError,
+            match=r"station.dat: line 7: time stamp 'x0' is not a number, up to 1e38; correct it",
         ):
             read(path)
 
     def test_missing_files(self, two_dips):
-        with pytest.raises(UserError, match=r"staton.cfg: there is no such file; did you mean 'station.cfg'\?"):
+        with pytest.raises(
+            UserError, match=r"staton.cfg: there is no such file; did you mean 'station.cfg'\?"
+        ):
             read(two_dips.with_name("staton.cfg"))
         with pytest.raises(UserError, match=r"give the \.cfg file"):
             read(two_dips.with_suffix(".hdr"))
         two_dips.with_suffix(".dat").unlink()
         with pytest.raises(
-            UserError, match=r"station.dat: there is no such file; the data must lie beside station.cfg"
+            UserError,
+            match=r"station.dat: there is no such file; the data must lie beside station.cfg",
         ):
             read(two_dips)
 
     def test_missing_samples_are_named(self, two_dips):
         dat = two_dips.with_suffix(".dat")
         content = bytearray(dat.read_bytes())
-        content[22 * 99 + 8 : 22 * 99 + 10] = (0x8000).to_bytes(2, "little")  # "missing" in IEEE C37.111
+        # "missing" in IEEE C37.111
+        content[22 * 99 + 8 : 22 * 99 + 10] = (0x8000).to_bytes(2, "little")
         dat.write_bytes(content)
         with pytest.raises(UserError, match="channel 0 'Ua' has no value at sample 100"):
             read(two_dips)
 
     def test_no_dip(self, tmp_path):
         t = np.arange(4800) / 3200
-        with pytest.raises(UserError, match=r"no dip: the voltage starts at 110 and falls at most .* \(t = 1.4"):
+        with pytest.raises(
+            UserError, match=r"no dip: the voltage starts at 110 and falls at most .* \(t = 1.4"
+        ):
             read(write(tmp_path, waveforms(t, 50.0, []), [(3200, 4800)]))
 
     def test_a_dip_without_recovery_and_a_segment_too_short(self, tmp_path):
         t = np.arange(3200) / 3200
         path = write(tmp_path, waveforms(t, 50.0, [(0.5, 2.0, 0.4)]), [(3200, 3200)])
-        with pytest.raises(UserError, match=r"dip 1: the record is shorter than the dip.* dips that can be used: none"):
+        with pytest.raises(
+            UserError,
+            match=r"dip 1: the record is shorter than the dip.* dips that can be used: none",
+        ):
             read(path)
         path = write(tmp_path, waveforms(t[:100], 50.0, []), [(3200, 100)])
-        with pytest.raises(UserError, match=r"segment from 0.000 s: 100 samples at 3200 Hz are too short"):
+        with pytest.raises(
+            UserError, match=r"segment from 0.000 s: 100 samples at 3200 Hz are too short"
+        ):
             read(path)
 
     def test_a_dip_right_at_the_start(self, tmp_path):
         t = np.arange(3200) / 3200
         path = write(tmp_path, waveforms(t, 50.0, [(0.021, 0.3, 0.4)]), [(3200, 3200)])
-        with pytest.raises(UserError, match=r"the dip starts at sample .* needs at least 10 samples"):
+        with pytest.raises(
+            UserError, match=r"the dip starts at sample .* needs at least 10 samples"
+        ):
             read(path)
 
 
@@ -321,25 +408,40 @@ class TestRealRecordings:
         assert [s.rate for s in recording.segments] == [3200, 50, 3200, 50]
 
     @pytest.mark.parametrize(
-        ("currents", "P66", "exponent"), [([15, 16, 17], 4.87, 1.94), ([19, 20, 21], 5.90, 1.89)], ids=["VL2", "VL3"]
+        ("currents", "P66", "exponent"),
+        [([15, 16, 17], 4.87, 1.94), ([19, 20, 21], 5.90, 1.89)],
+        ids=["VL2", "VL3"],
     )
-    def test_feeders_of_the_110_kv_pole_slip_are_static_loads(self, shared_data, currents, P66, exponent):
+    def test_feeders_of_the_110_kv_pole_slip_are_static_loads(
+        self, shared_data, currents, P66, exponent
+    ):
         recording = comtrade.load(shared_data / "async110kv-wisp" / "async110.cfg")
         [segment] = recording.waveforms()
         chosen = [0, 1, 2, *currents]
         made = measure(recording.matrix(chosen, segment), segment.rate, 50.0)
         late = made.t > 7
         slope, level = np.polyfit(np.log(np.abs(made.V1[late]) / 66), np.log(made.S[late].real), 1)
-        assert (np.exp(level), slope) == (pytest.approx(P66, abs=0.01), pytest.approx(exponent, abs=0.01))
+        assert (np.exp(level), slope) == (
+            pytest.approx(P66, abs=0.01),
+            pytest.approx(exponent, abs=0.01),
+        )
         assert 48.0 < made.f[late].min() < made.f[late].max() < 51.8
-        swings = np.count_nonzero((np.abs(made.V1[1:]) < 62) & (np.abs(made.V1[:-1]) >= 62) & (made.t[1:] > 7.5))
-        assert sum(made.t[start] > 7.5 for start, _ in find_dips(made.t, np.abs(made.V1))) == swings > 5
+        swings = np.count_nonzero(
+            (np.abs(made.V1[1:]) < 62) & (np.abs(made.V1[:-1]) >= 62) & (made.t[1:] > 7.5)
+        )
+        assert (
+            sum(made.t[start] > 7.5 for start, _ in find_dips(made.t, np.abs(made.V1)))
+            == swings
+            > 5
+        )
         assert recording.channels[15].name == "Ia_2СШ-110_ВЛ_ВЛ2"  # CP1251 found by itself
 
     def test_dips_of_the_pole_slip_that_cannot_be_used_are_named(self, shared_data):
         path = shared_data / "async110kv-wisp" / "async110.cfg"
         events = read(path, voltages=[0, 1, 2], currents=[15, 16, 17])
-        refused = [note for note in events.train[0].notes if note.startswith("not used for validation")]
+        refused = [
+            note for note in events.train[0].notes if note.startswith("not used for validation")
+        ]
         said = f"{1 + len(events.validate) + len(refused)} dips"
         assert any(said in note for note in events.train[0].notes)
         assert "dip 1: the dip starts at sample" in refused[0]  # the file begins within a swing
@@ -351,7 +453,8 @@ class TestRealRecordings:
         assert (segment.stop, recording.frequency) == (2048, 60.0)
         chosen = [4, 5, 6, 0, 1, 2]
         made = measure(recording.matrix(chosen, segment), segment.rate, 60.0)
-        assert np.abs(made.V1).mean() * np.sqrt(3) == pytest.approx(0.6, rel=0.05)  # kV: a 600 V feeder
+        # kV: a 600 V feeder
+        assert np.abs(made.V1).mean() * np.sqrt(3) == pytest.approx(0.6, rel=0.05)
         np.testing.assert_allclose(made.f, 60, atol=0.1)
 
 
@@ -360,7 +463,9 @@ def test_a_file_whose_time_multiplier_is_wrong_says_so(tmp_path):
     path = write(tmp_path, waveforms(t, 50.0, [(0.5, 0.7, 0.4)]), [(0, 4800)], stamps=t)
     text = path.read_text().rstrip().rsplit("\n", 1)[0] + "\n1000\n"
     path.write_text(text)
-    with pytest.raises(UserError, match=r"sampled at 3.2 Hz: no waveform, .*the time multiplier 1000; if"):
+    with pytest.raises(
+        UserError, match=r"sampled at 3.2 Hz: no waveform, .*the time multiplier 1000; if"
+    ):
         build("data", {"name": "comtrade", "path": str(path)}).read()
     (file,) = tractexp.look(path).files
     assert any("no load was recognised: sampled at 3.2 Hz" in note for note in file["notes"])
@@ -368,6 +473,14 @@ def test_a_file_whose_time_multiplier_is_wrong_says_so(tmp_path):
 
 def test_a_file_without_voltages_says_so(tmp_path):
     t = np.arange(4800) / 3200
-    path = write(tmp_path, waveforms(t, 50.0, []), [(3200, 4800)], names=[f"n{k}" for k in range(6)], units=["Hz", "A"])
-    with pytest.raises(UserError, match=r"no channel is a voltage by its unit, of which there are 'A', 'Hz', or"):
+    path = write(
+        tmp_path,
+        waveforms(t, 50.0, []),
+        [(3200, 4800)],
+        names=[f"n{k}" for k in range(6)],
+        units=["Hz", "A"],
+    )
+    with pytest.raises(
+        UserError, match=r"no channel is a voltage by its unit, of which there are 'A', 'Hz', or"
+    ):
         build("data", {"name": "comtrade", "path": str(path)}).read()

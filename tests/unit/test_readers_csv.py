@@ -48,7 +48,9 @@ def with_cell(line, column, cell):
 class TestWhatIsRead:
     def test_columns_become_the_record(self):
         record = read()
-        np.testing.assert_array_equal(np.column_stack([record.t, record.U, record.P, record.Q]).round(9), rows())
+        np.testing.assert_array_equal(
+            np.column_stack([record.t, record.U, record.P, record.Q]).round(9), rows()
+        )
         assert (record.name, record.source, record.notes) == ("dip", "dip.csv", ())
         assert record.f is None
         assert detect(record).depth == pytest.approx(0.4)
@@ -56,7 +58,9 @@ class TestWhatIsRead:
     @pytest.mark.parametrize("mark", [",", ";", "\t"])
     def test_any_order_any_separator_comments_and_spare_columns(self, mark):
         table = rows()
-        wide = np.column_stack([table[:, [2, 0]], np.full(400, 7.0), table[:, [3, 1]], np.full(400, 49.9)])
+        wide = np.column_stack(
+            [table[:, [2, 0]], np.full(400, 7.0), table[:, [3, 1]], np.full(400, 49.9)]
+        )
         header = mark.join(["P", " t", "breaker", "Q ", "U", "f"])
         content = "# a recorder\n\n" + text(wide, header, mark).replace("\n", "  # remark\n", 3)
         record = read("\ufeff" + content)
@@ -67,14 +71,18 @@ class TestWhatIsRead:
     def test_kilovolts_and_megawatts_are_divided_by_the_base(self):
         table = rows() * [1, 27.5, 20, 20]
         record = read(text(table), base_voltage=27.5, base_power=20.0)
-        np.testing.assert_allclose(np.column_stack([record.U, record.P, record.Q]), rows()[:, 1:], atol=1e-6)
+        np.testing.assert_allclose(
+            np.column_stack([record.U, record.P, record.Q]), rows()[:, 1:], atol=1e-6
+        )
         assert (record.base.voltage, record.base.power) == (27.5, 20.0)
 
     def test_gaps_in_power_are_written_nan(self):
         assert np.isnan(read(with_cell(12, 2, "nan")).P[10])
 
     def test_a_sidecar_gives_name_and_note(self, here):
-        (here / "dip.json").write_text(json.dumps({"name": "Tuesday", "note": "synthetic stand-in", "truth": {}}))
+        (here / "dip.json").write_text(
+            json.dumps({"name": "Tuesday", "note": "synthetic stand-in", "truth": {}})
+        )
         record = read()
         assert record.name == "Tuesday"
         assert record.notes == ("synthetic stand-in",)
@@ -93,7 +101,9 @@ class TestWhatIsRead:
         for folder in ("a", "b"):
             (here / folder).mkdir()
             (here / folder / "dip.csv").write_text(text())
-        events = build("data", {"name": "csv", "train": ["a/dip.csv"], "validate": ["b/dip.csv"]}).read()
+        events = build(
+            "data", {"name": "csv", "train": ["a/dip.csv"], "validate": ["b/dip.csv"]}
+        ).read()
         assert [events.train[0].name, events.validate[0].name] == ["a/dip.csv", "b/dip.csv"]
 
 
@@ -102,7 +112,10 @@ class TestWhatIsRefused:
     @pytest.mark.parametrize(
         ("content", "says"),
         [
-            ("", r"dip.csv: the file is empty; it must start with a line naming the columns t,U,P,Q"),
+            (
+                "",
+                r"dip.csv: the file is empty; it must start with a line naming the columns t,U,P,Q",
+            ),
             ("# only a remark\n", "the file is empty"),
             ("t,U,P,Q\n", "there are no rows below the header line"),
             (
@@ -110,10 +123,19 @@ class TestWhatIsRefused:
                 "column t is missing; the header line names when, U, P, Q; .*data.columns={t: '",
             ),
             (text(header="t,U,P,X"), "column Q is missing"),
-            (text(rows()[:, [0, 1, 2, 3, 3]], "t,U,P,Q,Q"), "Q could be any of the columns 'Q', 'Q'; say which"),
+            (
+                text(rows()[:, [0, 1, 2, 3, 3]], "t,U,P,Q,Q"),
+                "Q could be any of the columns 'Q', 'Q'; say which",
+            ),
             (with_cell(5, 2, "abc"), "dip.csv: line 5, column P: 'abc' is not a number"),
-            (with_cell(5, 1, ""), "line 5, column U: the cell is empty; only P and Q may have gaps"),
-            (with_cell(5, 1, "#N/A"), "line 5, column U: '#N/A' stands for no value; only P and Q may have gaps"),
+            (
+                with_cell(5, 1, ""),
+                "line 5, column U: the cell is empty; only P and Q may have gaps",
+            ),
+            (
+                with_cell(5, 1, "#N/A"),
+                "line 5, column U: '#N/A' stands for no value; only P and Q may have gaps",
+            ),
             (with_cell(5, 1, "nan"), "dip.csv: line 5: U = nan is not a finite number"),
             (with_cell(5, 0, "0.002"), "line 5: time does not increase: t = 0.002 s after 0.002 s"),
             (with_cell(9, 1, "0"), "line 9: U = 0, but voltage must be above zero everywhere"),
@@ -124,10 +146,22 @@ class TestWhatIsRefused:
                 text(np.delete(rows(), 50, axis=0)),
                 "line 52: t advances by 0.002 s where 0.001 s is usual: rows are missing",
             ),
-            (text().replace(".", ","), "line 2 has 6 cells where the header line names 4 columns; if the decimal mark"),
-            (text(rows() * [1, 110, 30, 30]), "U starts at 110, which is not per unit .* data.base_voltage"),
-            ("\n".join(line[: line.rfind(",")] for line in text().splitlines()), "column Q is missing"),
-            (text().replace("0.003,1,0.8,0.4", "0.003,1,0.8"), "line 5 has 3 cells where the others have 4"),
+            (
+                text().replace(".", ","),
+                "line 2 has 6 cells where the header line names 4 columns; if the decimal mark",
+            ),
+            (
+                text(rows() * [1, 110, 30, 30]),
+                "U starts at 110, which is not per unit .* data.base_voltage",
+            ),
+            (
+                "\n".join(line[: line.rfind(",")] for line in text().splitlines()),
+                "column Q is missing",
+            ),
+            (
+                text().replace("0.003,1,0.8,0.4", "0.003,1,0.8"),
+                "line 5 has 3 cells where the others have 4",
+            ),
         ],
     )
     def test_a_bad_file_gets_a_sentence_with_the_place(self, content, says):
@@ -136,7 +170,9 @@ class TestWhatIsRefused:
 
     def test_a_missing_file_is_refused_with_the_nearest_name(self):
         read()
-        with pytest.raises(UserError, match=r"dpi.csv: there is no such file in \.; did you mean 'dip.csv'\?"):
+        with pytest.raises(
+            UserError, match=r"dpi.csv: there is no such file in \.; did you mean 'dip.csv'\?"
+        ):
             build("data", {"name": "csv", "train": ["dpi.csv"]}).read()
 
     def test_a_missing_folder_or_package_is_said(self):
@@ -147,7 +183,9 @@ class TestWhatIsRefused:
 
     def test_text_that_is_not_of_the_encoding_asked_for_is_refused(self, here):
         (here / "dip.csv").write_bytes("t,U,P,Q,Störung\n".encode("latin-1"))
-        with pytest.raises(UserError, match=r"dip.csv: not utf-8 text; leave data.encoding out to have it detected"):
+        with pytest.raises(
+            UserError, match=r"dip.csv: not utf-8 text; leave data.encoding out to have it detected"
+        ):
             build("data", {"name": "csv", "train": ["dip.csv"], "encoding": "utf-8"}).read()
 
     def test_a_broken_sidecar_is_refused(self, here):
@@ -159,7 +197,10 @@ class TestWhatIsRefused:
         ("settings", "says"),
         [
             ({"train": []}, "data.train is empty"),
-            ({"path": "dip.csv"}, "data.train and data.validate are numbers of its dips, and 'dip.csv' is none"),
+            (
+                {"path": "dip.csv"},
+                "data.train and data.validate are numbers of its dips, and 'dip.csv' is none",
+            ),
             ({"validate": ["dip.csv"]}, "name 'dip.csv' twice"),
             ({"base_voltage": 0.0}, "data.base_voltage=0.0 is out of range"),
             ({"frequency": float("nan")}, "data.frequency=nan is out of range"),

@@ -15,7 +15,14 @@ N = 100
 
 def record(**changed):
     t = np.arange(N) * 0.001
-    given = {"name": "dip", "t": t, "U": np.ones(N), "P": np.full(N, 0.8), "Q": np.full(N, 0.4), "source": "dip.csv"}
+    given = {
+        "name": "dip",
+        "t": t,
+        "U": np.ones(N),
+        "P": np.full(N, 0.8),
+        "Q": np.full(N, 0.4),
+        "source": "dip.csv",
+    }
     return Record(**{**given, **changed})
 
 
@@ -37,13 +44,16 @@ def test_the_dips_of_one_record_are_numbered_from_one():
     whole = Record("whole", t, U, np.ones(3000), np.full(3000, 0.5), source="made")
     first, second = cut_dips([whole], "made", 0.3, 0.8)
     assert [(d.number, d.result.name, d.result.source) for d in (first, second)] == [
-        (1, "whole_dip1", "made dip 1"), (2, "whole_dip2", "made dip 2"),
-    ]  # fmt: skip
+        (1, "whole_dip1", "made dip 1"),
+        (2, "whole_dip2", "made dip 2"),
+    ]
     assert (first.result.t[0], second.result.t[0]) == pytest.approx((0.2, 1.7), abs=2e-3)
 
 
 def test_too_few_samples_of_low_voltage_tell_no_direction():
-    """What two samples do is no answer: said is that the voltage is never disturbed, and no exponent."""
+    """What two samples do is no answer: said is that the voltage is never disturbed, and no
+    exponent.
+    """
     U = spoiled(np.ones(N), slice(40, 42), 0.6)
     assert "the voltage is never disturbed" in direction(U, -0.8 * U**2, np.full(N, -0.3))
     long = spoiled(np.ones(N), slice(40, 60), 0.6)
@@ -64,10 +74,16 @@ def test_gaps_in_P_and_Q_are_allowed():
     ("changed", "says"),
     [
         ({"P": np.ones(N - 1)}, r"dip.csv: P has shape \(99,\) where t has 100 samples"),
-        ({"U": spoiled(np.ones(N), 7, np.nan)}, r"dip.csv: sample 8 \(t = 0.007 s\): U = nan .* only P and Q may have"),
+        (
+            {"U": spoiled(np.ones(N), 7, np.nan)},
+            r"dip.csv: sample 8 \(t = 0.007 s\): U = nan .* only P and Q may have",
+        ),
         ({"P": spoiled(np.ones(N), 7, np.inf)}, r"sample 8 .* P = inf is not a finite number"),
         ({"Q": np.full(N, np.nan)}, "Q holds no number at all"),
-        ({"U": spoiled(np.ones(N), 3, 0.0)}, r"sample 4 \(t = 0.003 s\): U = 0, but voltage must be above zero"),
+        (
+            {"U": spoiled(np.ones(N), 3, 0.0)},
+            r"sample 4 \(t = 0.003 s\): U = 0, but voltage must be above zero",
+        ),
         ({"U": spoiled(np.ones(N), 3, -0.2)}, "U = -0.2, but voltage must be above zero"),
         (
             {"t": spoiled(np.arange(N) * 0.001, 9, 0.008)},
@@ -79,7 +95,8 @@ def test_gaps_in_P_and_Q_are_allowed():
         ),
         (
             {"t": np.arange(N) * 1.0},
-            "one sample every 1 s is too coarse: .* at least 20 samples per second .*t must be in seconds",
+            "one sample every 1 s is too coarse: .* at least 20 samples per second .*t must be in"
+            " seconds",
         ),
         ({"U": np.full(N, 27.5)}, r"U starts at 27.5, which is not per unit .* data.base_voltage"),
         ({"P": np.full(N, 29.8)}, r"reaches 29.8, which is not per unit .* data.base_power"),
@@ -120,5 +137,8 @@ def test_jitter_of_rounding_is_straightened_without_a_note():
 def test_missing_rows_are_refused_not_resampled():
     keep = np.delete(np.arange(N), [40, 41, 42])
     cut = {name: values[keep] for name, values in record().channels.items()}
-    with pytest.raises(UserError, match=r"sample 41 .*t advances by 0.004 s where 0.001 s is usual: rows are missing"):
+    with pytest.raises(
+        UserError,
+        match=r"sample 41 .*t advances by 0.004 s where 0.001 s is usual: rows are missing",
+    ):
         dataclasses.replace(record(), **cut).uniform()

@@ -1,4 +1,6 @@
-"""A run's folder: an earlier whole run is there until a newer one is whole, whoever is killed and whatever is full."""
+"""A run's folder: an earlier whole run is there until a newer one is whole, whoever is killed and
+whatever is full.
+"""
 
 import contextlib
 import errno
@@ -14,7 +16,8 @@ from tractexp import files, run_folder
 from tractexp.errors import UserError
 from tractexp.run_folder import CONFIGURATION, LOCK, WHOLE, settle
 
-CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")  # of `os`: each changes what is on the disk
+# of `os`: each changes what is on the disk
+CALLS = ("replace", "mkdir", "unlink", "rmdir", "open", "fsync")
 NOTES = "mine"
 
 
@@ -50,7 +53,9 @@ def whole(seed: int) -> dict[str, str]:
 
 
 def state(folder: Path) -> dict[str, str]:
-    return {str(p.relative_to(folder)): p.read_text() for p in sorted(folder.rglob("*")) if p.is_file()}
+    return {
+        str(p.relative_to(folder)): p.read_text() for p in sorted(folder.rglob("*")) if p.is_file()
+    }
 
 
 def ours(folder: Path) -> dict[str, str]:
@@ -88,7 +93,9 @@ def test_a_newer_run_takes_the_place_of_the_earlier_and_leaves_what_is_not_its(e
 
 @pytest.mark.skipif(os.name == "nt", reason="forks")
 def test_who_is_killed_at_any_moment_loses_no_whole_run(earlier, monkeypatch):
-    """Of a folder that is looked at then: the earlier run whole, or the newer one, which the next command settles."""
+    """Of a folder that is looked at then: the earlier run whole, or the newer one, which the next
+    command settles.
+    """
     seen = set()
     for count in itertools.count(1):
         run(earlier, 1)
@@ -108,7 +115,8 @@ def test_who_is_killed_at_any_moment_loses_no_whole_run(earlier, monkeypatch):
     assert count > 20
     assert seen == {True, False}
     run(earlier, 3)
-    assert not [name for name in state(earlier) if name.startswith(".tractexp")]  # what the killed left is gone
+    # what the killed left is gone
+    assert not [name for name in state(earlier) if name.startswith(".tractexp")]
 
 
 def test_a_disk_that_is_full_at_any_write_loses_no_whole_run(earlier, monkeypatch):
@@ -137,7 +145,9 @@ def test_a_second_run_says_who_holds_the_folder_and_changes_nothing(earlier):
             "import sys; from pathlib import Path; from tractexp.run_folder import run_folder\n"
             "with run_folder(Path(sys.argv[1]), {}, frozenset()): pass"
         )
-        done = subprocess.run([sys.executable, "-c", code, str(earlier)], capture_output=True, text=True)
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(earlier)], capture_output=True, text=True
+        )
         assert f"{earlier} is in use by process {os.getpid()} on " in done.stderr
         with pytest.raises(UserError, match=f"in use by process {os.getpid()} on .*, since "):
             run(earlier, 3)
@@ -148,7 +158,10 @@ def test_a_second_run_says_who_holds_the_folder_and_changes_nothing(earlier):
 def test_a_run_that_is_refused_leaves_no_folder_and_one_that_was_there_as_it_was(earlier, tmp_path):
     for folder in (earlier, tmp_path / "new"):
         before = state(folder)
-        with pytest.raises(UserError, match="wrong"), run_folder.run_folder(folder, configured(2), frozenset()):
+        with (
+            pytest.raises(UserError, match="wrong"),
+            run_folder.run_folder(folder, configured(2), frozenset()),
+        ):
             raise UserError("wrong")
         assert state(folder) == before
     assert not (tmp_path / "new").exists()

@@ -15,7 +15,10 @@ def promises() -> list[tuple[str, list[tuple[str, str]]]]:
     text = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
     tables = re.findall(r"^\|.*\| tests \|\n\|[-|]+\|\n((?:\|.*\|\n)+)", text, re.MULTILINE)
     rows = [row for table in tables for row in table.splitlines()]
-    return [(row.split("|")[1].strip(), TEST.findall(row.rstrip("|").rpartition("|")[2])) for row in rows]
+    return [
+        (row.split("|")[1].strip(), TEST.findall(row.rstrip("|").rpartition("|")[2]))
+        for row in rows
+    ]
 
 
 @pytest.mark.parametrize(("told", "tests"), promises(), ids=[told for told, _ in promises()])
@@ -23,7 +26,10 @@ def test_each_row_names_tests_that_are_there(told, tests):
     assert tests
     for file, name in tests:
         tree = ast.parse((ROOT / "tests" / file).read_text(encoding="utf-8"))
-        assert name in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, (file, name)
+        assert name in {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}, (
+            file,
+            name,
+        )
 
 
 def test_all_rows_are_seen():

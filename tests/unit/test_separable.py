@@ -8,7 +8,12 @@ from written_out import dense, dense_normal
 
 from tractexp.inference.differences import central_differences, forward_differences
 from tractexp.inference.least_squares import normal
-from tractexp.inference.separable import NOT_SEPARABLE, NormalMatrix, Sensitivities, SeparableColumns
+from tractexp.inference.separable import (
+    NOT_SEPARABLE,
+    NormalMatrix,
+    Sensitivities,
+    SeparableColumns,
+)
 
 RNG = np.random.default_rng(7)
 LENGTHS = (6, 9, 7)
@@ -56,7 +61,9 @@ def test_coordinates_on_a_bound_take_nothing():
     free = np.ones(K + M * E, dtype=bool)
     free[[1, 6, 8, 9]] = False
     Q, _ = np.linalg.qr(DENSE[:, free])
-    np.testing.assert_allclose(J.only(free).basis().without(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12)
+    np.testing.assert_allclose(
+        J.only(free).basis().without(ROWS), ROWS - (ROWS @ Q) @ Q.T, atol=1e-12
+    )
     whole = np.zeros((len(ROWS), K + M * E))
     whole[:, free] = np.linalg.lstsq(DENSE[:, free], ROWS.T)[0].T
     np.testing.assert_allclose(J.only(free).fit(ROWS), np.delete(whole, 1, axis=1), atol=1e-10)
@@ -68,10 +75,16 @@ def test_differences_and_normal_equations_are_those_of_every_coordinate_by_itsel
     unit, lanes = RNG.uniform(0.2, 0.8, (2, K + M * E)), np.arange(2)
     rows = lambda x, lanes: np.sin(x @ DENSE.T)  # noqa: E731
     base = rows(unit, lanes)
-    alone, together = (normal(rows, unit, base, lanes, a, central=central) for a in (NOT_SEPARABLE, APART))
+    alone, together = (
+        normal(rows, unit, base, lanes, a, central=central) for a in (NOT_SEPARABLE, APART)
+    )
     np.testing.assert_allclose(together[0], alone[0], rtol=1e-7, atol=1e-7)
-    np.testing.assert_allclose(dense_normal(together[1]), dense_normal(alone[1]), rtol=1e-7, atol=1e-7)
-    np.testing.assert_allclose(together[1].diagonal, np.einsum("nkk->nk", dense_normal(together[1])))
+    np.testing.assert_allclose(
+        dense_normal(together[1]), dense_normal(alone[1]), rtol=1e-7, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        together[1].diagonal, np.einsum("nkk->nk", dense_normal(together[1]))
+    )
 
 
 def test_a_step_solves_the_equations_of_every_entry_and_what_rests_stays():
@@ -81,8 +94,12 @@ def test_a_step_solves_the_equations_of_every_entry_and_what_rests_stays():
     solution = matrix.solve(side, kept, (added, ~kept[:, None] * 1.0))
     for lane in range(2):
         for q in range(3):
-            H = dense_normal(matrix)[lane] * np.outer(kept[lane], kept[lane]) + np.diag(added[lane, q] + ~kept[lane])
-            np.testing.assert_allclose(solution[lane, q], np.linalg.solve(H, side[lane]), rtol=1e-9, atol=1e-12)
+            H = dense_normal(matrix)[lane] * np.outer(kept[lane], kept[lane]) + np.diag(
+                added[lane, q] + ~kept[lane]
+            )
+            np.testing.assert_allclose(
+                solution[lane, q], np.linalg.solve(H, side[lane]), rtol=1e-9, atol=1e-12
+            )
     assert (solution[~np.repeat(kept[:, None], 3, axis=1)] == 0).all()
 
 
@@ -102,9 +119,13 @@ def test_a_power_that_cannot_be_simulated_on_one_side_is_one_sided_in_its_event_
         made[np.ix_(x[:, 6] > 0.5, APART.rows[1])] = np.nan
         return made
 
-    _, columns = central_differences(rows, np.full((1, K + M * E), 0.5), np.zeros(1, dtype=int), APART)
+    _, columns = central_differences(
+        rows, np.full((1, K + M * E), 0.5), np.zeros(1, dtype=int), APART
+    )
     np.testing.assert_allclose(columns[0], J.columns, rtol=1e-5, atol=1e-8)
-    ahead = forward_differences(rows, np.full((1, K + M * E), 0.5), 0.5 * DENSE.sum(axis=1)[None], np.zeros(1), APART)
+    ahead = forward_differences(
+        rows, np.full((1, K + M * E), 0.5), 0.5 * DENSE.sum(axis=1)[None], np.zeros(1), APART
+    )
     lost = ahead[0][K] == 0
     assert lost.sum() == len(APART.rows[1])
 

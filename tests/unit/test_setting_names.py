@@ -12,7 +12,9 @@ def test_a_setting_is_the_key_outside_of_calls() -> None:
 
 
 def test_a_setting_is_the_argument_within_a_call() -> None:
-    """Only keys that the call takes lose their section; an outer call's arguments hold where the inner has none."""
+    """Only keys that the call takes lose their section; an outer call's arguments hold where the
+    inner has none.
+    """
     with settings_as("identify", lambda: {"records", "bounds"}):
         assert (setting("model.bounds.C"), DATA.train) == ("bounds.C", "records")
         assert (setting("task=identify"), setting("task=plan")) == ("identify()", "task=plan")

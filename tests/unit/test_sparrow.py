@@ -18,7 +18,9 @@ F = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
 
 
 class Drawn:
-    """A generator that hands out known numbers in the order they are asked for, and checks each request."""
+    """A generator that hands out known numbers in the order they are asked for, and checks each
+    request.
+    """
 
     def __init__(self, **numbers):
         self.numbers = {name: list(map(np.asarray, values)) for name, values in numbers.items()}
@@ -56,7 +58,9 @@ def test_producers_shrink_by_rank_while_no_alarm_is_raised():
     for i in range(3):
         for j in range(D):
             alpha = 1 - u[i]
-            assert got[i, j] == pytest.approx(X[i, j] * math.exp(-(i + 1) / (alpha * 300)), rel=1e-15)
+            assert got[i, j] == pytest.approx(
+                X[i, j] * math.exp(-(i + 1) / (alpha * 300)), rel=1e-15
+            )
 
 
 def test_alarmed_producers_jump_by_one_normal_number_in_every_coordinate():
@@ -79,12 +83,18 @@ def test_scalar_step_is_the_printed_matrix_product():
 
 
 def test_elementwise_step_is_the_equation_for_one_coordinate_at_a_time():
-    leader, coins, s = np.array([0.25, 0.5]), np.array([[0, 1], [1, 0]]), np.array([[2.0, -0.5], [0.1, 3.0]])
+    leader, coins, s = (
+        np.array([0.25, 0.5]),
+        np.array([[0, 1], [1, 0]]),
+        np.array([[2.0, -0.5], [0.1, 3.0]]),
+    )
     got = sparrow.follow(X[1:3], leader, s, False, Drawn(integers=[coins]))
     for i in range(2):
         for j in range(D):
             sign = 1 if coins[i, j] else -1
-            assert got[i, j] == pytest.approx(leader[j] + s[i, j] * abs(X[1 + i, j] - leader[j]) * sign, rel=1e-14)
+            assert got[i, j] == pytest.approx(
+                leader[j] + s[i, j] * abs(X[1 + i, j] - leader[j]) * sign, rel=1e-14
+            )
 
 
 def test_levy_flight_enters_the_scalar_step_coordinate_by_coordinate():
@@ -98,12 +108,16 @@ def test_hungry_scroungers_fly_to_a_normal_number_times_an_exponential():
     got = sparrow.starve(X[3:], worst, np.array([4, 5]), Drawn(normal=[[[v] for v in q]]))
     for k, i in enumerate((4, 5)):
         for j in range(D):
-            assert got[k, j] == pytest.approx(q[k] * math.exp((worst[j] - X[i - 1, j]) / i**2), rel=1e-15)
+            assert got[k, j] == pytest.approx(
+                q[k] * math.exp((worst[j] - X[i - 1, j]) / i**2), rel=1e-15
+            )
 
 
 def test_hungry_scroungers_survive_bounds_of_any_size():
     x = np.array([[-1e9, 1e9]])
-    assert np.isfinite(sparrow.starve(x, np.array([1e9, -1e9]), np.array([26]), np.random.default_rng(0))).all()
+    assert np.isfinite(
+        sparrow.starve(x, np.array([1e9, -1e9]), np.array([26]), np.random.default_rng(0))
+    ).all()
 
 
 def test_perceivers_gather_about_the_best_and_the_best_flees_the_worst():
@@ -111,7 +125,9 @@ def test_perceivers_gather_about_the_best_and_the_best_flees_the_worst():
     best, worst = (X[0], F[0]), (X[4], F[4])
     got = sparrow.perceive(X[[0, 2]], F[[0, 2]], best, worst, Drawn(normal=[beta], uniform=[k]))
     for j in range(D):
-        assert got[0, j] == pytest.approx(X[0, j] + 0.4 * abs(X[0, j] - X[4, j]) / (1.0 - 5.0 + 1e-50), rel=1e-15)
+        assert got[0, j] == pytest.approx(
+            X[0, j] + 0.4 * abs(X[0, j] - X[4, j]) / (1.0 - 5.0 + 1e-50), rel=1e-15
+        )
         assert got[1, j] == pytest.approx(X[0, j] + beta[1, j] * abs(X[2, j] - X[0, j]), rel=1e-15)
 
 
@@ -134,7 +150,9 @@ class Recorded:
 
 
 def iteration_by_hand(x, f, u, better_only, scalar):
-    """One iteration of Eqs. (11)-(13) with five sparrows: one producer, ranks 2 to 5 scroungers, two perceivers."""
+    """One iteration of Eqs. (11)-(13) with five sparrows: one producer, ranks 2 to 5 scroungers,
+    two perceivers.
+    """
     order = sorted(range(N), key=lambda i: f[i])
     x, f = [list(x[i]) for i in order], [f[i] for i in order]
     worst, f_worst = list(x[4]), f[4]
@@ -168,19 +186,29 @@ def iteration_by_hand(x, f, u, better_only, scalar):
             moves[i] = [best[j] + u["beta"][m][j] * abs(x[i][j] - best[j]) for j in range(D)]
         else:
             denominator = f[i] - f_worst + 1e-50
-            moves[i] = [x[i][j] + u["K"][m] * abs(x[i][j] - worst[j]) / denominator for j in range(D)]
+            moves[i] = [
+                x[i][j] + u["K"][m] * abs(x[i][j] - worst[j]) / denominator for j in range(D)
+            ]
     propose(moves)
     return x, f, batches
 
 
 @pytest.mark.parametrize("step", ["elementwise", "scalar"])
 @pytest.mark.parametrize("acceptance", ["better", "all"])
-@pytest.mark.parametrize(("R2", "watch"), [(0.5, [3, 0]), (0.79, [1, 4]), (0.8, [0, 2]), (0.95, [2, 3])])
+@pytest.mark.parametrize(
+    ("R2", "watch"), [(0.5, [3, 0]), (0.79, [1, 4]), (0.8, [0, 2]), (0.95, [2, 3])]
+)
 def test_an_iteration_of_ssa_is_the_one_computed_by_hand(step, acceptance, R2, watch):
     u = {
-        "R2": R2, "alpha": 0.35, "Q1": -0.15, "Q": [0.3, 0.9, -0.2], "A": [1, 0], "watch": watch,
-        "beta": [[0.5, -0.6], [0.2, 0.8]], "K": [0.3, -0.9],
-    }  # fmt: skip
+        "R2": R2,
+        "alpha": 0.35,
+        "Q1": -0.15,
+        "Q": [0.3, 0.9, -0.2],
+        "A": [1, 0],
+        "watch": watch,
+        "beta": [[0.5, -0.6], [0.2, 0.8]],
+        "K": [0.3, -0.9],
+    }
     normal = [[[v] for v in u["Q"]], u["beta"]]
     if R2 >= 0.8:
         normal.insert(0, [[u["Q1"]]])
@@ -232,7 +260,9 @@ def test_tent_map_by_hand():
 
 
 def test_tent_map_keeps_the_uniform_density():
-    """The map's invariant measure is uniform: the mean and variance of a long orbit are 1/2 and 1/12."""
+    """The map's invariant measure is uniform: the mean and variance of a long orbit are 1/2 and
+    1/12.
+    """
     rng = np.random.default_rng(3)
     z, seen = rng.random(200), []
     for _ in range(500):
@@ -253,7 +283,9 @@ def test_a_dead_orbit_starts_anew():
 
 def test_tent_initialization_is_one_orbit_of_the_map_in_each_coordinate():
     box = Box(np.array([-1.0, 2.0]), np.array([1.0, 6.0]))
-    x = build("optimizer", {"name": "issa", "population": 5}).initial(box, Drawn(random=[[0.1, 0.6]]))
+    x = build("optimizer", {"name": "issa", "population": 5}).initial(
+        box, Drawn(random=[[0.1, 0.6]])
+    )
     first, second = [0.1], [0.6]
     for _ in range(4):
         first.append(first[-1] / 0.3 if first[-1] < 0.3 else (1 - first[-1]) / 0.7)
@@ -263,7 +295,9 @@ def test_tent_initialization_is_one_orbit_of_the_map_in_each_coordinate():
 
 
 def test_mantegnas_sigma():
-    """beta = 1 is the Cauchy case, sigma = 1 exactly; 0.6966 at beta = 3/2 is the published value."""
+    """beta = 1 is the Cauchy case, sigma = 1 exactly; 0.6966 at beta = 3/2 is the
+    published value.
+    """
     assert issa.levy_sigma(1.0) == pytest.approx(1.0, rel=1e-14)
     assert issa.levy_sigma(1.5) == pytest.approx(0.696575, abs=1e-6)
 
@@ -300,7 +334,9 @@ def test_tent_perturbation_is_the_mean_with_a_chaotic_point_of_the_box():
 
 
 def perturbed(schedule, t, **switches):
-    optimizer = build("optimizer", {"name": "issa", "population": N, "schedule": schedule, **switches})
+    optimizer = build(
+        "optimizer", {"name": "issa", "population": N, "schedule": schedule, **switches}
+    )
     varied, disturbed = optimizer._divide(t, 10, F)
     return varied.tolist(), disturbed.tolist()
 
@@ -319,9 +355,13 @@ def test_by_stage_all_are_disturbed_early_and_the_best_varies_late():
 
 
 @pytest.mark.parametrize("budget", [1000, 6000, 40_000])
-@pytest.mark.parametrize("switches", [{}, {"gaussian": False}, {"tent_perturbation": False}, {"levy": False}])
+@pytest.mark.parametrize(
+    "switches", [{}, {"gaussian": False}, {"tent_perturbation": False}, {"levy": False}]
+)
 def test_a_budget_lets_the_schedule_run_whole(budget, switches, monkeypatch):
-    """The first half of the iterations disturbs all, the second varies the best: the budget ends with the second."""
+    """The first half of the iterations disturbs all, the second varies the best: the budget ends
+    with the second.
+    """
     laid_out, steps = [], []
     whole = issa.ISSA._divide
 
@@ -339,7 +379,9 @@ def test_a_budget_lets_the_schedule_run_whole(budget, switches, monkeypatch):
 
 def test_without_a_budget_there_are_the_papers_iterations_and_with_both_the_first_to_end_counts():
     def iterations(limit, **settings):
-        return search(Bowl(), build("optimizer", {"name": "issa", **settings}), 0, Limits(simulations=limit)).iterations
+        return search(
+            Bowl(), build("optimizer", {"name": "issa", **settings}), 0, Limits(simulations=limit)
+        ).iterations
 
     assert iterations(None) == 300
     assert iterations(100_000) > 900
@@ -353,7 +395,9 @@ class Bowl:
     lower, upper = np.array([0.1, -3.0, 10.0]), np.array([0.4, 5.0, 90.0])
 
     def objective(self, values):
-        return (((values - self.lower) / (self.upper - self.lower) - [0.3, 0.6, 0.45]) ** 2).sum(axis=1)
+        return (((values - self.lower) / (self.upper - self.lower) - [0.3, 0.6, 0.45]) ** 2).sum(
+            axis=1
+        )
 
     def residuals(self, values):
         return (values - self.lower) / (self.upper - self.lower) - [0.3, 0.6, 0.45]
@@ -362,7 +406,9 @@ class Bowl:
 OFF = {"tent_initialization": False, "levy": False, "gaussian": False, "tent_perturbation": False}
 
 
-@pytest.mark.parametrize("reading", [{}, {"space": "raw", "acceptance": "all", "step": "scalar"}, {"polish": True}])
+@pytest.mark.parametrize(
+    "reading", [{}, {"space": "raw", "acceptance": "all", "step": "scalar"}, {"polish": True}]
+)
 @pytest.mark.parametrize("seed", [0, 7])
 def test_issa_with_everything_off_is_ssa_bit_for_bit(reading, seed):
     settings = {"iterations": 40, **reading}
@@ -377,12 +423,16 @@ def test_issa_with_everything_off_is_ssa_bit_for_bit(reading, seed):
 @pytest.mark.parametrize("switch", OFF)
 def test_each_ingredient_changes_the_search(switch):
     ssa = search(Bowl(), build("optimizer", {"name": "ssa", "iterations": 10}), 0)
-    one = search(Bowl(), build("optimizer", {"name": "issa", "iterations": 10, **OFF, switch: True}), 0)
+    one = search(
+        Bowl(), build("optimizer", {"name": "issa", "iterations": 10, **OFF, switch: True}), 0
+    )
     assert ssa.history.values.tobytes() != one.history.values.tobytes()
 
 
 def test_simulations_of_an_iteration():
-    """A flock moves once, its perceiving producers once more; ISSA by fitness simulates all once again."""
+    """A flock moves once, its perceiving producers once more; ISSA by fitness simulates all once
+    again.
+    """
     spent = {}
     for name in ("ssa", "issa"):
         h = search(Bowl(), build("optimizer", {"name": name, "iterations": 30}), 1).history
@@ -400,9 +450,15 @@ def covariant_move(x, seed=3, **settings):
 
 
 def test_the_covariant_flock_moves_as_computed_by_hand():
-    """Five sparrows: a producer, a scrounger that follows, three that starve; the second and the last perceive."""
+    """Five sparrows: a producer, a scrounger that follows, three that starve; the second and the
+    last perceive.
+    """
     one, step, led = np.array([1, 3, 0, 2, 4]), np.array([2, 1, 3, 1, 4]), np.zeros(5, dtype=int)
-    q, normal, coins = np.array([[-0.7]]), np.array([[0.5, -1.5], [0.25, 2.0]]), np.full((N, D), 0.5)
+    q, normal, coins = (
+        np.array([[-0.7]]),
+        np.array([[0.5, -1.5], [0.25, 2.0]]),
+        np.full((N, D), 0.5),
+    )
     coins[2, 1] = 0.95  # not below the share of 0.9: the third sparrow keeps its second coordinate
     asked = iter([(0, N, one), (1, N, step), (0, 1, led), (0, D, np.zeros(N, dtype=int))])
 
@@ -420,9 +476,17 @@ def test_the_covariant_flock_moves_as_computed_by_hand():
     mean = [(X[0, j] + X[1, j]) / 2 for j in range(D)]  # of the better half, two of five
     for j in range(D):
         way = [X[one[i], j] - X[other[i], j] for i in range(N)]
-        expected = [X[0, j] - 0.7 * way[0], None, X[0, j] + 0.6 * way[2], X[0, j] + 0.6 * way[3], None]
+        expected = [
+            X[0, j] - 0.7 * way[0],
+            None,
+            X[0, j] + 0.6 * way[2],
+            X[0, j] + 0.6 * way[3],
+            None,
+        ]
         for row, (a, b) in zip((1, 4), normal, strict=True):
-            expected[row] = X[0, j] + (a * (X[0, j] - mean[j]) + b * (X[1, j] - mean[j])) / math.sqrt(2)
+            expected[row] = X[0, j] + (
+                a * (X[0, j] - mean[j]) + b * (X[1, j] - mean[j])
+            ) / math.sqrt(2)
         if j == 1:
             expected[2] = X[2, 1]
         np.testing.assert_allclose(got[:, j], expected, rtol=1e-13)
@@ -434,20 +498,30 @@ def test_a_covariant_scrounger_follows_a_producer_and_a_way_between_two_sparrows
     rng = np.random.default_rng(3)
     way, leader = covariant.differences(x, rng), x[rng.integers(0, 4, 20)]
     got = covariant_move(x, 3, perceivers=0.0, mixing=1.0)
-    np.testing.assert_allclose(got[4:10], x[4:10] + 0.6 * (leader - x)[4:10] + 0.6 * way[4:10], rtol=1e-13)
+    np.testing.assert_allclose(
+        got[4:10], x[4:10] + 0.6 * (leader - x)[4:10] + 0.6 * way[4:10], rtol=1e-13
+    )
 
 
 def test_a_covariant_flock_may_be_turned_stretched_and_shifted():
-    """With whole positions taken, the moves of the transformed flock are the transformed moves: no axis, no zero."""
+    """With whole positions taken, the moves of the transformed flock are the transformed moves: no
+    axis, no zero.
+    """
     rng = np.random.default_rng(1)
     x, turn, shift = rng.random((30, 4)), rng.standard_normal((4, 4)), rng.standard_normal(4)
     moved = covariant_move(x, mixing=1.0)
     assert np.abs(moved - x).max() > 0.1
-    np.testing.assert_allclose(covariant_move(x @ turn + shift, mixing=1.0), moved @ turn + shift, atol=1e-12)
+    np.testing.assert_allclose(
+        covariant_move(x @ turn + shift, mixing=1.0), moved @ turn + shift, atol=1e-12
+    )
 
 
 def test_covariant_perceivers_have_the_covariance_of_the_better_half():
-    better = np.random.default_rng(2).standard_normal((15, 3)) @ [[1, 2, 0], [0, 0.3, 0.1], [0, 0, 2]]
+    better = np.random.default_rng(2).standard_normal((15, 3)) @ [
+        [1, 2, 0],
+        [0, 0.3, 0.1],
+        [0, 0, 2],
+    ]
     best = np.array([5.0, -1.0, 2.0])
     drawn = covariant.draw_varied_points(best, better, 200_000, np.random.default_rng(4))
     np.testing.assert_allclose(drawn.mean(axis=0), best, atol=0.03)
@@ -457,7 +531,9 @@ def test_covariant_perceivers_have_the_covariance_of_the_better_half():
 def test_a_way_never_leads_from_a_sparrow_to_itself():
     x = np.arange(4.0)[:, None]
     assert (covariant.differences(np.repeat(x, 1, axis=0), np.random.default_rng(0)) != 0).all()
-    ways = np.concatenate([covariant.differences(x, np.random.default_rng(seed)) for seed in range(200)])
+    ways = np.concatenate(
+        [covariant.differences(x, np.random.default_rng(seed)) for seed in range(200)]
+    )
     assert {*ways[:, 0].tolist()} == {-3.0, -2.0, -1.0, 1.0, 2.0, 3.0}
 
 
@@ -469,8 +545,13 @@ def test_a_sparrow_takes_at_least_one_coordinate():
 
 
 def test_a_collapsed_covariant_flock_is_drawn_anew():
-    """In a bowl the flock is soon narrower than allowed; after that points all over the square come again."""
-    evaluate, optimizer = Recorded(), build("optimizer", {"name": "covariant_sparrow", "collapse": 1e-3})
+    """In a bowl the flock is soon narrower than allowed; after that points all over the square come
+    again.
+    """
+    evaluate, optimizer = (
+        Recorded(),
+        build("optimizer", {"name": "covariant_sparrow", "collapse": 1e-3}),
+    )
     steps = optimizer.search(evaluate, Box.unit(2), np.random.default_rng(0))
     for _ in range(200):
         next(steps)

@@ -14,7 +14,9 @@ BEGIN, END = 2.0, 2.15  # s, of the dip
 
 
 def record(course=None, rate=200.0, noise=1e-3, seed=0, tap=0.0):
-    """A dip of 30 % of a load of 0.8 + 0.4j that `course` of time [s] multiplies; a tap changer steps at 1.5 s."""
+    """A dip of 30 % of a load of 0.8 + 0.4j that `course` of time [s] multiplies; a tap changer
+    steps at 1.5 s.
+    """
     t, rng = np.arange(int(4 * rate)) / rate, np.random.default_rng(seed)
     U = np.where((t >= BEGIN) & (t < END), 0.7, 1.0) * np.where(t < 1.5, 1.0 + tap, 1.0)
     size = 1.0 if course is None else course(t)
@@ -48,7 +50,10 @@ def test_of_several_steps_the_last_counts():
 
 
 def test_a_step_right_before_the_dip_is_refused():
-    with pytest.raises(UserError, match=r"made.csv: the load changes at t = 1.9\d* s \(P 2.* to 0.*: no steady state"):
+    with pytest.raises(
+        UserError,
+        match=r"made.csv: the load changes at t = 1.9\d* s \(P 2.* to 0.*: no steady state",
+    ):
         detect(record(step(1.94, 3.0)))
 
 
@@ -95,7 +100,9 @@ def test_a_steady_load_is_left_as_it_is(noise, seed):
     assert event.steady == slice(event.start - 200, event.start)
 
 
-@pytest.mark.parametrize("name", ["tibet_30pct", "tibet_50pct", "tibet_65pct", "tibet_50pct_comtrade"])
+@pytest.mark.parametrize(
+    "name", ["tibet_30pct", "tibet_50pct", "tibet_65pct", "tibet_50pct_comtrade"]
+)
 def test_nothing_is_said_of_the_shipped_records(name):
     for event in tractexp.read(name):
         assert event.steady == slice(0, event.start)
@@ -109,5 +116,7 @@ def test_times_in_a_wrong_unit_end_in_no_traceback():
 
 @pytest.mark.parametrize(("rate", "seed"), [(100.0, 87), (100.0, 109), (100.0, 139), (200.0, 7)])
 def test_noise_of_the_voltage_is_no_tap_changer(rate, seed):
-    """Noise of 1 %: the means of two cycles differ by as much, in these four more than in 196 others of each rate."""
+    """Noise of 1 %: the means of two cycles differ by as much, in these four more than in 196
+    others of each rate.
+    """
     assert detect(record(rate=rate, noise=1e-2, seed=seed)).record.notes == ()

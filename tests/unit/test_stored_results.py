@@ -1,4 +1,6 @@
-"""Stored results that nobody's identification wrote: a sentence when they are read, and no number that is none."""
+"""Stored results that nobody's identification wrote: a sentence when they are read, and no number
+that is none.
+"""
 
 import json
 
@@ -63,13 +65,17 @@ def test_a_sound_one_is_read_without_a_word(sound):
 def test_values_outside_their_bounds_are_said(tmp_path):
     path = hostile.INPUTS["outside.json"](tmp_path / "outside.json")
     for read in (tractexp.load, lambda p: _load_pyfunc(str(p))):
-        with pytest.warns(UserWarning, match=r"outside.json: X_prime = 1e\+30 is outside its bounds, 0.125 to 0.5"):
+        with pytest.warns(
+            UserWarning, match=r"outside.json: X_prime = 1e\+30 is outside its bounds, 0.125 to 0.5"
+        ):
             read(path)
 
 
 def test_nulls_that_stand_for_numbers_of_no_model_are_read(tmp_path):
     path = tmp_path / "result.json"
-    content = json.loads(hostile.result(epsilon_q=None, standard_errors={"C": None}, intervals={"C": [None, 1.0]}))
+    content = json.loads(
+        hostile.result(epsilon_q=None, standard_errors={"C": None}, intervals={"C": [None, 1.0]})
+    )
     path.write_text(json.dumps(content))
     assert np.isnan(load(path).epsilon_q)
 

@@ -1,4 +1,6 @@
-"""The parts of a sweep one by one: what a job is, how its end is kept, and what is told while others run."""
+"""The parts of a sweep one by one: what a job is, how its end is kept, and what is told while
+others run.
+"""
 
 import io
 import json
@@ -17,7 +19,16 @@ from tractexp.sweep import launcher, progress, recorder
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.placing import place
-from tractexp.sweep.status import FAILED, FILE, FINISHED, RUNNING, Status, objective, read, select_returned_metrics
+from tractexp.sweep.status import (
+    FAILED,
+    FILE,
+    FINISHED,
+    RUNNING,
+    Status,
+    objective,
+    read,
+    select_returned_metrics,
+)
 from tractexp.tracking import TrackedRun, runfile
 from tractexp.tracking.sweepfile import folder_of
 
@@ -37,7 +48,10 @@ def ended(job: SweepJob, status: str = FINISHED, value: float | None = None) -> 
 
 @pytest.fixture
 def jobs(tmp_path):
-    return [job(tmp_path / str(k), "budget=500", f"optimizer.c1={k // 2}", f"seed={k}", seed=k) for k in range(4)]
+    return [
+        job(tmp_path / str(k), "budget=500", f"optimizer.c1={k // 2}", f"seed={k}", seed=k)
+        for k in range(4)
+    ]
 
 
 def test_a_status_comes_back_from_its_folder_and_a_damaged_one_does_not(jobs):
@@ -46,7 +60,8 @@ def test_a_status_comes_back_from_its_folder_and_a_damaged_one_does_not(jobs):
         assert read(one.folder) == end
         assert json.loads((one.folder / FILE).read_text())["seed"] == one.config["seed"]
     (jobs[0].folder / FILE).write_text("{")
-    (jobs[1].folder / FILE).write_text('{"status": "finished"}')  # of another version: parts are missing
+    # of another version: parts are missing
+    (jobs[1].folder / FILE).write_text('{"status": "finished"}')
     assert [read(one.folder) for one in jobs[:3]] == [None, None, None]
 
 
@@ -57,18 +72,27 @@ def test_a_job_starts_as_running_with_nothing_spent(jobs):
 def test_a_variant_leaves_out_what_all_jobs_share(jobs):
     assert find_shared_overrides(jobs) == {"budget=500"}
     assert find_shared_overrides(jobs[:1]) == set()
-    assert [one.variant(find_shared_overrides(jobs)) for one in jobs] == ["pso c1=0", "pso c1=0", "pso c1=1", "pso c1=1"]
+    assert [one.variant(find_shared_overrides(jobs)) for one in jobs] == [
+        "pso c1=0",
+        "pso c1=0",
+        "pso c1=1",
+        "pso c1=1",
+    ]
     assert jobs[0].variant(()) == "pso budget=500 c1=0"
 
 
 def test_the_best_of_each_variant_is_kept_and_failures_are_counted(jobs):
     tally = progress.Tally(jobs)
-    for one, status, value in zip(jobs, (FINISHED, FINISHED, FAILED, FINISHED), (3.0, 2.0, None, 1.0), strict=True):
+    for one, status, value in zip(
+        jobs, (FINISHED, FINISHED, FAILED, FINISHED), (3.0, 2.0, None, 1.0), strict=True
+    ):
         tally.add(one, ended(one, status, value))
     assert (tally.total, tally.done, tally.failed) == (4, 4, 1)
     assert tally.ranked() == [("pso c1=1", 1.0), ("pso c1=0", 2.0)]
     assert tally.jobs == {"pso c1=0": 2, "pso c1=1": 2}
-    assert tally.line().startswith("  4 of 4 jobs, 1 failed, best objectives pso c1=1 1, pso c1=0 2; about 0 s left")
+    assert tally.line().startswith(
+        "  4 of 4 jobs, 1 failed, best objectives pso c1=1 1, pso c1=0 2; about 0 s left"
+    )
 
 
 def test_the_time_left_is_that_of_the_pace_since_the_first_end(jobs, monkeypatch):
@@ -105,7 +129,9 @@ def test_a_terminal_shows_each_variant_under_a_bar(jobs, monkeypatch):
             note(one, ended(one, status, 2.0 - one.config["seed"]))
     text = re.sub(r"\x1b\[[0-9;?]*[a-zA-Z]", "", shown.file.getvalue())
     assert "3/4" in text
-    assert re.search(r"pso c1=1 +best 0\.0000e\+00 +1 jobs\s+pso c1=0 +best 2\.0000e\+00 +2 jobs", text)
+    assert re.search(
+        r"pso c1=1 +best 0\.0000e\+00 +1 jobs\s+pso c1=0 +best 2\.0000e\+00 +2 jobs", text
+    )
     assert "1 failed, about" in text
     assert "0 failed" not in text
 
@@ -146,9 +172,14 @@ def test_a_job_returns_where_its_search_ended_or_what_is_named():
     measured = {"search_objective": 2e-3, "objective": 3e-5, "search_simulations_to_floor": None}
     assert select_returned_metrics(measured, None) == 2e-3
     assert select_returned_metrics(measured, ["objective"]) == 3e-5
-    assert select_returned_metrics(measured, ["objective", "search_simulations_to_floor"]) == [3e-5, float("inf")]
+    assert select_returned_metrics(measured, ["objective", "search_simulations_to_floor"]) == [
+        3e-5,
+        float("inf"),
+    ]
     assert select_returned_metrics({"probability": 0.5}, None) is None
-    with pytest.raises(UserError, match=r"sweep\.returns names objectiv, .*did you mean 'objective'\?"):
+    with pytest.raises(
+        UserError, match=r"sweep\.returns names objectiv, .*did you mean 'objective'\?"
+    ):
         select_returned_metrics(measured, ["objectiv"])
 
 
@@ -191,7 +222,9 @@ def test_a_folder_that_is_not_the_jobs_alone_is_refused(subdirs, sentence, tmp_p
 
 def test_a_job_is_logged_once_below_the_run_of_its_sweep(jobs, monkeypatch):
     logged = []
-    monkeypatch.setattr(recorder, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1])
+    monkeypatch.setattr(
+        recorder, "log", lambda run, uri: (logged.append((run.name, run.parent, uri)), "id")[1]
+    )
     opening: Future[str | None] = Future()
     opening.set_result("7")
     record = recorder.Recorder(jobs[0].folder.parent, opening)
@@ -228,7 +261,11 @@ def test_a_store_that_is_away_is_asked_once_and_what_it_lacks_is_kept(jobs, monk
 def test_a_run_with_others_below_it_and_what_was_never_reached_is_read_back(tmp_path):
     """Those below end with it; what was never reached is kept, and left out where it is logged."""
     metrics = {"objective": 1.0, "search_simulations_to_floor": float("inf")}
-    runfile.save(tmp_path, TrackedRun("e", "r", metrics=metrics, children=[TrackedRun("e", "below")]), "sqlite:///x.db")
+    runfile.save(
+        tmp_path,
+        TrackedRun("e", "r", metrics=metrics, children=[TrackedRun("e", "below")]),
+        "sqlite:///x.db",
+    )
     back = runfile.read(tmp_path).run
     assert back.metrics == metrics
     assert [(child.name, child.ended) for child in back.children] == [("below", None)]

@@ -1,4 +1,6 @@
-"""Times as tables have them: by clocks that are set, in days, in two columns, digits in groups; and cut tables."""
+"""Times as tables have them: by clocks that are set, in days, in two columns, digits in groups; and
+cut tables.
+"""
 
 import datetime as dt
 
@@ -16,7 +18,9 @@ START = dt.datetime(2024, 3, 1, 10, 15, 30)
 
 
 def dip(seconds=20.0, rate=50.0):
-    """t [s], U [kV], P [MW], Q [Mvar] (N,) of a dip of 30 % at 8 s for 0.3 s; 110 kV, 20 MW, 8 Mvar."""
+    """t [s], U [kV], P [MW], Q [Mvar] (N,) of a dip of 30 % at 8 s for 0.3 s; 110 kV, 20 MW, 8
+    Mvar.
+    """
     t = np.round(np.arange(0, seconds, 1 / rate), 6)
     u = np.where((t >= 8) & (t < 8.3), 0.7, 1.0)
     return t, 110 * u, 20 * u**1.5, 8 * u**2
@@ -41,16 +45,25 @@ def is_the_dip(record, start=START):
     event = detect(record)
     assert event.t_start - record.t[0] == pytest.approx(8.0, abs=0.011)
     assert event.depth == pytest.approx(0.3, abs=0.01)
-    assert (record.base.voltage, record.base.power) == pytest.approx((110, np.hypot(20, 8)), rel=1e-3)
+    assert (record.base.voltage, record.base.power) == pytest.approx(
+        (110, np.hypot(20, 8)), rel=1e-3
+    )
     begun = record.identity.get("time")
-    assert begun is None if start is None else abs((dt.datetime.fromisoformat(begun) - start).total_seconds()) < 1e-3
+    assert (
+        begun is None
+        if start is None
+        else abs((dt.datetime.fromisoformat(begun) - start).total_seconds()) < 1e-3
+    )
 
 
 def stamps(form, start=START, jumps=()):
     """Times of the dip by a clock that is moved by so many hours from so many seconds on."""
     t = dip()[0]
     hours = sum((np.where(t >= at, by, 0.0) for at, by in jumps), np.zeros(len(t)))
-    moments = [start + dt.timedelta(seconds=x, hours=h) for x, h in zip(t.tolist(), hours.tolist(), strict=True)]
+    moments = [
+        start + dt.timedelta(seconds=x, hours=h)
+        for x, h in zip(t.tolist(), hours.tolist(), strict=True)
+    ]
     return [moment.strftime(form) for moment in moments]
 
 
@@ -71,7 +84,9 @@ def test_seconds_of_the_day_are_no_days(read):
 
 
 def test_days_of_too_few_digits_are_refused_with_what_helps(read):
-    with pytest.raises(UserError, match=r"line \d+: times are days since 1899.*too few digits.*ten decimals"):
+    with pytest.raises(
+        UserError, match=r"line \d+: times are days since 1899.*too few digits.*ten decimals"
+    ):
         read([f"{45352.4274305556 + x / 86400:.6f}" for x in dip()[0]])
 
 
@@ -85,13 +100,20 @@ def test_seconds_and_fractions_in_two_columns(read, whole):
 
 def test_the_quality_of_the_clock_above_the_fraction_is_left_out(read):
     soc = int(START.replace(tzinfo=dt.UTC).timestamp())
-    cells = [f"{soc + int(x + 1e-9)},{(0x0F << 24) + round((x + 1e-9) % 1 * 1e6)}" for x in dip()[0]]
+    cells = [
+        f"{soc + int(x + 1e-9)},{(0x0F << 24) + round((x + 1e-9) % 1 * 1e6)}" for x in dip()[0]
+    ]
     is_the_dip(read(cells, "SOC,FRACSEC"))
 
 
-@pytest.mark.parametrize(("header", "by"), [("Time,Milliseconds", 1e3), ("Time,ms", 1e3), ("Time,Fraction", 1.0)])
+@pytest.mark.parametrize(
+    ("header", "by"), [("Time,Milliseconds", 1e3), ("Time,ms", 1e3), ("Time,Fraction", 1.0)]
+)
 def test_a_clock_of_whole_seconds_and_its_fractions(read, header, by):
-    cells = [f"{stamp},{(x + 1e-9) % 1 * by:.3f}" for stamp, x in zip(stamps("%H:%M:%S"), dip()[0], strict=True)]
+    cells = [
+        f"{stamp},{(x + 1e-9) % 1 * by:.3f}"
+        for stamp, x in zip(stamps("%H:%M:%S"), dip()[0], strict=True)
+    ]
     is_the_dip(read(cells, header), start=None)
 
 
@@ -101,7 +123,14 @@ def test_date_and_time_in_two_columns_give_the_moment(read):
 
 @pytest.mark.parametrize(
     ("values", "mark"),
-    [("{:,.1f}", ";"), ("{:,.1f}", "\t"), ("swiss", ";"), ("narrow", ";"), ("german", ";"), ("quoted", ",")],
+    [
+        ("{:,.1f}", ";"),
+        ("{:,.1f}", "\t"),
+        ("swiss", ";"),
+        ("narrow", ";"),
+        ("german", ";"),
+        ("quoted", ","),
+    ],
 )
 def test_digits_in_groups(tmp_path, monkeypatch, values, mark):
     monkeypatch.chdir(tmp_path)
@@ -125,7 +154,11 @@ def test_what_may_be_a_decimal_mark_is_no_group():
     assert find_group_mark([["0,125", "110,250"]], ",") == ""
     assert find_group_mark([["0.125", "110,250"]], ".") == ","
     assert find_group_mark([["0.125", "110,25"]], ".") == ""
-    assert numbers(["1,234,567.5", "999.5", "-12,000"], group=",").tolist() == [1234567.5, 999.5, -12000]
+    assert numbers(["1,234,567.5", "999.5", "-12,000"], group=",").tolist() == [
+        1234567.5,
+        999.5,
+        -12000,
+    ]
 
 
 AUTUMN, SPRING = dt.datetime(2024, 10, 27, 2, 59, 51), dt.datetime(2024, 3, 31, 1, 59, 51)
@@ -165,8 +198,10 @@ def test_a_minute_of_61_seconds(read, form):
     t = dip()[0]
     cells = [(start + dt.timedelta(seconds=x - (x >= 10))).strftime(form) for x in t.tolist()]
     leap = (t >= 9) & (t < 10)
-    cells = [f"{start:%Y-%m-%dT}23:59:{51 + x:.2f}Z"[11 * ("Y" not in form) :] if now else cell
-             for cell, x, now in zip(cells, t.tolist(), leap, strict=True)]  # fmt: skip
+    cells = [
+        f"{start:%Y-%m-%dT}23:59:{51 + x:.2f}Z"[11 * ("Y" not in form) :] if now else cell
+        for cell, x, now in zip(cells, t.tolist(), leap, strict=True)
+    ]
     cells = [cell if "Y" in form else cell.removesuffix("Z") for cell in cells]
     assert any("23:59:60.5" in cell for cell in cells)
     is_the_dip(read(cells), start if "Y" in form else None)
@@ -194,7 +229,10 @@ def test_a_date_that_may_be_two_is_said_and_one_that_may_not_is_not():
         "read as 03 January 2024, day before month"
         in times(["03/01/2024 10:15:30", "03/01/2024 10:15:31"]).remarks[0][1]
     )
-    assert "01 March 2024, month before day, as with AM" in times(["03/01/2024 10:15:30 AM"]).remarks[0][1]
+    assert (
+        "01 March 2024, month before day, as with AM"
+        in times(["03/01/2024 10:15:30 AM"]).remarks[0][1]
+    )
     assert times(["2024-03-01 10:15:30", "2024-03-01 10:15:31"]).remarks == ()
     assert times(["13/03/2024 10:15:30"]).remarks == ()
 
@@ -205,7 +243,9 @@ def test_events_late_in_a_log_are_told_by_the_clock(tmp_path, monkeypatch):
     u = np.where((t >= 150) & (t < 150.3), 0.7, 1.0)
     moments = (f"{START + dt.timedelta(seconds=x):%Y-%m-%d %H:%M:%S.%f}" for x in t.tolist())
     rows = zip(moments, 110 * u, 20 * u**1.5, 8 * u**2, strict=True)
-    text = "\n".join(["Time,U (kV),P (MW),Q (Mvar)", *(f"{a},{b:.4f},{c:.4f},{d:.4f}" for a, b, c, d in rows)])
+    text = "\n".join(
+        ["Time,U (kV),P (MW),Q (Mvar)", *(f"{a},{b:.4f},{c:.4f},{d:.4f}" for a, b, c, d in rows)]
+    )
     (tmp_path / "log.csv").write_text(text + "\n")
     seen = tractexp.look("log.csv", progress=False)
     assert seen.content["files"][0]["start"] == START.isoformat()
@@ -226,7 +266,10 @@ def test_a_third_of_50_hz_is_read_however_it_is_written(tmp_path, written):
     assert comtrade.load(tmp_path / "r.cfg").frequency == pytest.approx(50 / 3, rel=3e-3)
 
 
-ROWS = [f"{k * 0.01:.2f},{0.7 if 60 <= k < 110 else 1.0},{0.5 if 60 <= k < 110 else 0.9},0.3456" for k in range(200)]
+ROWS = [
+    f"{k * 0.01:.2f},{0.7 if 60 <= k < 110 else 1.0},{0.5 if 60 <= k < 110 else 0.9},0.3456"
+    for k in range(200)
+]
 
 
 @pytest.mark.parametrize("cut", [1, 2, 3, 4])

@@ -19,7 +19,9 @@ def files(*events, loaded=True):
 @pytest.mark.parametrize("depth", [0.02, -0.03])
 def test_a_step_tells_the_exponents_that_the_load_has(depth):
     ratio = 1 - depth
-    told = unfitted.sentences(files(event(depth=depth, P=(30, 30 * ratio**1.4), Q=(5, 5 * ratio**3.1))))
+    told = unfitted.sentences(
+        files(event(depth=depth, P=(30, 30 * ratio**1.4), Q=(5, 5 * ratio**3.1)))
+    )
     assert "the step of" in told[0]
     assert "p_v 1.4 and q_v 3.1" in told[0]
     assert told[0].endswith("model.fixed.p_v=1.4 model.fixed.q_v=3.1")
@@ -42,7 +44,14 @@ def test_nothing_is_told_where_something_is_worth_fitting_or_no_load_is_there(si
 
 
 @pytest.mark.parametrize(
-    "odd", [event("swell"), event(depth=0.001), event(depth=1.0), event(P=(None, 1.0)), event(P=(-1.0, 1.0))]
+    "odd",
+    [
+        event("swell"),
+        event(depth=0.001),
+        event(depth=1.0),
+        event(P=(None, 1.0)),
+        event(P=(-1.0, 1.0)),
+    ],
 )
 def test_an_event_that_tells_no_exponent_leaves_the_advice(odd):
     assert unfitted.sentences(files(odd)) == [unfitted.DIPS, unfitted.AMBIENT]

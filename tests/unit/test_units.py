@@ -1,4 +1,6 @@
-"""Units of recordings: said by the file, by size or by a setting, or asked for; never a thousand by default."""
+"""Units of recordings: said by the file, by size or by a setting, or asked for; never a thousand by
+default.
+"""
 
 import numpy as np
 import pytest
@@ -24,16 +26,26 @@ def saved(tmp_path, volts, amps, by=(1.0, 1.0)):
     values = constant() * np.repeat(by, 3)[:, None]
     whole = recording(values)
     channels = [
-        Channel(c.name, c.raw, volts if i < 3 else amps, "", c.phase, gain=c.gain) for i, c in enumerate(whole.channels)
+        Channel(c.name, c.raw, volts if i < 3 else amps, "", c.phase, gain=c.gain)
+        for i, c in enumerate(whole.channels)
     ]
-    write(recording(values).__class__("", channels, whole.segments), tmp_path / "rec.cfg", "BINARY", 1999)
+    write(
+        recording(values).__class__("", channels, whole.segments),
+        tmp_path / "rec.cfg",
+        "BINARY",
+        1999,
+    )
     return tmp_path / "rec.cfg"
 
 
 def load(path, **settings):
     record = tractexp.read(path, **settings)[0].record
     event = tractexp.read(path, **settings)[0]
-    return event.U0 * record.base.voltage, event.P0 * record.base.power, event.Q0 * record.base.power
+    return (
+        event.U0 * record.base.voltage,
+        event.P0 * record.base.power,
+        event.Q0 * record.base.power,
+    )
 
 
 RIGHT = pytest.approx((KV, MW, MVAR), rel=2e-3)
@@ -42,27 +54,48 @@ RIGHT = pytest.approx((KV, MW, MVAR), rel=2e-3)
 @pytest.mark.parametrize(
     ("text", "unit"),
     [
-        ("кВ", ("voltage", 1.0)), ("В", ("voltage", 1e-3)), ("А", ("current", 1e-3)), ("кА", ("current", 1.0)),
-        ("мВ", ("voltage", 1e-6)), ("МВ", ("voltage", 1e3)), ("㎸", ("voltage", 1.0)), ("ｋＶ", ("voltage", 1.0)),
-        ("[kV]", ("voltage", 1.0)), ("kilovolts", ("voltage", 1.0)), ("千伏", ("voltage", 1.0)),
-        ("кA", ("current", 1.0)), ("pu", ("", 1.0)), ("V/kV", ("", 1.0)), ("", ("", 1.0)), ("W", ("", 1.0)),
+        ("кВ", ("voltage", 1.0)),
+        ("В", ("voltage", 1e-3)),
+        ("А", ("current", 1e-3)),
+        ("кА", ("current", 1.0)),
+        ("мВ", ("voltage", 1e-6)),
+        ("МВ", ("voltage", 1e3)),
+        ("㎸", ("voltage", 1.0)),
+        ("ｋＶ", ("voltage", 1.0)),
+        ("[kV]", ("voltage", 1.0)),
+        ("kilovolts", ("voltage", 1.0)),
+        ("千伏", ("voltage", 1.0)),
+        ("кA", ("current", 1.0)),
+        ("pu", ("", 1.0)),
+        ("V/kV", ("", 1.0)),
+        ("", ("", 1.0)),
+        ("W", ("", 1.0)),
         ("kV]", ("", 1.0)),
     ],
-)  # fmt: skip
+)
 def test_units_as_files_write_them(text, unit):
     assert unit_of(text) == unit
 
 
 def test_two_units_in_one_say_the_quantity_and_not_the_size():
     assert (quantity_of("В/кВ"), quantity_of("kA / A"), quantity_of("V/A"), quantity_of("m/s")) == (
-        "voltage", "current", "", "",
-    )  # fmt: skip
+        "voltage",
+        "current",
+        "",
+        "",
+    )
     assert amount("89.8 kV") == (89.8, "kV")
 
 
 @pytest.mark.parametrize(
     ("volts", "amps", "by"),
-    [("кВ", "А", (1, 1e3)), ("", "", (1e3, 1e3)), ("V", "", (1e3, 1e3)), ("kV", "", (1, 1e3)), ("В", "кА", (1e3, 1))],
+    [
+        ("кВ", "А", (1, 1e3)),
+        ("", "", (1e3, 1e3)),
+        ("V", "", (1e3, 1e3)),
+        ("kV", "", (1, 1e3)),
+        ("В", "кА", (1e3, 1)),
+    ],
 )
 def test_what_the_file_or_the_size_says_is_right(tmp_path, volts, amps, by):
     path = saved(tmp_path, volts, amps, by)
@@ -103,11 +136,18 @@ def test_volts_and_amperes_called_kilo_end_in_a_question(tmp_path, by):
     with pytest.raises(UserError, match=r"units=\{U: "):
         tractexp.read(path)
     assert not tractexp.look(path).commands
-    assert any("units={U: " in sentence for sentence in next(iter(tractexp.look(path).feeders))["said"])
-    assert load(path, units={"U": "V" if by[0] > 1 else "kV", "I": "A" if by[1] > 1 else "kA"}) == RIGHT
+    assert any(
+        "units={U: " in sentence for sentence in next(iter(tractexp.look(path).feeders))["said"]
+    )
+    assert (
+        load(path, units={"U": "V" if by[0] > 1 else "kV", "I": "A" if by[1] > 1 else "kA"})
+        == RIGHT
+    )
 
 
-@pytest.mark.parametrize("units", [{"U": "A"}, {"I": "kV"}, {"t": "s"}, {"U": "parsec"}, {"U": "-2 kV"}])
+@pytest.mark.parametrize(
+    "units", [{"U": "A"}, {"I": "kV"}, {"t": "s"}, {"U": "parsec"}, {"U": "-2 kV"}]
+)
 def test_a_setting_that_fits_nothing_is_refused(tmp_path, units):
     with pytest.raises(UserError, match="units"):
         tractexp.read(saved(tmp_path, "kV", "kA"), units=units)

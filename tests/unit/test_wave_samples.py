@@ -1,4 +1,6 @@
-"""Samples of waveforms by themselves: what is cut out, what is periodic, per unit of what, and blocks of residuals."""
+"""Samples of waveforms by themselves: what is cut out, what is periodic, per unit of what, and
+blocks of residuals.
+"""
 
 from types import SimpleNamespace
 
@@ -35,7 +37,9 @@ def test_samples_come_back_from_plain_data(late):
 
 def test_what_is_periodic_is_fitted_as_far_as_samples_and_rate_allow():
     t = np.arange(200) / RATE
-    x = np.array([0.3 + np.cos(2 * np.pi * FREQUENCY * t) + 0.1 * np.sin(6 * np.pi * FREQUENCY * t)])
+    x = np.array(
+        [0.3 + np.cos(2 * np.pi * FREQUENCY * t) + 0.1 * np.sin(6 * np.pi * FREQUENCY * t)]
+    )
     series = Periodic.of(t, x, FREQUENCY, RATE)
     assert len(series.coefficients) == 2 * int(0.45 * RATE / FREQUENCY) + 1
     assert pytest.approx(x, abs=1e-12) == (series.basis(t) @ series.coefficients).T
@@ -45,10 +49,13 @@ def test_what_is_periodic_is_fitted_as_far_as_samples_and_rate_allow():
 
 
 @pytest.mark.parametrize(
-    ("phases", "volts", "amperes"), [(3, np.sqrt(2 / 3), np.sqrt(2 / 3)), (1, np.sqrt(2), np.sqrt(2))]
+    ("phases", "volts", "amperes"),
+    [(3, np.sqrt(2 / 3), np.sqrt(2 / 3)), (1, np.sqrt(2), np.sqrt(2))],
 )
 def test_one_per_unit_is_the_peak_of_a_phase(phases, volts, amperes):
-    """Of line voltages and the power of three phases, or of the one voltage and power that there are."""
+    """Of line voltages and the power of three phases, or of the one voltage and power that there
+    are.
+    """
     record = SimpleNamespace(base=Base(voltage=110.0, power=20.0, frequency=FREQUENCY))
     V, I = _scale(record, phases)[[0, -1]]
     assert (pytest.approx(110.0 * volts), pytest.approx(20.0 / 110.0 * amperes)) == (V, I)
@@ -59,7 +66,13 @@ def test_a_voltage_that_nobody_recorded_is_an_event_of_its_load():
     t = 0.1 + np.arange(800) / RATE
     v = np.where((t > 0.3) & (t < 0.5), 0.6, 1.0) + 0.0j
     event = synthetic_event("planned", t, v, (1.0, 0.8, 0.6), FREQUENCY, 201, 400)
-    assert (event.depth, event.U0, event.P0, event.Q0, event.dips) == (pytest.approx(0.4), 1.0, 0.8, 0.6, 1)
+    assert (event.depth, event.U0, event.P0, event.Q0, event.dips) == (
+        pytest.approx(0.4),
+        1.0,
+        0.8,
+        0.6,
+        1,
+    )
     assert event.steady == slice(0, 201)
     waves = event.record.waves
     assert (waves.start, waves.rate, waves.phases) == (pytest.approx(0.1), pytest.approx(RATE), 3)
@@ -80,6 +93,7 @@ def test_blocks_are_counted_from_the_start_of_each_dip():
     assert all(b.stop - b.start >= 30 for b in whole)
     assert sum(b.stop - b.start for b in whole) == 2100
     assert sum(b.stop - b.start for b in after) == 2 * (1050 - 230)
-    assert len(blocks_of(events, drive, parameters=20)) > 2 * len(whole)  # shorter ones, three for each parameter
+    # shorter ones, three for each parameter
+    assert len(blocks_of(events, drive, parameters=20)) > 2 * len(whole)
     assert interval_factor(1) == pytest.approx(12.706, rel=1e-4)
     assert interval_factor(999) == pytest.approx(1.962, rel=1e-3)

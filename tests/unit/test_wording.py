@@ -7,25 +7,44 @@ from tractexp.wording import alternatives, in_words, join_words, list_figures, p
 
 @pytest.mark.parametrize(
     ("p", "told"),
-    [(1.0, "1"), (0.4543, "0.45"), (0.00012, "0.00012"), (2.64e-5, "2.6e-5"), (1.1e-6, "1.1e-6"),
-     (9e-7, "less than one in a million"), (6e-300, "less than one in a million"), (0.0, "less than one in a million")],
-)  # fmt: skip
+    [
+        (1.0, "1"),
+        (0.4543, "0.45"),
+        (0.00012, "0.00012"),
+        (2.64e-5, "2.6e-5"),
+        (1.1e-6, "1.1e-6"),
+        (9e-7, "less than one in a million"),
+        (6e-300, "less than one in a million"),
+        (0.0, "less than one in a million"),
+    ],
+)
 def test_a_probability_that_nobody_can_picture_is_told_in_words(p, told):
     assert in_words(p) == told
 
 
 @pytest.mark.parametrize(
     ("value", "error", "told"),
-    [(0.0220163, 7.78e-5, "0.022016 ± 0.000078"), (1.5, 3.6, "1.5 ± 3.6"), (-1.0241, 0.0262, "-1.024 ± 0.026"),
-     (9151.0, 20412.0, "9151 ± 2e4"), (1.23456e-9, 2.5e-11, "1.235e-9 ± 2.5e-11"), (0.1234567, float("nan"), "0.1235"),
-     (3.0, 0.0, "3")],
-)  # fmt: skip
+    [
+        (0.0220163, 7.78e-5, "0.022016 ± 0.000078"),
+        (1.5, 3.6, "1.5 ± 3.6"),
+        (-1.0241, 0.0262, "-1.024 ± 0.026"),
+        (9151.0, 20412.0, "9151 ± 2e4"),
+        (1.23456e-9, 2.5e-11, "1.235e-9 ± 2.5e-11"),
+        (0.1234567, float("nan"), "0.1235"),
+        (3.0, 0.0, "3"),
+    ],
+)
 def test_a_value_has_the_digits_that_its_error_leaves(value, error, told):
     assert with_error(value, error) == told
 
 
 def test_names_are_listed_as_in_a_sentence():
-    assert [join_words(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == ["", "a", "a and b", "a, b and c"]
+    assert [join_words(names) for names in ((), ("a",), ("a", "b"), ("a", "b", "c"))] == [
+        "",
+        "a",
+        "a and b",
+        "a, b and c",
+    ]
     assert join_words(("a", "b"), "or") == "a or b"
 
 

@@ -1,4 +1,6 @@
-"""Workbooks whose cells reach further than memory does end their reader, not the process that asked."""
+"""Workbooks whose cells reach further than memory does end their reader, not the process that
+asked.
+"""
 
 import hostile
 import pytest
@@ -13,7 +15,9 @@ resource = pytest.importorskip("resource")
 @pytest.mark.parametrize("name", ["far_cell.xlsx", "far_cell_of_a_table.xlsx"])
 def test_a_cell_in_the_last_row_and_column_is_a_sentence(name, tmp_path):
     path = hostile.INPUTS[name](tmp_path / name)
-    with pytest.raises(UserError, match=r"xlsx: it takes more than 2 GB .* save the workbook without it"):
+    with pytest.raises(
+        UserError, match=r"xlsx: it takes more than 2 GB .* save the workbook without it"
+    ):
         tractexp.look(str(path))
 
 

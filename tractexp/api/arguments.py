@@ -1,4 +1,6 @@
-"""What a person may give: arguments checked against a signature, and choices found by name as Hydra finds them."""
+"""What a person may give: arguments checked against a signature, and choices found by name as Hydra
+finds them.
+"""
 
 import dataclasses
 import functools
@@ -19,10 +21,12 @@ R = TypeVar("R")
 
 
 def public(function: Callable[P, R]) -> Callable[P, R]:
-    """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one sentence.
+    """A call whose arguments are checked: an unknown name or a wrong type is a `UserError` in one
+    sentence.
 
-    Sentences from below name a setting as the user wrote it: the argument (`bounds.C`) of this call, and the key of the
-    configuration (`model.bounds.C`) on the command line, which calls the function without this door (`inspect.unwrap`).
+    Sentences from below name a setting as the user wrote it: the argument (`bounds.C`) of this
+    call, and the key of the configuration (`model.bounds.C`) on the command line, which calls the
+    function without this door (`inspect.unwrap`).
     """
     signature = inspect.signature(function)
     named = [p.name for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
@@ -32,7 +36,9 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
     def called(*args: P.args, **keywords: P.kwargs) -> R:
         for name in keywords:
             if name not in named and not open_ended:
-                raise UserError(f"{where} has no argument '{name}'{among(name, named, 'Arguments')}")
+                raise UserError(
+                    f"{where} has no argument '{name}'{among(name, named, 'Arguments')}"
+                )
         try:
             arguments = signature.bind(*args, **keywords).arguments
         except TypeError as error:
@@ -41,7 +47,10 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
             parameter = signature.parameters[name]
             if parameter.kind not in (parameter.VAR_POSITIONAL, parameter.VAR_KEYWORD):
                 check_kind(name, value, parameter.annotation)
-        with settings_as(function.__name__, lambda: {*named, *keywords, *(_settings("data") if open_ended else ())}):
+        with settings_as(
+            function.__name__,
+            lambda: {*named, *keywords, *(_settings("data") if open_ended else ())},
+        ):
             return function(*args, **keywords)
 
     return called
@@ -49,14 +58,19 @@ def public(function: Callable[P, R]) -> Callable[P, R]:
 
 @dataclass(frozen=True)
 class Choice(Plain):
-    """What is chosen in a group: the name of the choice, and the plugin's name and settings it stands for."""
+    """What is chosen in a group: the name of the choice, and the plugin's name and settings it
+    stands for.
+    """
 
     name: str
     node: Mapping[str, Any]
 
     @classmethod
-    def of(cls, group: str, chosen: "str | Mapping[str, Any] | Sequence[Any] | Choice | None") -> "Choice":
-        """The choice of a name, of a mapping of `name` and settings that replace the choice's own, or of several.
+    def of(
+        cls, group: str, chosen: "str | Mapping[str, Any] | Sequence[Any] | Choice | None"
+    ) -> "Choice":
+        """The choice of a name, of a mapping of `name` and settings that replace the choice's own,
+        or of several.
 
         None is the default of `conf/config.yaml`.
         """
@@ -68,21 +82,29 @@ class Choice(Plain):
             chosen = plugin.of_several(group, chosen)
         asked = {"name": chosen} if isinstance(chosen, str) else dict(chosen)
         if "name" not in asked:
-            raise UserError(f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings")
+            raise UserError(
+                f"{group}={asked} lacks 'name'; give a name, or a mapping of 'name' and settings"
+            )
         name = str(asked.pop("name"))
         node = {**read_choice(group, name), **asked}
         return cls(name, complete_settings(group, node))
 
     @classmethod
     def several(cls, group: str, chosen: Any) -> "list[Choice]":
-        """The choices of one, of a list, or of a mapping of the names to call them by to each; argument `groups`.
+        """The choices of one, of a list, or of a mapping of the names to call them by to each;
+        argument `groups`.
 
-        A mapping that has the key `name` is one choice with settings. Raises `UserError` for none and for doubles.
+        A mapping that has the key `name` is one choice with settings. Raises `UserError` for none
+        and for doubles.
         """
         if isinstance(chosen, Mapping) and "name" not in chosen:
-            several = [dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()]
+            several = [
+                dataclasses.replace(cls.of(group, one), name=name) for name, one in chosen.items()
+            ]
         else:
-            listed = chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else [chosen]
+            listed = (
+                chosen if isinstance(chosen, Sequence) and not isinstance(chosen, str) else [chosen]
+            )
             several = [cls.of(group, one) for one in listed]
         check_distinct(f"{group}s", [one.name for one in several])
         return several
@@ -101,4 +123,5 @@ def complete_settings(group: str, node: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _settings(group: str) -> list[str]:
-    return [f.name for cls in plugin.discover().get(group, {}).values() for f in dataclasses.fields(cls)]  # type: ignore[arg-type]
+    classes = plugin.discover().get(group, {}).values()
+    return [f.name for cls in classes for f in dataclasses.fields(cls)]  # type: ignore[arg-type]

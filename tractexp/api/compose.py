@@ -1,4 +1,6 @@
-"""A load model by name or put together from parts, and what is known of its parameters beforehand."""
+"""A load model by name or put together from parts, and what is known of its
+parameters beforehand.
+"""
 
 import dataclasses
 import functools
@@ -24,7 +26,9 @@ GROUP, DOMAIN, PARTS = "model", "domain", ("motor", "static")
 
 
 class Portable:
-    """Base of dataclasses that travel to other processes by their fields: what they cache is compiled code."""
+    """Base of dataclasses that travel to other processes by their fields: what they cache is
+    compiled code.
+    """
 
     def __getstate__(self) -> dict[str, Any]:
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(self)}  # type: ignore[arg-type]
@@ -46,14 +50,23 @@ class LoadModel(Portable, Plain, Tabulated):
     window: float | str | None = None
     priors: bool = False
     shown_effects: bool = False
-    shown: Mapping[str, str] = field(default_factory=dict)  # {effect that the records show: how they do}
+    # {effect that the records show: how they do}
+    shown: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def node(self) -> dict[str, Any]:
-        """The parts, as `result.json` keeps them; integration, domain and window where they are not the usual ones."""
-        parts = {"motor": dict(self.motor), "static": dict(self.static), "effects": list(self.effects)}
+        """The parts, as `result.json` keeps them; integration, domain and window where they are not
+        the usual ones.
+        """
+        parts = {
+            "motor": dict(self.motor),
+            "static": dict(self.static),
+            "effects": list(self.effects),
+        }
         usual = {"integration": "classical", "domain": "phasors", "window": None}
-        return parts | {key: value for key, plain in usual.items() if (value := getattr(self, key)) != plain}
+        return parts | {
+            key: value for key, plain in usual.items() if (value := getattr(self, key)) != plain
+        }
 
     @functools.cached_property
     def model(self) -> "Model":
@@ -67,13 +80,17 @@ class LoadModel(Portable, Plain, Tabulated):
 
     @functools.cached_property
     def parameters(self) -> Mapping[str, Any]:
-        """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit, about, symbol)."""
+        """The parameters by name, with bounds as set here (`Parameter`: default, bounds, unit,
+        about, symbol).
+        """
         from tractexp.inference.problem import narrow_bounds
 
         return {p.name: p for p in narrow_bounds(self.model.parameters, self.bounds)}
 
     def with_(self, **changes: Any) -> "LoadModel":
-        """The model with what is given (not None) in place; bounds and fixed values are added to those there are."""
+        """The model with what is given (not None) in place; bounds and fixed values are added to
+        those there are.
+        """
         settings = {key: value for key, value in changes.items() if value is not None}
         for key in ("bounds", "fixed"):
             if key in settings:
@@ -81,7 +98,9 @@ class LoadModel(Portable, Plain, Tabulated):
         return replace(self, **settings)
 
     def fitting(self, events: Sequence["Event"]) -> "LoadModel":
-        """The model with the effects that some of the events show, where it is one of `shown_effects`."""
+        """The model with the effects that some of the events show, where it is one of
+        `shown_effects`.
+        """
         if not self.shown_effects:
             return self
         shown = {**self.shown, **effects_shown(self.model, events)}
@@ -89,14 +108,21 @@ class LoadModel(Portable, Plain, Tabulated):
 
     def table(self) -> Table:
         rows = [
-            [p.name, self.fixed.get(p.name, p.default), p.unit,
-             "fixed" if p.name in self.fixed else f"{p.bounds[0]:g} .. {p.bounds[1]:g}", p.about]
+            [
+                p.name,
+                self.fixed.get(p.name, p.default),
+                p.unit,
+                "fixed" if p.name in self.fixed else f"{p.bounds[0]:g} .. {p.bounds[1]:g}",
+                p.about,
+            ]
             for p in self.parameters.values()
-        ]  # fmt: skip
+        ]
         return Table(["parameter", "default", "unit", "bounds", "meaning"], rows, self.model.title)
 
     def _repr_html_(self) -> str:
-        return super()._repr_html_() + "".join(f"<p>$${quoting.html(line)}$$</p>" for line in self.model.latex())
+        return super()._repr_html_() + "".join(
+            f"<p>$${quoting.html(line)}$$</p>" for line in self.model.latex()
+        )
 
     def _repr_latex_(self) -> str:
         return "\n\n".join(f"$${line}$$" for line in self.model.latex())
@@ -119,30 +145,42 @@ def compose(
     priors: bool | None = None,
     shown_effects: bool | None = None,
 ) -> LoadModel:
-    """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor beside a static load.
+    """A load model: a choice of `conf/model` (by name, or the path of a YAML file), or a motor
+    beside a static load.
 
-    `motor` and `static` are names ("double_cage"; "none" for without), or mappings of `name` and the plugin's settings;
-    a list of motors is several groups side by side (["stator_flux", "double_cage"]). They replace those of `model`, and
-    one left out is that of the paper's model. `effects` names what is added to the equations. `bounds` {name: [lower,
-    upper]} and `fixed` {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
-    parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample, as many as needed
-    by default; `integration` "printed" is Eq. (4) of the paper as it stands; with `domain` "waves" the same equations
-    draw sampled currents, and what phasors neglect is kept. `window` is that over which the recorder averages phasors:
-    seconds, the name of an estimator, or "recorded", as the records say. With `priors` a fit holds the motor to what
-    machines usually are, where its records do not tell; with `shown_effects` it has the effects that its records show.
+    `motor` and `static` are names ("double_cage"; "none" for without), or mappings of `name` and
+    the plugin's settings; a list of motors is several groups side by side (["stator_flux",
+    "double_cage"]). They replace those of `model`, and one left out is that of the paper's model.
+    `effects` names what is added to the equations. `bounds` {name: [lower, upper]} and `fixed`
+    {name: value}, in the parameters' own units, are added to the choice's; `per_event` names
+    parameters with a value of their own in each event; `substeps` are Runge-Kutta steps per sample,
+    as many as needed by default; `integration` "printed" is Eq. (4) of the paper as it stands; with
+    `domain` "waves" the same equations draw sampled currents, and what phasors neglect is kept.
+    `window` is that over which the recorder averages phasors: seconds, the name of an estimator, or
+    "recorded", as the records say. With `priors` a fit holds the motor to what machines usually
+    are, where its records do not tell; with `shown_effects` it has the effects that its records
+    show.
 
-    Raises `UserError` for an unknown name or an effect that does not fit the equations; the values are checked where
-    the model is used.
+    Raises `UserError` for an unknown name or an effect that does not fit the equations; the values
+    are checked where the model is used.
     """
     composed = model_of(model, domain)
     chosen_parts = {"motor": motor, "static": static}
     parts = {
-        part: Choice.of(f"model/{part}", chosen).node for part, chosen in chosen_parts.items() if chosen is not None
+        part: Choice.of(f"model/{part}", chosen).node
+        for part, chosen in chosen_parts.items()
+        if chosen is not None
     }
     settings = {
-        "effects": effects, "substeps": substeps, "per_event": per_event, "integration": integration, "domain": domain,
-        "window": window, "priors": priors, "shown_effects": shown_effects,
-    }  # fmt: skip
+        "effects": effects,
+        "substeps": substeps,
+        "per_event": per_event,
+        "integration": integration,
+        "domain": domain,
+        "window": window,
+        "priors": priors,
+        "shown_effects": shown_effects,
+    }
     composed = composed.with_(bounds=bounds, fixed=fixed, **settings, **parts)
     _ = composed.parameters
     for key in composed.fixed:
@@ -158,7 +196,11 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
     from tractexp.model.parts import Effect
 
     names = discover()["effect"].keys() - {effect.name for effect in model.effects}
-    showing = [cls() for cls in (get("effect", name) for name in sorted(names)) if cls.shown is not Effect.shown]
+    showing = [
+        cls()
+        for cls in (get("effect", name) for name in sorted(names))
+        if cls.shown is not Effect.shown
+    ]
     taken = [effect for effect in showing if model.acceptance(effect).refusal is None]
     seen = domain_of(model).events(events) if taken else ()
     how = {effect.name: next(filter(None, map(effect.shown, seen)), "") for effect in taken}
@@ -166,13 +208,16 @@ def effects_shown(model: "Model", events: Sequence["Event"]) -> dict[str, str]:
 
 
 def model_of(given: Any, domain: str | None = None) -> LoadModel:
-    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed `Model`.
+    """What a call takes as `model`: a name, a path, a mapping of parts, a `LoadModel` or a composed
+    `Model`.
 
     None is the usual model of the `domain`. Raises `UserError` for an unknown name.
     """
     if domain is not None:
         check_choice("domain", domain, sorted(choices()[DOMAIN]))
-        return replace(model_of(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain)
+        return replace(
+            model_of(given or read_replacements(DOMAIN, domain).get(GROUP)), domain=domain
+        )
     if isinstance(given, LoadModel):
         return given
     if given is None or isinstance(given, str | Path):
@@ -182,10 +227,17 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
     keys = [f.name for f in dataclasses.fields(LoadModel)]
     for key in given:
         if key not in keys:
-            raise UserError(f"{setting(f'model.{key}')}: there is no such key{among(key, keys, 'Keys')}")
+            raise UserError(
+                f"{setting(f'model.{key}')}: there is no such key{among(key, keys, 'Keys')}"
+            )
     if missing := [part for part in PARTS if not given.get(part)]:
-        raise UserError(f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for without)")
-    composed: dict[str, Any] = dict(given) | {part: Choice.of(f"model/{part}", given[part]).node for part in PARTS}
+        raise UserError(
+            f"model lacks {' and '.join(missing)}; name a motor and a static load ('none' for"
+            " without)"
+        )
+    composed: dict[str, Any] = dict(given) | {
+        part: Choice.of(f"model/{part}", given[part]).node for part in PARTS
+    }
     for item in dataclasses.fields(LoadModel):
         if item.name in composed:
             check_kind(f"model.{item.name}", composed[item.name], item.type)
@@ -195,9 +247,21 @@ def model_of(given: Any, domain: str | None = None) -> LoadModel:
 def _node(model: Any) -> dict[str, Any]:
     """The parts of a model composed of plugins."""
     try:
-        motor, static = ({"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static))
-        parts = {"motor": motor, "static": static, "effects": [effect.name for effect in model.effects]}
-        return parts | {"integration": model.integration, "domain": model.domain, "window": model.window}
+        motor, static = (
+            {"name": p.name, **dataclasses.asdict(p)} for p in (model.motor, model.static)
+        )
+        parts = {
+            "motor": motor,
+            "static": static,
+            "effects": [effect.name for effect in model.effects],
+        }
+        return parts | {
+            "integration": model.integration,
+            "domain": model.domain,
+            "window": model.window,
+        }
     except AttributeError:
         kind = type(model).__name__
-        raise UserError(f"model is of type {kind}; give a name, or what tractexp.compose makes") from None
+        raise UserError(
+            f"model is of type {kind}; give a name, or what tractexp.compose makes"
+        ) from None

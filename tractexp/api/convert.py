@@ -21,13 +21,16 @@ from tractexp.recording.cut import cut_recording
 from tractexp.recording.reader import WaveformReader
 
 WHAT = ("recording", "events")
-DIP_MARGIN = 0.1  # s of waveforms kept about a dip's record, for the windows of its first and last phasors
+# s of waveforms kept about a dip's record, for the windows of its first and last phasors
+DIP_MARGIN = 0.1
 Part = tuple[str, Recording | Record]  # what is written, and its name
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Converted(Tabulated):
-    """What was written: `files`, each table with its sidecar, each .cfg with its .dat; `said` is a sentence on each."""
+    """What was written: `files`, each table with its sidecar, each .cfg with its .dat; `said` is a
+    sentence on each.
+    """
 
     files: Sequence[Path]
     said: Sequence[str]
@@ -41,18 +44,24 @@ class Converted(Tabulated):
 
 @public
 def convert(
-    *sources: Any, to: str | None = None, what: str | None = None, folder: str | Path = ".", **settings: Any
-) -> Converted:  # fmt: skip
-    """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE into `folder`.
+    *sources: Any,
+    to: str | None = None,
+    what: str | None = None,
+    folder: str | Path = ".",
+    **settings: Any,
+) -> Converted:
+    """Write files that can be read, or events that were read, as Parquet, CSV or COMTRADE into
+    `folder`.
 
-    `to` is "parquet" (the default), "csv" (tables of a row per sample, with a sidecar in JSON that says everything
-    else), "comtrade" (.cfg and .dat), "cff" or the name of a plugin. `what` is "recording", all channels of a file as
-    they were recorded (the default, where it holds waveforms), or "events", the record of each dip; for COMTRADE those
-    are the waveforms about each dip, or U, P, Q in kV, MW, Mvar where there are none. `settings` are those of the
-    reader, as for `tractexp.read`.
+    `to` is "parquet" (the default), "csv" (tables of a row per sample, with a sidecar in JSON that
+    says everything else), "comtrade" (.cfg and .dat), "cff" or the name of a plugin. `what` is
+    "recording", all channels of a file as they were recorded (the default, where it holds
+    waveforms), or "events", the record of each dip; for COMTRADE those are the waveforms about each
+    dip, or U, P, Q in kV, MW, Mvar where there are none. `settings` are those of the reader, as for
+    `tractexp.read`.
 
-    Reading what was written gives the same: the bits of numbers, the integers of a recorder. Raises `UserError` for
-    what cannot be read, and where a source would be overwritten.
+    Reading what was written gives the same: the bits of numbers, the integers of a recorder. Raises
+    `UserError` for what cannot be read, and where a source would be overwritten.
     """
     if not sources:
         raise UserError("nothing to read: give a file, or events as tractexp.read gives them")
@@ -64,7 +73,10 @@ def convert(
 def writer_of(to: str | None) -> Writer:
     """The writer of that name, or the usual one."""
     writers = discover()["writer"]
-    return build("writer", {"name": to or next(name for name, cls in writers.items() if getattr(cls, "usual", False))})
+    return build(
+        "writer",
+        {"name": to or next(name for name, cls in writers.items() if getattr(cls, "usual", False))},
+    )
 
 
 def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
@@ -74,7 +86,8 @@ def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
     waves = isinstance(reader, WaveformReader)
     if what == WHAT[0] and not waves:
         raise UserError(
-            f"{TASK.what}=recording: the file holds U, P, Q, no recording of waveforms; use {TASK.what}=events"
+            f"{TASK.what}=recording: the file holds U, P, Q, no recording of waveforms; use"
+            f" {TASK.what}=events"
         )
     if waves and what in (None, WHAT[0]):
         return [(Path(reader.path).stem, reader.recording())]
@@ -82,20 +95,32 @@ def parts_of(reader: Any, writer: Writer, what: str | None) -> list[Part]:
     records = [*read.train, *read.validate]
     if waves and writer.waves:
         whole = reader.recording()
-        return [(one.name, cut_recording(whole, one.t[0] - DIP_MARGIN, one.t[-1] + DIP_MARGIN)) for one in records]
+        return [
+            (one.name, cut_recording(whole, one.t[0] - DIP_MARGIN, one.t[-1] + DIP_MARGIN))
+            for one in records
+        ]
     return [(one.name, one) for one in records]
 
 
 def written(parts: Sequence[Part], writer: Writer, folder: Path) -> Converted:
-    """Write everything into a folder; raises `UserError` before anything is written over what was read."""
+    """Write everything into a folder; raises `UserError` before anything is written over what was
+    read.
+    """
     names = unique(["".join("_" if c in '/\\:*?"<>|' else c for c in name) for name, _ in parts])
     paths = [folder / f"{name}{writer.endings[0]}" for name in names]
     for path, (_, part) in zip(paths, parts, strict=True):
         _check_source(path, part.source, writer)
     files: list[Path] = []
     for path, (_, part) in zip(paths, parts, strict=True):
-        files += writer.recording(part, path) if isinstance(part, Recording) else writer.record(part, path)
-    return Converted(files, [_describe_written_part(part, path) for path, (_, part) in zip(paths, parts, strict=True)])
+        files += (
+            writer.recording(part, path)
+            if isinstance(part, Recording)
+            else writer.record(part, path)
+        )
+    return Converted(
+        files,
+        [_describe_written_part(part, path) for path, (_, part) in zip(paths, parts, strict=True)],
+    )
 
 
 def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, Any]) -> list[Part]:
@@ -107,21 +132,34 @@ def _parts(source: Any, writer: Writer, what: str | None, settings: dict[str, An
         return [part for one in source for part in _parts(one, writer, what, settings)]
     if not isinstance(source, Record | Event):
         kind = type(source).__name__
-        raise UserError(f"a value of type {kind} cannot be converted; give a file, or events as tractexp.read gives")
+        raise UserError(
+            f"a value of type {kind} cannot be converted; give a file, or events as tractexp.read"
+            " gives"
+        )
     if settings or what == WHAT[0]:
         reason = ", ".join(settings) or f"{TASK.what}=recording"
-        raise UserError(f"{reason}: events are taken as they are; give the file, whose recording or settings are meant")
+        raise UserError(
+            f"{reason}: events are taken as they are; give the file, whose recording or settings"
+            " are meant"
+        )
     record = source.record if isinstance(source, Event) else source
     return [(record.name, record)]
 
 
 def _check_source(path: Path, source: str, writer: Writer) -> None:
-    """Raise `UserError` where a file to be written is one that was read, or would be taken for its sidecar."""
+    """Raise `UserError` where a file to be written is one that was read, or would be taken for its
+    sidecar.
+    """
     for own in _read_from(source):
         files = {path.with_suffix(ending).resolve() for ending in writer.endings}
-        taken = {own.resolve(), own.with_suffix(".dat" if own.suffix.lower() == ".cfg" else ".json").resolve()}
+        taken = {
+            own.resolve(),
+            own.with_suffix(".dat" if own.suffix.lower() == ".cfg" else ".json").resolve(),
+        }
         if both := files & taken:
-            raise UserError(f"{min(both).name} belongs to {own}, which is converted; give another folder")
+            raise UserError(
+                f"{min(both).name} belongs to {own}, which is converted; give another folder"
+            )
 
 
 def _read_from(source: str) -> Iterator[Path]:
@@ -140,13 +178,18 @@ def _describe_written_part(part: Recording | Record, path: Path) -> str:
 
 @plugin
 class Convert(Task, call=convert, given=("sources", "folder", "settings")):
-    """Write what was read as Parquet, CSV or COMTRADE: the whole recording, or the record of each dip."""
+    """Write what was read as Parquet, CSV or COMTRADE: the whole recording, or the record of each
+    dip.
+    """
 
     reads = ("data",)
     instead = {"model": "a conversion has no model"}
 
-    to: str = ""  # parquet (where none is named), csv (both with a sidecar in JSON), comtrade (.cfg and .dat), cff
-    what: str | None = None  # recording or events; null: the recording, where the file holds waveforms
+    # parquet (where none is named), csv (both with a sidecar in JSON), comtrade (.cfg and .dat),
+    # cff
+    to: str = ""
+    # recording or events; null: the recording, where the file holds waveforms
+    what: str | None = None
 
     def run(self, job: Job) -> None:
         writer = writer_of(self.to)

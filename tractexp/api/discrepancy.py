@@ -1,7 +1,8 @@
-"""Find where simulation and measurement disagree, name the missing effect, add it, show the gap shrink.
+"""Find where simulation and measurement disagree, name the missing effect, add it, show the gap
+shrink.
 
-The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in `_steps`, `_estimated`
-and `Investigation.write_results`.
+The investigation itself is `tractexp.discrepancy`; everything this file asks of it stands in
+`_steps`, `_estimated` and `Investigation.write_results`.
 """
 
 import functools
@@ -48,8 +49,8 @@ class Question(Given):
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a model is from some events: the model's error {value, interval} of the response, relative errors of
-    Eq. (20), and chi-squared per sample.
+    """How far a model is from some events: the model's error {value, interval} of the response,
+    relative errors of Eq. (20), and chi-squared per sample.
 
     `epsilon_i` is that of the currents, where those are compared.
     """
@@ -63,7 +64,9 @@ class Misfit:
 
 @dataclass(frozen=True)
 class Gap:
-    """The misfit of the base model and of the extended one; `closed` is the share of the squared error that went."""
+    """The misfit of the base model and of the extended one; `closed` is the share of the squared
+    error that went.
+    """
 
     before: Misfit
     after: Misfit
@@ -81,7 +84,9 @@ class Gaps:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Investigation(Written):
-    """What is missing in a model, how sure that is, and the model with it. `content` is that of `discrepancy.json`."""
+    """What is missing in a model, how sure that is, and the model with it. `content` is that of
+    `discrepancy.json`.
+    """
 
     kind = "investigation"
     page = "discrepancy.html"
@@ -108,17 +113,23 @@ class Investigation(Written):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The effects added to the model, by the catalogue's names; `forms` says at which place and by which law."""
+        """The effects added to the model, by the catalogue's names; `forms` says at which place and
+        by which law.
+        """
         return tuple(self.content["effects"])
 
     @property
     def forms(self) -> Mapping[str, Mapping[str, Any]]:
-        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as `discrepancy.json` holds it."""
+        """{name: {place, kind, law, differs, effect, curve}} of each effect added, as
+        `discrepancy.json` holds it.
+        """
         return self.content["forms"]
 
     @property
     def members(self) -> tuple[str, ...]:
-        """The effects added as `model.effects` takes them: of another law or place, the family's member."""
+        """The effects added as `model.effects` takes them: of another law or place, the family's
+        member.
+        """
         return tuple(form["effect"] for form in self.forms.values())
 
     @property
@@ -130,17 +141,28 @@ class Investigation(Written):
     def where(self) -> Table:
         """The intervals in which the base model disagrees with the records, the loudest first."""
         places = self.content["where"]
-        return Table([*places[0]] if places else [], [[*place.values()] for place in places], "where they disagree")
+        return Table(
+            [*places[0]] if places else [],
+            [[*place.values()] for place in places],
+            "where they disagree",
+        )
 
     @property
     def candidates(self) -> Table:
-        """Every set of effects that was fitted and every single one that was tested, with what became of it."""
-        rows = [[" and ".join(c["effects"]), c["status"], c["likelihood_ratio"]] for c in self.content["candidates"]]
+        """Every set of effects that was fitted and every single one that was tested, with what
+        became of it.
+        """
+        rows = [
+            [" and ".join(c["effects"]), c["status"], c["likelihood_ratio"]]
+            for c in self.content["candidates"]
+        ]
         return Table(["effects", "status", "deviance lowered by"], rows, "candidates")
 
     @property
     def remainder(self) -> Table:
-        """Where nothing explains the disagreement: the shapes in what the base model leaves, the loudest first."""
+        """Where nothing explains the disagreement: the shapes in what the base model leaves, the
+        loudest first.
+        """
         entry = self.content["remainder"]
         shapes = entry["of_base"] if entry else []
         columns = [*shapes[0]] if shapes else []
@@ -149,7 +171,9 @@ class Investigation(Written):
 
     @property
     def proposal(self) -> Mapping[str, Any] | None:
-        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None where there is none."""
+        """The term proposed for an unexplained disagreement, as `discrepancy.json` has it; None
+        where there is none.
+        """
         return self.content["proposal"]
 
     @property
@@ -161,7 +185,9 @@ class Investigation(Written):
 
     @property
     def sizes(self) -> list[str]:
-        """How large the effects named are, with standard errors, as text: their parameters that have a null."""
+        """How large the effects named are, with standard errors, as text: their parameters that
+        have a null.
+        """
         return self._sizes(self.members, self.content["parameters"])
 
     @property
@@ -172,13 +198,18 @@ class Investigation(Written):
 
     @staticmethod
     def _sizes(effects: Sequence[str], parameters: Mapping[str, Mapping[str, Any]]) -> list[str]:
-        own = [p for name in effects for p in get("effect", name)().parameters if p.null is not None]
+        own = [
+            p for name in effects for p in get("effect", name)().parameters if p.null is not None
+        ]
         return [_size(p.name, parameters[p.name], p.unit) for p in own]
 
     @property
     def sets(self) -> list[Mapping[str, Any]]:
-        """The sets of effects that were refitted: `effects`, `status`, `likelihood_ratio`, `parameters`."""
-        return [row for row in self.content["candidates"] if "why" not in row]  # single tests say why
+        """The sets of effects that were refitted: `effects`, `status`, `likelihood_ratio`,
+        `parameters`.
+        """
+        # single tests say why
+        return [row for row in self.content["candidates"] if "why" not in row]
 
     @property
     def gap(self) -> Gaps:
@@ -193,19 +224,28 @@ class Investigation(Written):
 
     @functools.cached_property
     def extended(self) -> LoadModel:
-        """The model with the effects named: a model again, for any call. Raises `UserError` where none was named."""
+        """The model with the effects named: a model again, for any call. Raises `UserError` where
+        none was named.
+        """
         model = self.question.model
         if not self.names:
             raise UserError(
-                f"there is no extended model: the verdict is '{self.verdict}', and nothing was added; go on with the"
+                f"there is no extended model: the verdict is '{self.verdict}', and nothing was"
+                " added; go on with the"
                 " base model (.question.model), or give records that show more"
             )
-        window = self.content.get("recorder_window", self.content["phasor_window"])  # the latter of earlier versions
-        return model.with_(effects=sorted({*model.effects, *self.members}), fixed=self.content["held"], window=window)
+        # the latter of earlier versions
+        window = self.content.get("recorder_window", self.content["phasor_window"])
+        return model.with_(
+            effects=sorted({*model.effects, *self.members}),
+            fixed=self.content["held"],
+            window=window,
+        )
 
     @functools.cached_property
     def fit(self) -> Identification:
-        """The extended model with the parameters that the investigation found; it predicts, simulates and exports.
+        """The extended model with the parameters that the investigation found; it predicts,
+        simulates and exports.
 
         The base model where no effect was named.
         """
@@ -213,12 +253,16 @@ class Investigation(Written):
         return Identification(replace(self.result, standard_errors=errors))
 
     def predict(self, event: Any = None, **voltage: Any) -> Response:
-        """What the model of `fit` draws in an event, or from a voltage: see `Identification.predict`."""
+        """What the model of `fit` draws in an event, or from a voltage: see
+        `Identification.predict`.
+        """
         return self.fit.predict(event, **voltage)
 
     @functools.cached_property
     def steps(self) -> "Steps":
-        """The chain of results, from the records to the verdict; of a loaded result it is investigated again."""
+        """The chain of results, from the records to the verdict; of a loaded result it is
+        investigated again.
+        """
         return self.behind or _steps(self.question, False)
 
     def table(self) -> Table:
@@ -238,16 +282,22 @@ class Investigation(Written):
         return discrepancy.report(self.steps, self.content, self.result.identities)
 
     def write_results(self, folder: Path, home: Path | None = None) -> list[Path]:
-        """discrepancy.json and result.json; `home` is the folder that the files will be in, by default `folder`.
+        """discrepancy.json and result.json; `home` is the folder that the files will be in, by
+        default `folder`.
 
-        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains, and the plugin of
-        a term where one is proposed.
+        conf/model/extended.yaml where an effect was named, unexplained.csv where nothing explains,
+        and the plugin of a term where one is proposed.
         """
         from tractexp.discrepancy import discrepancy_json
         from tractexp.discrepancy.discrepancy_json import MODEL_FILE
 
         model = self.question.model
-        known = {"bounds": model.bounds, "fixed": model.fixed, "substeps": model.substeps, "priors": model.priors}
+        known = {
+            "bounds": model.bounds,
+            "fixed": model.fixed,
+            "substeps": model.substeps,
+            "priors": model.priors,
+        }
         base = {**model.node, **known}
         paths = [
             files.write_json(folder / "discrepancy.json", self.content),
@@ -255,12 +305,18 @@ class Investigation(Written):
         ]
         if self.names:
             paths.append(
-                discrepancy_json.write_model(self.steps, base, folder / MODEL_FILE, (home or folder) / MODEL_FILE)
+                discrepancy_json.write_model(
+                    self.steps, base, folder / MODEL_FILE, (home or folder) / MODEL_FILE
+                )
             )
         if not self.complete:
             paths.append(discrepancy_json.write_left(self.steps, folder / "unexplained.csv"))
         if self.content["proposal"]:
-            paths.append(discrepancy_json.write_plugin(self.steps, folder / self.content["proposal"]["plugin"]))
+            paths.append(
+                discrepancy_json.write_plugin(
+                    self.steps, folder / self.content["proposal"]["plugin"]
+                )
+            )
         return paths
 
 
@@ -277,7 +333,8 @@ def investigate(
     validate: Any = (),
     effects: Sequence[str] = (),  # only these effects are tested; empty: the whole catalogue
     false_alarms: float = 0.05,  # probability of naming anything where nothing is missing
-    criteria: Mapping[str, float] | None = None,  # {name: value} of other thresholds of its decisions
+    # {name: value} of other thresholds of its decisions
+    criteria: Mapping[str, float] | None = None,
     bounds: Mapping[str, Sequence[float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
@@ -285,17 +342,21 @@ def investigate(
     seed: int = 0,
     progress: Any = None,
 ) -> Investigation:
-    """Find what a load model lacks: where it disagrees with the records, which effect explains that, and how sure.
+    """Find what a load model lacks: where it disagrees with the records, which effect explains
+    that, and how sure.
 
-    `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is found is judged on those
-    of `validate`. `model` is the base model, as in `tractexp.identify`, with `bounds`, `fixed`, `substeps` and
-    `domain`: with "waves" the sampled currents are investigated. Only `effects` are tested, by default all there are.
-    `false_alarms` (0.001 to 0.5) is the probability of naming anything where nothing is missing; `criteria`
-    {name: value} are the other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
-    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each stage.
+    `records` are events of `tractexp.read`, or what it reads; all are fitted together. What is
+    found is judged on those of `validate`. `model` is the base model, as in `tractexp.identify`,
+    with `bounds`, `fixed`, `substeps` and `domain`: with "waves" the sampled currents are
+    investigated. Only `effects` are tested, by default all there are. `false_alarms` (0.001 to 0.5)
+    is the probability of naming anything where nothing is missing; `criteria` {name: value} are the
+    other thresholds of the decisions, listed in `tractexp.discrepancy.criteria`. The same `seed`
+    gives the same bits. `progress`: None shows the stage, False does not; a callable is told each
+    stage.
 
-    Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for wrong names or
-    values, for events that do not belong together, and for a model with `per_event`: the events share its parameters.
+    Nothing is searched, so that there is no objective, optimizer or budget. Raises `UserError` for
+    wrong names or values, for events that do not belong together, and for a model with `per_event`:
+    the events share its parameters.
     """
     from tractexp.discrepancy.criteria import Criteria
 
@@ -303,13 +364,21 @@ def investigate(
     thresholds = Criteria.of({"false_alarms": false_alarms, **(criteria or {})})
     base = model_of(model, domain).with_(bounds=bounds, fixed=fixed, substeps=substeps)
     if base.per_event:
-        raise UserError(f"{MODEL.per_event}={list(base.per_event)} has no meaning in an investigation; leave it out")
+        raise UserError(
+            f"{MODEL.per_event}={list(base.per_event)} has no meaning in an investigation; leave it"
+            " out"
+        )
     train, held = dips_together(records, validate)
     base = base.fitting(train)
     question = Question(
-        train=train, validate=held, model=base, seed=seed, effects=tuple(effects),
-        false_alarms=thresholds.false_alarms, criteria=dict(criteria or {}),
-    )  # fmt: skip
+        train=train,
+        validate=held,
+        model=base,
+        seed=seed,
+        effects=tuple(effects),
+        false_alarms=thresholds.false_alarms,
+        criteria=dict(criteria or {}),
+    )
     return _build_investigation(question, _steps(question, progress))
 
 
@@ -322,16 +391,31 @@ def _steps(question: Question, progress: Progress) -> "Steps":
         if base.shown:
             tell(shown_in_words(base.shown))
         if base.priors:
-            tell(f"{MODEL.priors} holds the models that are graded, and no fit by which effects are ranked")
+            tell(
+                f"{MODEL.priors} holds the models that are graded, and no fit by which effects are"
+                " ranked"
+            )
         return findings_of(
-            base.model, q.train, q.validate, base.bounds, base.fixed, only=q.effects, substeps=base.substeps,
-            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}), priors=base.priors,
-            shown=tuple(base.shown), search=functools.partial(_search_end, q.seed), seed=q.seed, tell=tell,
-        )  # fmt: skip
+            base.model,
+            q.train,
+            q.validate,
+            base.bounds,
+            base.fixed,
+            only=q.effects,
+            substeps=base.substeps,
+            criteria=Criteria.of({"false_alarms": q.false_alarms, **q.criteria}),
+            priors=base.priors,
+            shown=tuple(base.shown),
+            search=functools.partial(_search_end, q.seed),
+            seed=q.seed,
+            tell=tell,
+        )
 
 
 def _search_end(seed: int, problem: Problem) -> np.ndarray:
-    """The free values (d,) at which the search of an identification ends that is asked for nothing unusual."""
+    """The free values (d,) at which the search of an identification ends that is asked for nothing
+    unusual.
+    """
     end = search(problem, Choice.of("optimizer", None).build("optimizer"), seed)
     refuse_failed(problem, end)
     return end.values
@@ -340,7 +424,9 @@ def _search_end(seed: int, problem: Problem) -> np.ndarray:
 def _build_investigation(question: Question, steps: "Steps") -> Investigation:
     from tractexp.discrepancy.discrepancy_json import content
 
-    return Investigation(question, files.plain(content(steps)), _estimate_extended_model(question, steps), steps)
+    return Investigation(
+        question, files.plain(content(steps)), _estimate_extended_model(question, steps), steps
+    )
 
 
 def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
@@ -349,7 +435,9 @@ def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
     values, problem = graded.values, graded.problem
     model = base.with_(effects=sorted({*base.effects, *steps.names}), window=problem.model.window)
     objective = float(problem.objective(values[None])[0])
-    history = History(np.array([effort.simulations]), np.array([objective]), values[None], np.zeros(1))
+    history = History(
+        np.array([effort.simulations]), np.array([objective]), values[None], np.zeros(1)
+    )
     status = f"ended with the verdict {steps.verdict.word}"
     end = SearchResult(values, objective, effort.simulations, 0, 0, 0.0, status, history)
     result = conclude(problem, end, values, graded.fits, question.seed, model.node, "descent")
@@ -357,8 +445,16 @@ def _estimate_extended_model(question: Question, steps: "Steps") -> Result:
 
 
 def _next_commands(result: Investigation, paths: Mapping[str, Path]) -> list[str]:
-    """The commands that go on from the files of an investigation, {name: path}, each with what it does."""
-    from tractexp.discrepancy.discrepancy_json import MODEL_FILE, PLUGIN, adopt_term, investigate_with, use_of
+    """The commands that go on from the files of an investigation, {name: path}, each with what it
+    does.
+    """
+    from tractexp.discrepancy.discrepancy_json import (
+        MODEL_FILE,
+        PLUGIN,
+        adopt_term,
+        investigate_with,
+        use_of,
+    )
 
     lines, domain = [], result.question.model.domain
     if model := paths.get(MODEL_FILE.name):
@@ -388,7 +484,9 @@ class Discrepancy(Task, call=investigate):
         for line in describe_records(train, held, "hold out"):
             say(line)
         job.prepare_log()
-        return super().perform(job, records=train, validate=held, progress=lambda line: say(f"  {line}"), **instead)
+        return super().perform(
+            job, records=train, validate=held, progress=lambda line: say(f"  {line}"), **instead
+        )
 
     def conclude(self, job: Job, result: Written) -> None:
         """The page's path and the command that uses the extended model end what is printed."""
@@ -399,17 +497,24 @@ class Discrepancy(Task, call=investigate):
         show(result.summary(), console())
         if page := paths.get(result.page):
             say(f"page: {page}")
-        beside = sorted(str(path.relative_to(job.folder)) for name, path in paths.items() if name != result.page)
+        beside = sorted(
+            str(path.relative_to(job.folder)) for name, path in paths.items() if name != result.page
+        )
         say(f"beside it: {', '.join(beside)}")
         for line in _next_commands(result, paths):
             say(line)
         conf, model = job.folder / "conf", paths.get("extended.yaml")
-        artifacts = [*(p for p in paths.values() if conf not in p.parents), *([conf] if model else [])]
+        artifacts = [
+            *(p for p in paths.values() if conf not in p.parents),
+            *([conf] if model else []),
+        ]
         content = {"values": {}, "artifacts": [*artifacts, job.folder / ".hydra"]}
         job.log(**content | self.logged(job, result))
 
     def logged(self, job: Job, result: Investigation) -> dict[str, Any]:
-        """Verdict, gap and page, and below this run one for every set of effects that was refitted."""
+        """Verdict, gap and page, and below this run one for every set of effects that
+        was refitted.
+        """
         from tractexp import tracking
 
         metrics = {}
@@ -419,7 +524,11 @@ class Discrepancy(Task, call=investigate):
             for stage in ("before", "after"):
                 misfit = vars(getattr(gap, stage))
                 off = misfit | {"model_error": misfit["model_error"]["value"]}
-                metrics |= {f"{role}_{stage}_{key}": value for key, value in off.items() if value is not None}
+                metrics |= {
+                    f"{role}_{stage}_{key}": value
+                    for key, value in off.items()
+                    if value is not None
+                }
             if gap.closed is not None:
                 metrics[f"{role}_gap_closed"] = gap.closed
         children = [
@@ -433,8 +542,11 @@ class Discrepancy(Task, call=investigate):
             for row in result.sets
         ]
         return {
-            "name": f"{result.verdict} {' '.join(result.names)}".strip(), "tags": {"verdict": result.verdict},
-            "metrics": metrics, "children": children,
-            "description": quoting.markdown(result.reason), "model": job.folder / "result.json",
+            "name": f"{result.verdict} {' '.join(result.names)}".strip(),
+            "tags": {"verdict": result.verdict},
+            "metrics": metrics,
+            "children": children,
+            "description": quoting.markdown(result.reason),
+            "model": job.folder / "result.json",
             "records": result.result.records,
-        }  # fmt: skip
+        }

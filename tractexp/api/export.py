@@ -27,7 +27,9 @@ POWER, VOLTAGE = 100.0, 110.0  # MVA and kV, where nobody said what one per unit
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Exported(Outcome):
-    """An identified load in another simulator's format; `text` is the file, `write(path)` writes it."""
+    """An identified load in another simulator's format; `text` is the file, `write(path)` writes
+    it.
+    """
 
     kind = "export"
 
@@ -36,7 +38,8 @@ class Exported(Outcome):
     title: str
     text: str
     notes: tuple[str, ...]
-    # how far the file, played back, is off the fit, over what its power moves; None where nothing plays it back
+    # how far the file, played back, is off the fit, over what its power moves; None where nothing
+    # plays it back
     agreement: float | None = None
 
     def write(self, path: Path | str) -> Path:
@@ -47,7 +50,9 @@ class Exported(Outcome):
         return Table(["note"], [[note] for note in self.notes], f"{self.title}, as {self.format}")
 
     def summary(self) -> Report:
-        report = Report(f"{self.title}, as {self.format}").text(*(f"note: {note}" for note in self.notes), "")
+        report = Report(f"{self.title}, as {self.format}").text(
+            *(f"note: {note}" for note in self.notes), ""
+        )
         return report.text(*self.text.splitlines())
 
 
@@ -57,20 +62,24 @@ def export(
     format: str,
     *,
     bus: int = 1,  # number of the bus the load is on
-    power: float | None = None,  # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
+    # MVA, what 1 pu of the record's file stands for; null: what the record says, else 100
+    power: float | None = None,
     voltage: float | None = None,  # kV, line to line; null: what the record says, else 110
     base: str = OWN,  # own: values on the base of the fit; file: on that of the record's file
-    doubtful: bool = False,  # export also a model that does not describe the load, or is no physical one
+    # export also a model that does not describe the load, or is no physical one
+    doubtful: bool = False,
     playback: bool = True,  # play a dip through the file, in its simulator where that is installed
 ) -> Exported:
-    """Turn an identification into the file of another simulator's format ("andes", "psse_dyr", "modelica", ...).
+    """Turn an identification into the file of another simulator's format ("andes", "psse_dyr",
+    "modelica", ...).
 
-    The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line to line], by
-    default what the record says, else 100 and 110. `base` "own" writes values on the base of the fit, "file" on that of
-    the record's file, where it was another. With `playback` a dip is played through the file (in ANDES where that is
-    installed, else by our own simulator from the file's numbers), and the notes say how well it follows the fit.
-    Raises `UserError` where the format cannot represent a part of the model, and unless `doubtful` for a model that
-    does not describe the load it was fitted to, or is no physical load.
+    The load is on `bus`; 1 pu of the record's file stands for `power` [MVA] and `voltage` [kV, line
+    to line], by default what the record says, else 100 and 110. `base` "own" writes values on the
+    base of the fit, "file" on that of the record's file, where it was another. With `playback` a
+    dip is played through the file (in ANDES where that is installed, else by our own simulator from
+    the file's numbers), and the notes say how well it follows the fit.
+    Raises `UserError` where the format cannot represent a part of the model, and unless `doubtful`
+    for a model that does not describe the load it was fitted to, or is no physical load.
     """
     from tractexp.exchange.format import Identified
     from tractexp.exchange.playback import play_back_export
@@ -82,13 +91,19 @@ def export(
     against = _objections(fit)
     if against and not doubtful:
         raise UserError(f"{'; '.join(against)}; {TASK.doubtful}=true exports it all the same")
-    own, recorded = fit.result.base, fit.result.records[0].get("base", {}) if fit.result.records else {}
+    own, recorded = (
+        fit.result.base,
+        fit.result.records[0].get("base", {}) if fit.result.records else {},
+    )
     file_power = power or (own.file_power if own.in_mva else POWER)
     on_file = base == FILE
     identified = Identified(
-        fit.result, bus, file_power * (1.0 if on_file else own.ratio), voltage or recorded.get("voltage_kV") or VOLTAGE,
+        fit.result,
+        bus,
+        file_power * (1.0 if on_file else own.ratio),
+        voltage or recorded.get("voltage_kV") or VOLTAGE,
         own.ratio if on_file else 1.0,
-    )  # fmt: skip
+    )
     form = build("format", {"name": format})
     form.check_parts(identified)
     text = form.text(identified)
@@ -107,11 +122,16 @@ def export(
 
 
 def _objections(fit: Identification) -> list[str]:
-    """Why this model should not be handed on, a sentence each: by its grade, and as a physical load."""
+    """Why this model should not be handed on, a sentence each: by its grade, and as a physical
+    load.
+    """
     against = []
     if fit.grade == Grade.WRONG_MODEL:
         sentence = fit.result.adequacy["sentence"]
-        against.append(f"{sentence}; find what it lacks by {build_again_command('task=discrepancy')}, or choose another model")
+        against.append(
+            f"{sentence}; find what it lacks by {build_again_command('task=discrepancy')}, or"
+            " choose another model"
+        )
     if fit.doubts:
         against.append(f"this model is no physical load: {' and '.join(fit.doubts)}")
     return against
@@ -121,21 +141,33 @@ def _powers(load: "Identified") -> str:
     """What the load and its parts draw before the dip, in a sentence."""
     before, scale = load.before, load.power
     rows = {"load": (load.ratio * load.result.before["P0"], load.ratio * load.result.before["Q0"])}
-    rows |= {part: (before[f"P_{part}"], before[f"Q_{part}"]) for part in ("motor", "static") if f"P_{part}" in before}
+    rows |= {
+        part: (before[f"P_{part}"], before[f"Q_{part}"])
+        for part in ("motor", "static")
+        if f"P_{part}" in before
+    }
     said = [f"{part} {scale * P:.5g} MW and {scale * Q:.5g} Mvar" for part, (P, Q) in rows.items()]
     return f"before the dip, at {load.result.before['U0'] * load.voltage:.5g} kV: {'; '.join(said)}"
 
 
 def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -> str:
     """On which base the values of an export are, in a sentence."""
-    which = "" if ratio == 1 else ", the base of the record's file" if base == FILE else ", the record's own base"
+    which = (
+        ""
+        if ratio == 1
+        else ", the base of the record's file"
+        if base == FILE
+        else ", the record's own base"
+    )
     said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"
     return said + f"; 1 pu of the file is taken for {POWER:g} MVA, for no power is given" * guessed
 
 
 @plugin
 class Export(Task, call=export, given=("fit",)):
-    """Turn `result.json` of an identification into a file of the format chosen; nothing is written where it cannot."""
+    """Turn `result.json` of an identification into a file of the format chosen; nothing is written
+    where it cannot.
+    """
 
     instead = {"model": "the model is that of task.parameters"}
 
@@ -146,7 +178,8 @@ class Export(Task, call=export, given=("fit",)):
     def run(self, job: Job) -> None:
         if self.parameters is None:
             raise UserError(
-                f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of the run that"
+                f"{TASK.parameters} is not given; it is the path of a result.json, or the folder of"
+                " the run that"
                 " wrote it"
             )
         fit = Identification(load(Path(self.parameters)))

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from tractexp.identification.result import Fit, Result
 
 CAPTION = (
-    "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most likely parameters;"
+    "residuals: mean absolute value of Eq. (21), pu; medians over the seeds. estimate: the most"
+    " likely parameters;"
     " beside it where each optimizer's search ended"
 )
 ARRAYS = ("t", "U", "P", "Q", "P_calculated", "Q_calculated")
@@ -34,7 +35,8 @@ ERRORS = (*RESIDUALS, "epsilon_p", "epsilon_q")
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Generalised(Written):
-    """Residuals on the held-out dips: a row for each optimizer, seed and dip; and the parameters they come from.
+    """Residuals on the held-out dips: a row for each optimizer, seed and dip; and the parameters
+    they come from.
 
     The optimizer "estimate" is the most likely set; the others tell where their searches ended.
     """
@@ -43,16 +45,21 @@ class Generalised(Written):
 
     residuals: Sequence[Mapping[str, Any]]
     identified: Sequence[Mapping[str, Any]]
-    curves: Sequence[Mapping[str, Any]]  # what is drawn: each optimizer's first seed on each held-out dip
+    # what is drawn: each optimizer's first seed on each held-out dip
+    curves: Sequence[Mapping[str, Any]]
 
     @property
     def errors(self) -> tuple[str, ...]:
-        """What is told of each dip: residuals and relative errors of P and Q, and in waveforms of the currents."""
+        """What is told of each dip: residuals and relative errors of P and Q, and in waveforms of
+        the currents.
+        """
         return (*ERRORS, *["epsilon_i"] * all("epsilon_i" in row for row in self.residuals))
 
     @property
     def medians(self) -> list[dict[str, Any]]:
-        """Over the seeds: {event, kind, optimizer, residual_P, residual_Q, epsilon_p, epsilon_q ...}, by event."""
+        """Over the seeds: {event, kind, optimizer, residual_P, residual_Q, epsilon_p, epsilon_q
+        ...}, by event.
+        """
         groups: dict[Any, list[Mapping[str, Any]]] = {}
         for event, kind in dict.fromkeys((row["event"], row["kind"]) for row in self.residuals):
             for row in self.residuals:
@@ -66,7 +73,12 @@ class Generalised(Written):
 
     def table(self) -> Table:
         columns = ["event", "kind", "optimizer", *self.errors]
-        return Table(columns, [[row[c] for c in columns] for row in self.medians], "on dips not fitted", CAPTION)
+        return Table(
+            columns,
+            [[row[c] for c in columns] for row in self.medians],
+            "on dips not fitted",
+            CAPTION,
+        )
 
     def summary(self) -> Report:
         return Report().add(self.table()).text(CAPTION)
@@ -76,7 +88,9 @@ class Generalised(Written):
         return [files.write_json(folder / "generalise.json", content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
-        """A figure for each optimizer and held-out dip, of curves and residuals: issa_interpolation.svg, ..."""
+        """A figure for each optimizer and held-out dip, of curves and residuals:
+        issa_interpolation.svg, ...
+        """
         return {curve["file"]: functools.partial(_draw, curve) for curve in self.curves}
 
 
@@ -99,22 +113,35 @@ def generalise(
     seed: int = 0,
     progress: Any = None,
 ) -> Generalised:
-    """Fit a model to `records` by each optimizer under `seeds` seeds from `seed` on, and judge it on `validate`.
+    """Fit a model to `records` by each optimizer under `seeds` seeds from `seed` on, and judge it
+    on `validate`.
 
-    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names to call them by to
-    such; all have the same limits. Everything else is as in `tractexp.identify`. `progress`: None shows how far each
-    search is, False does not; a callable is told what is read, and which search begins.
+    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names
+    to call them by to such; all have the same limits. Everything else is as in `tractexp.identify`.
+    `progress`: None shows how far each search is, False does not; a callable is told what is read,
+    and which search begins.
 
     Raises `UserError` for wrong names or values, and where no dip is held out.
     """
     check_range("task.seeds", seeds, 1)
     setup = Setup.of(
-        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
-        seed=seed, budget=budget, time_limit=time_limit, target=target,
-    )  # fmt: skip
+        records,
+        model,
+        validate,
+        objective,
+        bounds=bounds,
+        fixed=fixed,
+        per_event=per_event,
+        substeps=substeps,
+        seed=seed,
+        budget=budget,
+        time_limit=time_limit,
+        target=target,
+    )
     if not setup.validate:
         raise UserError(
-            f"{setting('task=generalise')} needs dips that are not fitted: name them in {DATA.validate}, a milder one "
+            f"{setting('task=generalise')} needs dips that are not fitted: name them in"
+            f" {DATA.validate}, a milder one "
             "to interpolate and a deeper one to extrapolate"
         )
     chosen = Choice.several("optimizer", optimizers)
@@ -143,22 +170,32 @@ def _run_searches(
                 yield conclude(problem, end, values, fits, seed, node, name), fits[fitted:]
 
 
-def _judge_generalization(setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]") -> Generalised:
+def _judge_generalization(
+    setup: Setup, searched: "Sequence[tuple[Result, list[Fit]]]"
+) -> Generalised:
     from tractexp.identification.generalization import by_depth
 
     kinds = by_depth(setup.validate, setup.train)
     rows = [row for result, fits in searched for row in _residuals(result, fits, kinds)]
     identified = [
-        {key: getattr(result, key) for key in ("optimizer", "seed", "objective", "simulations", "parameters")}
+        {
+            key: getattr(result, key)
+            for key in ("optimizer", "seed", "objective", "simulations", "parameters")
+        }
         for result, _ in searched
     ]
     first = {result.optimizer: (result, fits) for result, fits in reversed(searched)}
-    curves = [_curve(*first[name], kinds, k) for name in dict.fromkeys(r.optimizer for r, _ in searched)
-              for k in range(len(kinds))]  # fmt: skip
+    curves = [
+        _curve(*first[name], kinds, k)
+        for name in dict.fromkeys(r.optimizer for r, _ in searched)
+        for k in range(len(kinds))
+    ]
     return Generalised(rows, identified, curves)
 
 
-def _residuals(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]) -> Iterable[dict[str, Any]]:
+def _residuals(
+    result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]
+) -> Iterable[dict[str, Any]]:
     """Eq. (21) and Eq. (20) of P and Q on each held-out dip."""
     from tractexp.identification.generalization import mean_residual
 
@@ -177,7 +214,9 @@ def _residuals(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str]) ->
 
 
 def _curve(result: "Result", fits: "Sequence[Fit]", kinds: Sequence[str], k: int) -> dict[str, Any]:
-    """Measured and calculated power of one held-out dip, (N,) each, and what its figure is called."""
+    """Measured and calculated power of one held-out dip, (N,) each, and what its
+    figure is called.
+    """
     fit, record = fits[k], fits[k].event.record
     suffix = f"_{k + 1}" if kinds.count(kinds[k]) > 1 else ""
     return {
@@ -197,36 +236,49 @@ def _draw(curve: Mapping[str, Any], path: Path) -> Path:
     t, U, P, Q, *calculated = (np.array(curve[key], dtype=float) for key in ARRAYS)
     epsilon_p, epsilon_q = curve["epsilon"]
     return figures.fit(
-        path, t, U, (P, Q), (calculated[0], calculated[1]), title=curve["title"], epsilon=(epsilon_p, epsilon_q),
+        path,
+        t,
+        U,
+        (P, Q),
+        (calculated[0], calculated[1]),
+        title=curve["title"],
+        epsilon=(epsilon_p, epsilon_q),
         notes=curve["notes"],
-    )  # fmt: skip
+    )
 
 
 @plugin
 class Generalise(Task, call=generalise):
-    """Mean absolute residuals of Eq. (21) on the held-out dips, by optimizer: generalise.json, curves and residuals.
+    """Mean absolute residuals of Eq. (21) on the held-out dips, by optimizer: generalise.json,
+    curves and residuals.
 
-    The optimizer chosen by `optimizer=` is always among those compared, with its settings; the others have their own
-    defaults. All have the same limits.
+    The optimizer chosen by `optimizer=` is always among those compared, with its settings; the
+    others have their own defaults. All have the same limits.
     """
 
     reads = ("data", "model", *SEARCH)
 
     optimizers: list[str] = field(default_factory=list)
-    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+    # {choice of data: files}; without data.validate
+    held_out: dict[str, list[str]] = field(default_factory=dict)
 
     def check(self) -> None:
         for name in self.optimizers:
             build("optimizer", {"name": name})
 
     def perform(self, job: Job, **instead: Any) -> Generalised:
-        compared = {name: {"name": name} for name in self.optimizers} | {job.choices["optimizer"]: job.chosen}
+        compared = {name: {"name": name} for name in self.optimizers} | {
+            job.choices["optimizer"]: job.chosen
+        }
         return super().perform(job.holding_out(self.held_out), optimizers=compared, **instead)
 
     def logged(self, job: Job, result: Generalised) -> dict[str, Any]:
         """The residuals of each optimizer's first seed, by the number of the held-out dip."""
         rows = result.residuals
-        dips = sum((row["optimizer"], row["seed"]) == (rows[0]["optimizer"], rows[0]["seed"]) for row in rows)
+        dips = sum(
+            (row["optimizer"], row["seed"]) == (rows[0]["optimizer"], rows[0]["seed"])
+            for row in rows
+        )
         metrics = {
             f"validate_{1 + k % dips}_residual_{c}_{row['optimizer']}": row[f"residual_{c}"]
             for k, row in reversed(list(enumerate(rows)))  # the first seed's stand

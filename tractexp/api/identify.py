@@ -49,22 +49,29 @@ class FitSpec(Setup):
     check_intervals: bool = True
 
     def search_end(self, progress: Progress) -> SearchResult:
-        """Where the search ends; raises `UserError` where the input is wrong, before anything is told."""
+        """Where the search ends; raises `UserError` where the input is wrong, before anything is
+        told.
+        """
         tell(progress, [*self.lines(), f"optimizer: {self.optimizer.name}, seed {self.seed}"])
         return self.search(self.optimizer, self.seed, progress)
 
     def so_far(self, end: SearchResult | None) -> "Identification | None":
-        """Where a search was when it was stopped, as an identification that nothing is judged of."""
+        """Where a search was when it was stopped, as an identification that nothing
+        is judged of.
+        """
         if end is None or not end.objective < REFUSED:
             return None
         fits = play(self.problem, end.values, self.validate)
-        result = conclude(self.problem, end, end.values, fits, self.seed, self.model.node, self.optimizer.name)
+        result = conclude(
+            self.problem, end, end.values, fits, self.seed, self.model.node, self.optimizer.name
+        )
         return Identification(result, self, end)
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """One parameter: its value and how sure it is. Interval (95 %) and standard error are None where there is none.
+    """One parameter: its value and how sure it is. Interval (95 %) and standard error are None
+    where there is none.
 
     `search` is where the optimizer itself ended.
     """
@@ -83,13 +90,20 @@ class Estimate:
         """The estimate in a unit of which one is a `factor`-th of its own."""
         low, high = self.bounds
         return replace(
-            self, value=factor * self.value, search=factor * self.search, bounds=(factor * low, factor * high),
+            self,
+            value=factor * self.value,
+            search=factor * self.search,
+            bounds=(factor * low, factor * high),
             interval=self.interval and (factor * self.interval[0], factor * self.interval[1]),
             standard_error=None if self.standard_error is None else factor * self.standard_error,
-        )  # fmt: skip
+        )
 
     def __repr__(self) -> str:
-        span = f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}" if self.interval else ""
+        span = (
+            f", 95 % interval {self.interval[0]:.4g} .. {self.interval[1]:.4g}"
+            if self.interval
+            else ""
+        )
         return f"{self.name} = {self.value:.5g} {self.unit}{span}: {self.verdict}"
 
 
@@ -112,7 +126,9 @@ class FitDetails(NamedTuple):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Written):
-    """Identified parameters, how sure they are, and how well they fit. `result` is the content of `result.json`."""
+    """Identified parameters, how sure they are, and how well they fit. `result` is the content of
+    `result.json`.
+    """
 
     kind = "identification"
     page = "report.html"
@@ -138,7 +154,8 @@ class Identification(Written):
         """The call. Raises `UserError` where only a `result.json` was read."""
         if self.setup is None:
             raise UserError(
-                "a result.json holds no records, so that this can predict but not be judged again; call"
+                "a result.json holds no records, so that this can predict but not be judged again;"
+                " call"
                 " tractexp.identify and save() its result"
             )
         return self.setup
@@ -156,7 +173,9 @@ class Identification(Written):
 
     @functools.cached_property
     def parameters(self) -> Estimates:
-        """The estimates by name; a parameter with a value of its own in each event is there as T_m[1], T_m[2], too."""
+        """The estimates by name; a parameter with a value of its own in each event is there as
+        T_m[1], T_m[2], too.
+        """
         r, about = self.result, {p.name: p.about for p in self.model.model.parameters}
         values, ended, estimates = by_event(r.parameters, r.per_event), r.search, Estimates()
         search = by_event(ended["parameters"], ended["per_event"]) if ended else values
@@ -166,17 +185,32 @@ class Identification(Written):
             verdict = r.verdicts.get(name, without)
             bounds = tuple(r.bounds.get(of, (float("nan"),) * 2))
             estimates[name] = Estimate(
-                name, value, search[name], r.units.get(of, ""), tuple(interval) if interval else None,  # type: ignore[arg-type]
-                r.standard_errors.get(name), verdict, bounds, about.get(of, ""),  # type: ignore[arg-type]
-            )  # fmt: skip
+                name,
+                value,
+                search[name],
+                r.units.get(of, ""),
+                tuple(interval) if interval else None,  # type: ignore[arg-type]
+                r.standard_errors.get(name),
+                verdict,
+                bounds,  # type: ignore[arg-type]
+                about.get(of, ""),
+            )
         return estimates
 
     @functools.cached_property
     def on_given_base(self) -> Estimates:
-        """The estimates on the base of the record's file: those of `parameters` where that is the record's own."""
-        ratio, exponents = self.result.base.ratio, {p.name: p.power_exponent for p in self.model.model.parameters}
+        """The estimates on the base of the record's file: those of `parameters` where that is the
+        record's own.
+        """
+        ratio, exponents = (
+            self.result.base.ratio,
+            {p.name: p.power_exponent for p in self.model.model.parameters},
+        )
         return Estimates(
-            {name: e.times(ratio ** exponents[name.partition("[")[0]]) for name, e in self.parameters.items()}
+            {
+                name: e.times(ratio ** exponents[name.partition("[")[0]])
+                for name, e in self.parameters.items()
+            }
         )
 
     @property
@@ -193,7 +227,9 @@ class Identification(Written):
 
     @functools.cached_property
     def operating_point(self) -> "OperatingPoint | None":
-        """How the load divides before the dip, and the motor as a machine; None where the model has no motor."""
+        """How the load divides before the dip, and the motor as a machine; None where the model has
+        no motor.
+        """
         from tractexp.exchange.operating_point import OperatingPoint
 
         return OperatingPoint.of(self.result)
@@ -224,12 +260,16 @@ class Identification(Written):
     @staticmethod
     def _error(content: Mapping[str, Any]) -> ModelError:
         if not content:
-            raise UserError("this result.json has no model_error: it is of an earlier version; identify again")
+            raise UserError(
+                "this result.json has no model_error: it is of an earlier version; identify again"
+            )
         return ModelError.of(content)
 
     @property
     def yardstick(self) -> str:
-        """How many times what the best linear network leaves this model does, in a sentence; "" where not judged."""
+        """How many times what the best linear network leaves this model does, in a sentence; ""
+        where not judged.
+        """
         return self.result.linear_network.get("sentence", "")
 
     @property
@@ -238,14 +278,22 @@ class Identification(Written):
         return self.result.advice
 
     def predict(
-        self, event: Any = None, *, t: Any = None, U: Any = None, f: Any = None, P0: float | None = None,
+        self,
+        event: Any = None,
+        *,
+        t: Any = None,
+        U: Any = None,
+        f: Any = None,
+        P0: float | None = None,
         Q0: float | None = None,
-    ) -> Response:  # fmt: skip
-        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage, on the base of its file.
+    ) -> Response:
+        """P and Q [pu] (N,) that the identified load draws in an event, or from a voltage, on the
+        base of its file.
 
-        `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage, and the power before
-        it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f` [Hz] where known; `P0` and `Q0` are by
-        default those of the event identified on. Raises `UserError` where the load has no steady state there.
+        `event` is one that `tractexp.read` gave (or what it reads, holding one dip): its voltage,
+        and the power before it. Otherwise `U` [pu] at uniform times `t` [s], (N,) each, with `f`
+        [Hz] where known; `P0` and `Q0` are by default those of the event identified on. Raises
+        `UserError` where the load has no steady state there.
         """
         if (event is None) == (t is None or U is None):
             raise UserError("predict() needs either an event, or both t= and U=")
@@ -274,12 +322,16 @@ class Identification(Written):
 
     @property
     def moves(self) -> dict[str, tuple[str, float]]:
-        """By parameter the rival structure that moves it most, and by more than it scatters; and the value there."""
+        """By parameter the rival structure that moves it most, and by more than it scatters; and
+        the value there.
+        """
         far = {}
         for rival in self.result.rival_structures:
             for e in (self.parameters[name] for name in rival["parameters"]):
                 value, before = rival["parameters"][e.name], far.get(e.name, ("", e.value))[1]
-                if abs(value - e.value) > max(LEAST_TOLD_MOVE * (e.standard_error or 0.0), abs(before - e.value)):
+                if abs(value - e.value) > max(
+                    LEAST_TOLD_MOVE * (e.standard_error or 0.0), abs(before - e.value)
+                ):
                     far[e.name] = rival["name"], value
         return far
 
@@ -289,13 +341,18 @@ class Identification(Written):
         by_name: dict[str, list[str]] = {}
         for name, (structure, value) in sorted(self.moves.items()):
             by_name.setdefault(structure, []).append(f"{name} {value:.4g}")
-        return [f"with {name}, which fits as well: {', '.join(values)}" for name, values in by_name.items()]
+        return [
+            f"with {name}, which fits as well: {', '.join(values)}"
+            for name, values in by_name.items()
+        ]
 
     @property
     def astray(self) -> list[str]:
         """Parameters whose interval does not hold the value that the search ended at."""
         return [
-            e.name for e in self.parameters.values() if e.interval and not e.interval[0] <= e.search <= e.interval[1]
+            e.name
+            for e in self.parameters.values()
+            if e.interval and not e.interval[0] <= e.search <= e.interval[1]
         ]
 
     @property
@@ -303,32 +360,57 @@ class Identification(Written):
         """Where the optimizer itself ended, in one line; "" where that is not known."""
         if not (s := self.result.search):
             return ""
-        end = f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu² (the estimate's is"
+        end = (
+            f"search: {self.result.optimizer} {s['status']}: objective {s['objective']:.4g} pu²"
+            " (the estimate's is"
+        )
         errors = ", ".join(f"{name} {epsilon(s[name])}" for name in ("epsilon_p", "epsilon_q"))
         end += f" {self.result.objective:.4g}), {errors},"
         return f"{end} {s['simulations']} simulations in {s['seconds']:.2f} s{self._apart}"
 
     @property
     def _apart(self) -> str:
-        """Where the search's end differs from the estimate, as the end of a sentence; "" where it does not."""
+        """Where the search's end differs from the estimate, as the end of a sentence; "" where it
+        does not.
+        """
         if not (away := self.astray):
             return ""
-        ratio = self.result.search["objective"] / self.result.objective if self.result.objective else float("inf")
-        why = f"it stopped short of the minimum, at {ratio:.3g} times its objective" if ratio > 1 else "it is elsewhere"
+        ratio = (
+            self.result.search["objective"] / self.result.objective
+            if self.result.objective
+            else float("inf")
+        )
+        why = (
+            f"it stopped short of the minimum, at {ratio:.3g} times its objective"
+            if ratio > 1
+            else "it is elsewhere"
+        )
         lie = "lies" if len(away) == 1 else "lie"
         return f"; its {join_words(away)} {lie} outside the estimate's interval: {why}"
 
     def to_dict(self) -> dict[str, Any]:
         end = None if self.end is None else asdict(self.end)
-        return {"setup": self.setup and self.setup.to_dict(), "result": asdict(self.result), "found": end}
+        return {
+            "setup": self.setup and self.setup.to_dict(),
+            "result": asdict(self.result),
+            "found": end,
+        }
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
         setup, end = content["setup"], content["found"]
         if end is not None:
-            history = History(**{key: np.array(v, dtype=float) for key, v in end["history"].items()})
-            end = SearchResult(**end | {"values": np.array(end["values"], dtype=float), "history": history})
-        return cls(Result.of(content["result"], "the saved result"), setup and FitSpec.from_dict(setup), end)
+            history = History(
+                **{key: np.array(v, dtype=float) for key, v in end["history"].items()}
+            )
+            end = SearchResult(
+                **end | {"values": np.array(end["values"], dtype=float), "history": history}
+            )
+        return cls(
+            Result.of(content["result"], "the saved result"),
+            setup and FitSpec.from_dict(setup),
+            end,
+        )
 
     def write_results(self, folder: Path) -> list[Path]:
         from tractexp.identification.result import write_history
@@ -336,7 +418,7 @@ class Identification(Written):
         return [
             self.result.write(folder / "result.json"),
             write_history(folder / "history.csv", self.search_result.history),
-        ]  # fmt: skip
+        ]
 
 
 @public
@@ -360,29 +442,46 @@ def identify(
     check_intervals: bool = True,
     progress: Any = None,
 ) -> Identification:
-    """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on others held out.
+    """Fit the free parameters of a load model to recorded dips, and judge the fit on these and on
+    others held out.
 
-    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
-    judged. `model` is a choice of `conf/model`, the path of such a YAML file, or what `tractexp.compose` or an
-    investigation (`found.extended`) made; `bounds`, `fixed`, `per_event`, `substeps`, `domain` and
-    `priors` are as in `tractexp.compose`: with `domain="waves"` the records' sampled currents are fitted, not the power
-    that phasors show.
+    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of
+    `validate` are only judged. `model` is a choice of `conf/model`, the path of such a YAML file,
+    or what `tractexp.compose` or an investigation (`found.extended`) made; `bounds`, `fixed`,
+    `per_event`, `substeps`, `domain` and `priors` are as in `tractexp.compose`: with
+    `domain="waves"` the records' sampled currents are fitted, not the power that phasors show.
 
-    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso", "population": 100}`. A
-    model, an objective or an optimizer left out is that of `conf/config.yaml`, as on the command line. The search ends
-    after `budget` simulations, `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives
-    the same bits. `check_intervals` confirms wide intervals by profile likelihood, and fits the structures that most
-    loads may have as well, to tell by how much they would move each parameter. `progress`: None shows how far the
-    search is, False does not; a callable is told what is read and done, a sentence at a time.
+    `objective` and `optimizer` are names, or mappings of `name` and settings: `{"name": "pso",
+    "population": 100}`. A model, an objective or an optimizer left out is that of
+    `conf/config.yaml`, as on the command line. The search ends after `budget` simulations,
+    `time_limit` [s], at the objective `target` [pu²], or by itself. The same `seed` gives the same
+    bits. `check_intervals` confirms wide intervals by profile likelihood, and fits the structures
+    that most loads may have as well, to tell by how much they would move each parameter.
+    `progress`: None shows how far the search is, False does not; a callable is told what is read
+    and done, a sentence at a time.
 
-    Raises `UserError` for wrong names or values, records that lack what the model reads, and where nothing tried can be
-    simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt whose `result` holds what was found so far.
+    Raises `UserError` for wrong names or values, records that lack what the model reads, and where
+    nothing tried can be simulated. Ctrl-C raises `tractexp.errors.Stopped`, a KeyboardInterrupt
+    whose `result` holds what was found so far.
     """
     setup = FitSpec.of(
-        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
-        domain=domain, priors=priors, seed=seed, budget=budget, time_limit=time_limit, target=target,
-        optimizer=Choice.of("optimizer", optimizer), check_intervals=check_intervals,
-    )  # fmt: skip
+        records,
+        model,
+        validate,
+        objective,
+        bounds=bounds,
+        fixed=fixed,
+        per_event=per_event,
+        substeps=substeps,
+        domain=domain,
+        priors=priors,
+        seed=seed,
+        budget=budget,
+        time_limit=time_limit,
+        target=target,
+        optimizer=Choice.of("optimizer", optimizer),
+        check_intervals=check_intervals,
+    )
     end = None
     try:
         end = setup.search_end(progress)
@@ -391,7 +490,9 @@ def identify(
         raise Stopped.of(stop, result=setup.so_far(end or getattr(stop, "state", None))) from None
 
 
-def _conclude_identification(setup: FitSpec, end: SearchResult, progress: Progress = False) -> tuple[Result, FitDetails]:
+def _conclude_identification(
+    setup: FitSpec, end: SearchResult, progress: Progress = False
+) -> tuple[Result, FitDetails]:
     """The estimate that a search led to, and what stands behind it."""
     from tractexp.identification.advice import advise
     from tractexp.identification.agreement import compare_events
@@ -406,13 +507,17 @@ def _conclude_identification(setup: FitSpec, end: SearchResult, progress: Progre
     graded = grade_model(problem, setup.validate, end.values, shown)
     uncertainty = graded.uncertainty
     if setup.check_intervals:
-        profiled = check_by_profiles(uncertainty, counter("points at most on the profiles", progress))
+        profiled = check_by_profiles(
+            uncertainty, counter("points at most on the profiles", progress)
+        )
         uncertainty = with_rivals(profiled, counter("structures fitted beside", progress))
     if not np.array_equal(uncertainty.values, graded.values):  # a profile led to a better optimum
         moved = replace(graded.estimation, uncertainty=uncertainty)
         graded = grade_estimate(problem, moved, setup.validate, shown)
     fits, adequacy = list(graded.fits), graded.adequacy
-    result = conclude(problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name)
+    result = conclude(
+        problem, end, graded.values, fits, setup.seed, setup.model.node, setup.optimizer.name
+    )
     result = replace(result, shown_effects=dict(shown))
     together = compare_events(uncertainty) if len(problem.events) > 1 else None
     fields = uncertainty.fields()
@@ -427,20 +532,33 @@ def _conclude_identification(setup: FitSpec, end: SearchResult, progress: Progre
     ]
     beside = yardstick(fits, result.model_error)
     result = replace(
-        result, **fields, adequacy=adequacy.to_dict(), linear_network=beside, starts=starts,
-        rival_structures=structures, advice=advice,
-    )  # fmt: skip
+        result,
+        **fields,
+        adequacy=adequacy.to_dict(),
+        linear_network=beside,
+        starts=starts,
+        rival_structures=structures,
+        advice=advice,
+    )
     return result, FitDetails(fits, graded.estimation, uncertainty, together, adequacy)
 
 
 def _with_priors(problem: Problem, result: Result) -> list[str]:
-    """The command that holds a motor that no load has to what machines usually are; [] where it is one, or is held."""
+    """The command that holds a motor that no load has to what machines usually are; [] where it is
+    one, or is held.
+    """
     from tractexp.exchange.operating_point import OperatingPoint
 
     point = OperatingPoint.of(result)
-    if problem.priors or not (point and point.doubt) or not departures(problem, problem.defaults[None]).size:
+    if (
+        problem.priors
+        or not (point and point.doubt)
+        or not departures(problem, problem.defaults[None]).size
+    ):
         return []
-    return [f"hold the motor to what machines usually are: {build_again_command('model.priors=true')}"]
+    return [
+        f"hold the motor to what machines usually are: {build_again_command('model.priors=true')}"
+    ]
 
 
 @plugin
@@ -448,7 +566,8 @@ class Identify(Task, call=identify):
     """Fit free parameters to the training events, judge on all, show and log that."""
 
     figures: bool | None = None  # write the page; null: in single runs, not in sweeps
-    predictor: bool | None = None  # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
+    # log the model for mlflow.pyfunc; null: in single runs, not in sweeps
+    predictor: bool | None = None
 
     def draws(self, job: Job) -> bool:
         return not job.of_many if self.figures is None else self.figures

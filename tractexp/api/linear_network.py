@@ -1,4 +1,6 @@
-"""The black box: the best linear network from the recorded voltage to the recorded current, without any physics."""
+"""The black box: the best linear network from the recorded voltage to the recorded current, without
+any physics.
+"""
 
 import functools
 from collections.abc import Mapping
@@ -30,10 +32,12 @@ MOST_ASKED_POLES = 12  # poles that may be asked for
 
 @dataclass(frozen=True, eq=False, repr=False)
 class NetworkFit(Written):
-    """The best linear network of few poles for some events, and how well it does on them and on others.
+    """The best linear network of few poles for some events, and how well it does on them and on
+    others.
 
-    `content` is that of `linear_network.json`: `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`,
-    `model_error` as in `result.json`, `events` and `records`, and `by_poles`, what each number of poles leaves.
+    `content` is that of `linear_network.json`: `poles` [{decay [1/s], frequency [Hz], admittance
+    [pu]}], `chosen_by`, `model_error` as in `result.json`, `events` and `records`, and `by_poles`,
+    what each number of poles leaves.
     """
 
     kind = "linear network"
@@ -67,8 +71,8 @@ class NetworkFit(Written):
     def predict(self, event: Any) -> Response:
         """P and Q [pu] (N,) that it draws in an event, on the base of its file.
 
-        `event` is one that `tractexp.read` gave, or what it reads, holding one dip: its voltage and the power before
-        it. Raises `UserError` where the event lacks the samples of its domain.
+        `event` is one that `tractexp.read` gave, or what it reads, holding one dip: its voltage and
+        the power before it. Raises `UserError` where the event lacks the samples of its domain.
         """
         (one,) = dips_of("event", event, least=1)[:1]
         own = OwnBase.at(self.train[0].record)
@@ -99,14 +103,17 @@ def linear_network(
     poles: int | None = None,  # null: as many as predict best the dips that are held out
     progress: Any = None,
 ) -> NetworkFit:
-    """Fit the best linear network of few poles from the voltage to the current of recorded dips: how good can it get?
+    """Fit the best linear network of few poles from the voltage to the current of recorded dips:
+    how good can it get?
 
-    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of `validate` are only
-    judged, and tell the number of `poles`, up to four, where that is not given; without them an information criterion
-    does. With `domain="waves"` space vectors of sampled currents follow those of the voltages, and the zero sequence
-    has a path of its own; else P and Q follow U. `progress`: a callable is told what is read, a sentence at a time.
+    `records` are events of `tractexp.read`, or what it reads; several are fitted together. Those of
+    `validate` are only judged, and tell the number of `poles`, up to four, where that is not given;
+    without them an information criterion does. With `domain="waves"` space vectors of sampled
+    currents follow those of the voltages, and the zero sequence has a path of its own; else P and Q
+    follow U. `progress`: a callable is told what is read, a sentence at a time.
 
-    Raises `UserError` for wrong values, and for records of too few samples or whose voltage does not move.
+    Raises `UserError` for wrong values, and for records of too few samples or whose voltage does
+    not move.
     """
     domain = domain or defaults()[DOMAIN]
     check_choice("domain", domain, sorted(choices()[DOMAIN]))
@@ -130,7 +137,8 @@ def _fit_networks(of: NetworkFit) -> "tuple[BlackBox, list[BlackBox]]":
         return selection(boxes, train, held_out), boxes
     if len(boxes) <= of.order:
         raise UserError(
-            f"{TASK.poles}={of.order}: the samples from the dips on are enough for {len(boxes) - 1}; ask for fewer "
+            f"{TASK.poles}={of.order}: the samples from the dips on are enough for"
+            f" {len(boxes) - 1}; ask for fewer "
             "poles, or take a record that goes on longer"
         )
     return boxes[-1], boxes
@@ -145,7 +153,11 @@ def _play(box: "BlackBox", event: Event, role: str) -> "Fit":
 def _play_network(box: "BlackBox", of: NetworkFit) -> "list[Fit]":
     from tractexp.identification.result import TRAIN, VALIDATE
 
-    return [_play(box, e, role) for role, events in ((TRAIN, of.train), (VALIDATE, of.validate)) for e in events]
+    return [
+        _play(box, e, role)
+        for role, events in ((TRAIN, of.train), (VALIDATE, of.validate))
+        for e in events
+    ]
 
 
 def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[str, Any]:
@@ -163,22 +175,28 @@ def _content(of: NetworkFit, box: "BlackBox", boxes: "list[BlackBox]") -> dict[s
     if error["held_out"]:
         sentence += f", and of the held-out dips {ModelError.of(error['held_out'])}"
     return {
-        "sentence": sentence, "poles": box.poles, "chosen_by": box.chosen_by or f"task.poles={of.order}",
+        "sentence": sentence,
+        "poles": box.poles,
+        "chosen_by": box.chosen_by or f"task.poles={of.order}",
         "model_error": error,
-        "events": [fit.to_dict() for fit in fits], "by_poles": by_poles,
+        "events": [fit.to_dict() for fit in fits],
+        "by_poles": by_poles,
         "records": [
-            {"role": f.role, "name": f.event.record.name} | Identity.at(f.event.record).to_dict() for f in fits
+            {"role": f.role, "name": f.event.record.name} | Identity.at(f.event.record).to_dict()
+            for f in fits
         ],
-        "tractexp_version": provenance.version(), "commit": provenance.commit(),
-    }  # fmt: skip
+        "tractexp_version": provenance.version(),
+        "commit": provenance.commit(),
+    }
 
 
 @plugin
 class LinearNetwork(Task, call=linear_network):
-    """Fit the best linear network of few poles, a model without physics: linear_network.html and .json.
+    """Fit the best linear network of few poles, a model without physics: linear_network.html and
+    .json.
 
-    What it leaves is what a model can hardly go below by linear equations; each identification says how much more it
-    leaves itself.
+    What it leaves is what a model can hardly go below by linear equations; each identification says
+    how much more it leaves itself.
     """
 
     reads = ("data", "model.domain")
@@ -194,6 +212,8 @@ class LinearNetwork(Task, call=linear_network):
             metrics["model_error_held_out"] = error["held_out"]["value"]
         names = " and ".join(event.record.name for event in result.train)
         return {
-            "name": f"linear network, {names}", "metrics": metrics, "description": quoting.markdown(result.headline),
+            "name": f"linear network, {names}",
+            "metrics": metrics,
+            "description": quoting.markdown(result.headline),
             "records": result.content["records"],
-        }  # fmt: skip
+        }

@@ -11,11 +11,12 @@ from tractexp.outcome import MARK, Outcome, read_saved_result
 
 @public
 def load(path: str | Path) -> Outcome:
-    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line, or of its folder.
+    """The result that `save` wrote, or the `Identification` of a `result.json` of the command line,
+    or of its folder.
 
-    The latter holds no records: it predicts, simulates and exports, with the error and the grade that the run told, but
-    cannot be judged again. The folder of an investigation gives the model that it ended with. Raises `UserError` where
-    the file is missing, damaged or of no kind known.
+    The latter holds no records: it predicts, simulates and exports, with the error and the grade
+    that the run told, but cannot be judged again. The folder of an investigation gives the model
+    that it ended with. Raises `UserError` where the file is missing, damaged or of no kind known.
     """
     if Path(path).is_dir() or _bare(path):
         from tractexp.api.identify import Identification
@@ -26,7 +27,9 @@ def load(path: str | Path) -> Outcome:
     kinds = result_kinds()
     if content["kind"] not in kinds:
         why = among(content["kind"], kinds, "Kinds")
-        raise UserError(f"{path} holds a result of kind '{content['kind']}', which is not known{why}")
+        raise UserError(
+            f"{path} holds a result of kind '{content['kind']}', which is not known{why}"
+        )
     return kinds[content["kind"]].revived(content)
 
 

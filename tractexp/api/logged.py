@@ -1,6 +1,8 @@
-"""What is logged in MLflow of an identification: what it found as numbers, where its search ended, the curves.
+"""What is logged in MLflow of an identification: what it found as numbers, where its search ended,
+the curves.
 
-A name means one thing in the runs of every task: `T_prime` is an estimate, `search_T_prime` where the optimizer ended.
+A name means one thing in the runs of every task: `T_prime` is an estimate, `search_T_prime` where
+the optimizer ended.
 """
 
 from collections.abc import Mapping
@@ -18,15 +20,20 @@ if TYPE_CHECKING:
 
 FLOOR = 1.01  # times the estimate's objective: from there a search has found what the noise leaves
 ENDED = ("objective", "epsilon_p", "epsilon_q", "simulations", "seconds")
-GRADES = (Grade.WRONG_MODEL, Grade.EFFECT_MISSING, Grade.ADEQUATE)  # as the metric `grade` counts them
+# as the metric `grade` counts them
+GRADES = (Grade.WRONG_MODEL, Grade.EFFECT_MISSING, Grade.ADEQUATE)
 
 
 def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> dict[str, Any]:
     """Fields of `tractexp.tracking.TrackedRun`: metrics, curves and, as a predictor, the model."""
     result = fit.result
-    searched = f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
+    searched = (
+        f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
+    )
     if job.label:
-        searched = ", ".join([job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.of_many])
+        searched = ", ".join(
+            [job.choices["model"], *[f"{job.variant}, seed {job.seed}"] * job.of_many]
+        )
     return {
         "name": searched,
         "metrics": _of_search(fit) | _errors(fit) | _estimates(fit),  # MLflow compares by the first
@@ -40,7 +47,9 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
 
 
 def _estimates(fit: "Identification") -> dict[str, float]:
-    """Each estimate with the ends of its interval, and on the base of the file where that differs."""
+    """Each estimate with the ends of its interval, and on the base of the file where
+    that differs.
+    """
     metrics: dict[str, float] = {}
     for name, one in _name_for_tracking(fit.parameters).items():
         metrics[name] = one.value
@@ -53,7 +62,9 @@ def _estimates(fit: "Identification") -> dict[str, float]:
 def _errors(fit: "Identification") -> dict[str, float]:
     """How well the estimate fits, event by event too."""
     result = fit.result
-    metrics = {key: getattr(result, key) for key in ENDED} | {"model_error": result.model_error["value"]}
+    metrics = {key: getattr(result, key) for key in ENDED} | {
+        "model_error": result.model_error["value"]
+    }
     if held_out := result.model_error["held_out"]:
         metrics["model_error_held_out"] = held_out["value"]
     if (ratio := result.linear_network.get("ratio")) is not None:
@@ -68,9 +79,13 @@ def _errors(fit: "Identification") -> dict[str, float]:
 
 
 def _of_search(fit: "Identification") -> dict[str, float]:
-    """Where the optimizer itself ended, and after how many simulations it was within 1 % of the estimate."""
+    """Where the optimizer itself ended, and after how many simulations it was within 1 % of the
+    estimate.
+    """
     metrics = {f"search_{key}": fit.result.search[key] for key in ENDED}
-    metrics |= {f"search_{name}": one.search for name, one in _name_for_tracking(fit.parameters).items()}
+    metrics |= {
+        f"search_{name}": one.search for name, one in _name_for_tracking(fit.parameters).items()
+    }
     history = fit.search_result.history
     there = np.flatnonzero(history.objective <= FLOOR * fit.result.objective)
     reached = float(history.simulations[there[0]]) if there.size else float("inf")

@@ -1,4 +1,6 @@
-"""A file looked at without being told anything: what it holds, which loads it shows, what happened, what to fit."""
+"""A file looked at without being told anything: what it holds, which loads it shows, what happened,
+what to fit.
+"""
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +26,9 @@ from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_o
 from tractexp.recording.recording import unit_of
 from tractexp.wording import count_noun
 
-EARLIER = 3.0  # cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves out
+# cycles that a fit of samples needs before the dip, and one that the estimator of phasors leaves
+# out
+EARLIER = 3.0
 
 
 class Listed(Tabulated):
@@ -41,14 +45,17 @@ class Listed(Tabulated):
 
     def table(self) -> Table:
         columns = list(self.rows[0]) if self.rows else []
-        return Table(columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title)
+        return Table(
+            columns, [[_cell(row[name]) for name in columns] for row in self.rows], self.title
+        )
 
     def to_frame(self) -> Any:
         import pandas
 
         frame = pandas.DataFrame(list(self.rows))
         unknown = [name for name in frame if all(row[name] is None for row in self.rows)]
-        return frame.astype(dict.fromkeys(unknown, float))  # what no row has is nan, as where some rows have it
+        # what no row has is nan, as where some rows have it
+        return frame.astype(dict.fromkeys(unknown, float))
 
 
 def _cell(value: Any) -> Any:
@@ -57,7 +64,9 @@ def _cell(value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Look(Written):
-    """What files hold. `content` is that of `look.json`; arrays are read again where a look was loaded."""
+    """What files hold. `content` is that of `look.json`; arrays are read again where a look was
+    loaded.
+    """
 
     kind = "look"
     page = "look.html"
@@ -82,18 +91,32 @@ class Look(Written):
     @property
     def channels(self) -> Listed:
         """One row for each channel: number, name, phase, unit, primary magnitude, quality."""
-        return Listed([{"file": f["file"], **c} for f in self.content["files"] for c in f["channels"]], "channels")
+        return Listed(
+            [{"file": f["file"], **c} for f in self.content["files"] for c in f["channels"]],
+            "channels",
+        )
 
     @property
     def feeders(self) -> Listed:
-        """One row for each load: its channels, voltage and power before anything happened, the command that fits."""
-        rows = [{"file": file, **{k: v for k, v in load.items() if k != "events"}} for file, load in self._loads]
+        """One row for each load: its channels, voltage and power before anything happened, the
+        command that fits.
+        """
+        rows = [
+            {"file": file, **{k: v for k, v in load.items() if k != "events"}}
+            for file, load in self._loads
+        ]
         return Listed(rows, "loads")
 
     @property
     def events(self) -> Listed:
-        """One row for each event of each load: kind, start, depth, duration, jump, U2, P and Q, worth, why."""
-        rows = [{"file": file, "feeder": load["name"], **e} for file, load in self._loads for e in load["events"]]
+        """One row for each event of each load: kind, start, depth, duration, jump, U2, P and Q,
+        worth, why.
+        """
+        rows = [
+            {"file": file, "feeder": load["name"], **e}
+            for file, load in self._loads
+            for e in load["events"]
+        ]
         return Listed(rows, "events")
 
     @property
@@ -107,16 +130,21 @@ class Look(Written):
         return [(f["file"], load) for f in self.content["files"] for load in f["feeders"]]
 
     def phasors(self, feeder: int = 0, file: int = 0) -> Any:
-        """A frame of one load: t [s], f [Hz], U, U2 [kV, line to line], I1, I2 [kA], P [MW], Q [Mvar].
+        """A frame of one load: t [s], f [Hz], U, U2 [kV, line to line], I1, I2 [kA], P [MW], Q
+        [Mvar].
 
-        Of a table that is a record: its columns, in the same units. Raises `UserError` where there is no such load.
+        Of a table that is a record: its columns, in the same units. Raises `UserError` where there
+        is no such load.
         """
         import pandas
 
-        return pandas.DataFrame(series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load")))
+        return pandas.DataFrame(
+            series(_pick_item(_pick_item(self.views, file, "file").sights, feeder, "load"))
+        )
 
     def waveforms(self, file: int = 0) -> Any:
-        """A frame of all channels of a file in primary values: t [s], then each channel [kV, kA, ...].
+        """A frame of all channels of a file in primary values: t [s], then each channel [kV, kA,
+        ...].
 
         Raises `UserError` for a file that holds no channels.
         """
@@ -124,29 +152,50 @@ class Look(Written):
 
         recording = _pick_item(self.views, file, "file").recording
         if recording is None:
-            raise UserError(f"{self.content['files'][file]['file']} is a table of U, P and Q, without waveforms")
+            raise UserError(
+                f"{self.content['files'][file]['file']} is a table of U, P and Q, without waveforms"
+            )
         t = np.concatenate([s.t for s in recording.segments])
         names = [c.name for c in recording.channels]
         labels = [n if names.count(n) == 1 else f"{n} ({i})" for i, n in enumerate(names)]
-        columns = {label: c.values()[: len(t)] for label, c in zip(labels, recording.channels, strict=True)}
+        columns = {
+            label: c.values()[: len(t)] for label, c in zip(labels, recording.channels, strict=True)
+        }
         return pandas.DataFrame({"t": t, **columns})
 
     def table(self) -> Table:
         """Every event of every load."""
         from tractexp.report.look import event_row
 
-        columns = ["load", "dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", "P", "Q", "fit it?"]
+        columns = [
+            "load",
+            "dip",
+            "kind",
+            "starts [s]",
+            "lasts [ms]",
+            "depth",
+            "jump [°]",
+            "U2",
+            "P",
+            "Q",
+            "fit it?",
+        ]
         several = len(self.content["files"]) > 1
         rows = [
             [f"{file} {load['name']}" if several else load["name"], *event_row(event)]
             for file, load in self._loads
             for event in load["events"]
         ]
-        title = f"{count_noun(len(rows), 'event')} in {', '.join(f['file'] for f in self.content['files'])}"
+        title = (
+            f"{count_noun(len(rows), 'event')} in"
+            f" {', '.join(f['file'] for f in self.content['files'])}"
+        )
         return Table(columns, rows, title)
 
     def summary(self) -> Report:
-        """One screen: which load and dip to fit by which command, then a line for each file, bus and load."""
+        """One screen: which load and dip to fit by which command, then a line for each file, bus
+        and load.
+        """
         from tractexp.report import look_console
 
         return look_console.summary(self.content)
@@ -174,16 +223,22 @@ class Look(Written):
 
 @public
 def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
-    """Look at files without saying which channels they have: what they hold, which loads they show, what happened.
+    """Look at files without saying which channels they have: what they hold, which loads they show,
+    what happened.
 
-    A source is the path of any file that `tractexp.read` takes, an event or a record, or a frame with the columns
-    t, U, P, Q. `settings` are those of the reader; where `voltages` and `currents` are given, that load is looked at
-    instead of those proposed. Loads count P and Q as positive when consumed; voltages are primary kV line to line,
-    depth, jump and U2 are those of `tractexp.recording.Happening`.
+    A source is the path of any file that `tractexp.read` takes, an event or a record, or a frame
+    with the columns t, U, P, Q. `settings` are those of the reader; where `voltages` and `currents`
+    are given, that load is looked at instead of those proposed. Loads count P and Q as positive
+    when consumed; voltages are primary kV line to line, depth, jump and U2 are those of
+    `tractexp.recording.Happening`.
 
     Raises `UserError` for what cannot be read, naming file, place and value.
     """
-    flat = [one for source in sources for one in (source if isinstance(source, list | tuple) else [source])]
+    flat = [
+        one
+        for source in sources
+        for one in (source if isinstance(source, list | tuple) else [source])
+    ]
     if not flat:
         raise UserError("nothing to look at: give a file, e.g. look('station.cfg')")
     distinct = list(dict.fromkeys(map(_source, flat)))
@@ -209,7 +264,9 @@ def _source(given: Any) -> str | Record:
     if isinstance(record, Mapping) or hasattr(record, "columns"):
         names = record if isinstance(record, Mapping) else record.columns
         return table({str(name): record[name] for name in names}, "frame", {})
-    raise UserError(f"a {type(given).__name__} cannot be looked at; give a path, an event, a record or a frame")
+    raise UserError(
+        f"a {type(given).__name__} cannot be looked at; give a path, an event, a record or a frame"
+    )
 
 
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
@@ -219,17 +276,27 @@ def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
 
 
 def series(shown: Sight) -> dict[str, np.ndarray]:
-    """Columns (M,) of one load: t [s], f [Hz], U, U2 [kV], P [MW], Q [Mvar] and, of channels, I1, I2 [kA]."""
+    """Columns (M,) of one load: t [s], f [Hz], U, U2 [kV], P [MW], Q [Mvar] and, of channels, I1,
+    I2 [kA].
+    """
     if shown.record is not None:
         return shown.record.base.absolute(shown.record.channels)
     parts = [
         {
-            "t": p.t, "f": p.f, "U": p.U, "U2": p.U2, "I1": np.abs(p.I1), "I2": np.abs(p.I2), "P": np.real(p.S),
+            "t": p.t,
+            "f": p.f,
+            "U": p.U,
+            "U2": p.U2,
+            "I1": np.abs(p.I1),
+            "I2": np.abs(p.I2),
+            "P": np.real(p.S),
             "Q": np.imag(p.S),
         }
         for p in shown.phasors
-    ]  # fmt: skip
-    return {name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())}
+    ]
+    return {
+        name: np.concatenate([part[name] for part in parts]) for name in (parts[0] if parts else ())
+    }
 
 
 def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]:
@@ -239,12 +306,22 @@ def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]
     """
     what = event.what
     return {
-        "kind": what.kind, "start": what.start,
+        "kind": what.kind,
+        "start": what.start,
         "when": begun and (begun + timedelta(seconds=what.start)).isoformat(),
-        "end": what.end, "duration": what.end - what.start,
-        "depth": what.depth, "jump": what.jump, "U2": what.U2, "P_before": what.before[0], "Q_before": what.before[1],
-        "P_after": what.after[0], "Q_after": what.after[1], "dip": event.dip, "worth": event.worth, "why": event.why,
-    }  # fmt: skip
+        "end": what.end,
+        "duration": what.end - what.start,
+        "depth": what.depth,
+        "jump": what.jump,
+        "U2": what.U2,
+        "P_before": what.before[0],
+        "Q_before": what.before[1],
+        "P_after": what.after[0],
+        "Q_after": what.after[1],
+        "dip": event.dip,
+        "worth": event.worth,
+        "why": event.why,
+    }
 
 
 def _content(view: View) -> dict[str, Any]:
@@ -255,27 +332,39 @@ def _content(view: View) -> dict[str, Any]:
         record = view.sights[0].record
         assert record is not None
         content |= {
-            "station": "", "device": "", "start": view.begun and view.begun.isoformat(),
+            "station": "",
+            "device": "",
+            "start": view.begun and view.begun.isoformat(),
             "frequency": record.base.frequency,
-            "rates": [record.rate], "seconds": float(record.t[-1] - record.t[0]),
-            "segments": [{"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}],
-            "notes": list(record.notes), "channels": [],
-        }  # fmt: skip
+            "rates": [record.rate],
+            "seconds": float(record.t[-1] - record.t[0]),
+            "segments": [
+                {"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}
+            ],
+            "notes": list(record.notes),
+            "channels": [],
+        }
     else:
         last = recording.segments[-1]
         shown = any(each.feeder is None or each.feeder.currents for each in view.sights)
         lacks = "" if shown else explain_unrecognized(recording)
         content |= {
-            "station": recording.station, "device": recording.device,
+            "station": recording.station,
+            "device": recording.device,
             "start": recording.start and recording.start.isoformat(),
-            "frequency": recording.frequency, "rates": [s.rate for s in recording.segments],
+            "frequency": recording.frequency,
+            "rates": [s.rate for s in recording.segments],
             "seconds": last.start + (last.stop - last.first) / last.rate,
-            "segments": [{"rate": s.rate, "start": s.start, "samples": s.stop - s.first} for s in recording.segments],
+            "segments": [
+                {"rate": s.rate, "start": s.start, "samples": s.stop - s.first}
+                for s in recording.segments
+            ],
             "notes": [
-                *recording.notes, *([f"no load was recognised: {lacks}"] if lacks else []),
+                *recording.notes,
+                *([f"no load was recognised: {lacks}"] if lacks else []),
             ],
             "channels": [_channel(view, number) for number in range(len(recording.channels))],
-        }  # fmt: skip
+        }
         content |= {"lacks": lacks, "can_be_named": can_be_named(recording)}
     content["measured_frequency"] = view.frequency
     return content | {"feeders": [_feeder(view, shown) for shown in view.sights]}
@@ -286,37 +375,63 @@ def _channel(view: View, number: int) -> dict[str, Any]:
     channel, fitness = view.recording.channels[number], view.quality[number]
     share = fitness.noise / fitness.level if fitness.level > 0 else None
     return {
-        "number": number, "name": channel.name, "phase": channel.phase, "unit": channel.unit,
-        "quantity": channel.quantity, "magnitude": fitness.level,
-        "primary_unit": {"voltage": "kV", "current": "kA"}.get(unit_of(channel.unit)[0], channel.unit),
-        "noise_share": share, **asdict(fitness),
-    }  # fmt: skip
+        "number": number,
+        "name": channel.name,
+        "phase": channel.phase,
+        "unit": channel.unit,
+        "quantity": channel.quantity,
+        "magnitude": fitness.level,
+        "primary_unit": {"voltage": "kV", "current": "kA"}.get(
+            unit_of(channel.unit)[0], channel.unit
+        ),
+        "noise_share": share,
+        **asdict(fitness),
+    }
 
 
 def _feeder(view: View, shown: Sight) -> dict[str, Any]:
     feeder, powers = shown.feeder, view.powers(shown)
     names = [c.name for c in view.recording.channels] if view.recording else []
     row: dict[str, Any] = {
-        "name": shown.name, "connection": "", "voltages": [], "currents": [], "channels": [], "reverse_current": False,
-        "why": [], "loaded": True,
-    }  # fmt: skip
+        "name": shown.name,
+        "connection": "",
+        "voltages": [],
+        "currents": [],
+        "channels": [],
+        "reverse_current": False,
+        "why": [],
+        "loaded": True,
+    }
     if feeder is not None:
-        row |= {key: getattr(feeder, key) for key in ("voltages", "currents", "reverse_current", "why", "loaded")}
+        row |= {
+            key: getattr(feeder, key)
+            for key in ("voltages", "currents", "reverse_current", "why", "loaded")
+        }
         row["connection"] = _name(feeder.connection)
         row["channels"] = [names[i] for i in (*feeder.voltages, *feeder.currents)]
     U, P, Q = powers if powers and not shown.secondary else (None, None, None)
     units = ("pu", "pu", "pu") if shown.per_unit else ("kV", "MW", "Mvar")
     return row | {
-        "U": U, "P": P, "Q": Q, "units": units, **_sums(shown),
-        "said": list(shown.said), "unexamined": shown.unexamined, "secondary": shown.secondary,
+        "U": U,
+        "P": P,
+        "Q": Q,
+        "units": units,
+        **_sums(shown),
+        "said": list(shown.said),
+        "unexamined": shown.unexamined,
+        "secondary": shown.secondary,
         "command": command(view, shown),
         "events": [_without_powers(event_row(event, view.begun), shown) for event in shown.events],
-    }  # fmt: skip
+    }
 
 
 def _without_powers(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
     """The row of an event, without powers where they are those of a transformer's secondary."""
-    return row | dict.fromkeys(("P_before", "Q_before", "P_after", "Q_after")) if shown.secondary else row
+    return (
+        row | dict.fromkeys(("P_before", "Q_before", "P_after", "Q_after"))
+        if shown.secondary
+        else row
+    )
 
 
 def _name(connection: Any) -> str:
@@ -330,29 +445,45 @@ def command(view: View, shown: Sight) -> str:
         return ""
     usual = {f.name: f for f in fields(plugin.get("data", view.node["name"]))}
     settings = {**view.node, **choice}
-    text = build_typed_command({key: value for key, value in settings.items() if key == "name" or not _is_usual(usual[key], value)})
+    text = build_typed_command(
+        {
+            key: value
+            for key, value in settings.items()
+            if key == "name" or not _is_usual(usual[key], value)
+        }
+    )
     return f"{text} domain=waves" if waves_serve(view, shown) else text
 
 
 def waves_serve(view: View, shown: Sight) -> bool:
-    """Whether the samples of the dip that is fitted first tell more than its phasors, and can be fitted."""
-    first = next((event.what for event in shown.events if event.worth and event.dip is not None), None)
+    """Whether the samples of the dip that is fitted first tell more than its phasors, and can be
+    fitted.
+    """
+    first = next(
+        (event.what for event in shown.events if event.worth and event.dip is not None), None
+    )
     if view.recording is None or first is None:
         return False
     f = view.recording.frequency
     ends = [(s, s.start + (s.stop - s.first) / s.rate) for s in view.recording.waveforms()]
     there = next((s for s, end in ends if s.start <= first.start and first.end <= end), None)
-    fine = there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
+    fine = (
+        there is not None and there.rate >= COARSEST * f and first.start - there.start > EARLIER / f
+    )
     return fine and bool(describe_smearing(first.end - first.start, first.U2 or 0.0, f))
 
 
 def _is_usual(setting: Any, value: Any) -> bool:
     """Whether a value is what a setting (a dataclass field) is without it."""
-    return value == (setting.default if setting.default is not MISSING else setting.default_factory())
+    return value == (
+        setting.default if setting.default is not MISSING else setting.default_factory()
+    )
 
 
 def _sums(shown: Sight) -> dict[str, Any]:
-    """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's, at the beginning."""
+    """Kirchhoff: the sums of the three voltages and of the three currents, as shares of a phase's,
+    at the beginning.
+    """
     sums = {}
     for key in "VI":
         value = None

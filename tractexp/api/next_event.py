@@ -61,7 +61,9 @@ class Recommended(Written):
 
 
 def recommend_event(setup: Setup, rivals: Any, progress: Progress = None) -> Recommended:
-    """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be planned for."""
+    """Choose the event that tells `rivals` apart. Raises `UserError` for rivals that cannot be
+    planned for.
+    """
     sets = sets_of(rivals)
     event = _event(setup, sets, progress)
     return Recommended(setup, sets, files.plain(event.to_dict()), event)
@@ -77,16 +79,21 @@ def sets_of(rivals: Any) -> list[list[str]]:
     path = Path(rivals)
     if not files.there(path):
         raise UserError(
-            f"{TASK.rivals}={rivals}: there is no such file; give names of effects, [a,b] or [a,b+c], or the"
+            f"{TASK.rivals}={rivals}: there is no such file; give names of effects, [a,b] or"
+            " [a,b+c], or the"
             " discrepancy.json of an investigation that ended tied"
         )
     investigation = files.read_json(path)
     if not isinstance(investigation, dict) or "verdict" not in investigation:
-        raise UserError(f"{TASK.rivals}={rivals}: this is not the discrepancy.json of an investigation")
+        raise UserError(
+            f"{TASK.rivals}={rivals}: this is not the discrepancy.json of an investigation"
+        )
     if investigation.get("verdict") != "tied":
         raise UserError(
-            f"{TASK.rivals}={rivals}: that investigation ended {investigation.get('verdict')}, not tied, so that "
-            "there is nothing to tell apart; of a proposal the terms that are like it, and what to record for them, "
+            f"{TASK.rivals}={rivals}: that investigation ended {investigation.get('verdict')}, not"
+            " tied, so that "
+            "there is nothing to tell apart; of a proposal the terms that are like it, and what to"
+            " record for them, "
             "are in that file itself, as next_event"
         )
     return investigation["name_sets"]
@@ -97,6 +104,10 @@ def _event(setup: Setup, rivals: Sequence[Sequence[str]], progress: Progress) ->
 
     m = setup.model
     if m.per_event:
-        raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
+        raise UserError(
+            f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty"
+        )
     with tell_stages(progress) as tell:
-        return event_for(m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell)
+        return event_for(
+            m.model, setup.train, rivals, m.bounds, m.fixed, substeps=m.substeps, tell=tell
+        )

@@ -1,4 +1,6 @@
-"""Before the recording: which dips tell what, how deep one must be, and which events of an archive to fit."""
+"""Before the recording: which dips tell what, how deep one must be, and which events of an archive
+to fit.
+"""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -37,7 +39,9 @@ FIT, DEFAULT = "fit", "default"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Forecasts(Written):
-    """A plan: what dips of other depths, lengths, rates and noises would tell. `content` is that of `plan.json`."""
+    """A plan: what dips of other depths, lengths, rates and noises would tell. `content` is that of
+    `plan.json`.
+    """
 
     kind = "plan"
     page = "plan.html"
@@ -85,7 +89,8 @@ def plan(
     rate: float | None = None,  # Hz
     noise: float | None = None,  # standard deviation, as a share of P before the event; white
     jump: float | None = None,  # degrees, of the voltage's phase; in waveforms
-    unbalance: float | None = None,  # negative sequence over the depth, 1 of a fault between two phases; in waveforms
+    # negative sequence over the depth, 1 of a fault between two phases; in waveforms
+    unbalance: float | None = None,
     domain: str | None = None,
     values: Any = FIT,  # fit, default, or the path of a result.json
     least: float = 0.05,  # another event of the archive must narrow the intervals by this share
@@ -96,21 +101,23 @@ def plan(
     rivals: Any = (),  # [a,b+c], or a discrepancy.json: what to record to tell these apart
     progress: Any = None,
 ) -> Forecasts | Recommended:
-    """Forecast the intervals that a recording would give, without fitting it; or what tells `rivals` apart.
+    """Forecast the intervals that a recording would give, without fitting it; or what tells
+    `rivals` apart.
 
-    How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 % interval `within` a share
-    of the value? The dip is that of the deepest of `records`, unless `depth` (of the voltage before), `duration` [s],
-    `rate` [1/s] or `noise` (standard deviation, as a share of P before the event; white) are given. With `domain`
-    "waves" the voltage's phase jumps by `jump` [degrees] in it, its negative sequence is `unbalance` times its depth
-    (0: balanced, 1: a fault between two phases), and the noise is that of the sampled currents, as a share of P before
-    the event, too. `values` are what is planned at: "fit", the estimate of
-    that record; "default", the model's; an identification; or the path of a `result.json`. Of several records those
-    that tell most together are chosen, until another one narrows the intervals by less than the share `least`, at most
-    `events` of them. The model is as in `tractexp.identify`.
+    How deep must a dip be for `parameter` (H stands for M) to be known with half of its 95 %
+    interval `within` a share of the value? The dip is that of the deepest of `records`, unless
+    `depth` (of the voltage before), `duration` [s], `rate` [1/s] or `noise` (standard deviation, as
+    a share of P before the event; white) are given. With `domain` "waves" the voltage's phase jumps
+    by `jump` [degrees] in it, its negative sequence is `unbalance` times its depth (0: balanced, 1:
+    a fault between two phases), and the noise is that of the sampled currents, as a share of P
+    before the event, too. `values` are what is planned at: "fit", the estimate of that record;
+    "default", the model's; an identification; or the path of a `result.json`. Of several records
+    those that tell most together are chosen, until another one narrows the intervals by less than
+    the share `least`, at most `events` of them. The model is as in `tractexp.identify`.
 
-    With `rivals` nothing of this is asked: they are effects that the model may lack (`["a", "b"]`, `"b+c"` two at
-    once, or the path of a `discrepancy.json` that ended tied), and the event is chosen that most surely leaves one of
-    them. `progress` is as in `tractexp.investigate`.
+    With `rivals` nothing of this is asked: they are effects that the model may lack (`["a", "b"]`,
+    `"b+c"` two at once, or the path of a `discrepancy.json` that ended tied), and the event is
+    chosen that most surely leaves one of them. `progress` is as in `tractexp.investigate`.
 
     Raises `UserError` for wrong names or values, and for a model with `per_event`.
     """
@@ -126,20 +133,38 @@ def plan(
     if isinstance(values, Identification):
         values = values.result.on_base_of(setup.train[0].record)
     asked = {
-        "parameter": parameter, "within": within, "depth": depth, "duration": duration, "rate": rate, "noise": noise,
-        "jump": jump, "unbalance": unbalance, "values": values, "least": least, "events": events,
-    }  # fmt: skip
+        "parameter": parameter,
+        "within": within,
+        "depth": depth,
+        "duration": duration,
+        "rate": rate,
+        "noise": noise,
+        "jump": jump,
+        "unbalance": unbalance,
+        "values": values,
+        "least": least,
+        "events": events,
+    }
     planned = _forecast_plan(setup, **asked)
     return Forecasts(setup, asked, files.plain(_content(planned)), planned)
 
 
-def _forecast_plan(setup: Setup, parameter: str, within: float, values: Any, least: float, events: int | None,
-             **given: Any) -> Planned:  # fmt: skip
+def _forecast_plan(
+    setup: Setup,
+    parameter: str,
+    within: float,
+    values: Any,
+    least: float,
+    events: int | None,
+    **given: Any,
+) -> Planned:
     """Everything forecast: how deep, over what, and the best events."""
     problem, recorded = setup.problem, setup.train
     planning.column(problem.space.names, parameter)
     if problem.per_event:
-        raise UserError(f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty")
+        raise UserError(
+            f"{setting('task=plan')} plans for shared parameters; leave {MODEL.per_event} empty"
+        )
     for name in GRIDS:
         if given[name] is not None and name not in problem.domain.shaped_by:
             where = f"{setting(f'task.{name}')}={given[name]:g}"
@@ -155,10 +180,11 @@ def _forecast_plan(setup: Setup, parameter: str, within: float, values: Any, lea
 
 
 def chosen_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
-    """The events of a setup that tell most about its model together, at most `most`; `values` are those of `plan`.
+    """The events of a setup that tell most about its model together, at most `most`; `values` are
+    those of `plan`.
 
-    Events before which the model has no steady state at these values are left out. Raises `UserError` where that are
-    all of them.
+    Events before which the model has no steady state at these values are left out. Raises
+    `UserError` where that are all of them.
     """
     if setup.problem_of(setup.train[:1]).per_event:
         raise UserError(f"events are chosen for shared parameters; leave {MODEL.per_event} empty")
@@ -174,11 +200,20 @@ def chosen_events(setup: Setup, values: Any, most: int) -> list[ChosenEvent]:
     return planning.best_of([*informations.values()], [*informations], 0.0, most)
 
 
-def _shape(event: Event, noise: float | None, seen: Noise | None = None, **given: float | None) -> DipShape:
-    """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given replaced."""
-    shape = replace(DipShape.of(event, seen), **{key: value for key, value in given.items() if value is not None})  # type: ignore[arg-type]
+def _shape(
+    event: Event, noise: float | None, seen: Noise | None = None, **given: float | None
+) -> DipShape:
+    """The dip to plan for: the recorded one, with the noise `seen` in its fit, and what is given
+    replaced.
+    """
+    shape = replace(
+        DipShape.of(event, seen),
+        **{key: value for key, value in given.items() if value is not None},
+    )  # type: ignore[arg-type]
     if noise is not None:
-        shape = replace(shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0)
+        shape = replace(
+            shape, noise_P=noise * abs(event.P0), noise_Q=noise * abs(event.P0), memory=0.0
+        )
     return shape
 
 
@@ -199,7 +234,10 @@ def _guess(setup: Setup, event: Event, values: Any) -> tuple[np.ndarray, str, No
     given = isinstance(values, Mapping)
     by_parameter = values if given else load(Path(values)).on_base_of(setup.train[0].record)
     if missing := [name for name in problem.space.names if name not in by_parameter]:
-        raise UserError(f"{TASK.values}={values}: that result has no {', '.join(missing)}; it is of another model")
+        raise UserError(
+            f"{TASK.values}={values}: that result has no {', '.join(missing)}; it is of another"
+            " model"
+        )
     origin = f"the values of {'an identification' if given else values}"
     return np.array([by_parameter[n] for n in problem.space.names]), origin, None
 
@@ -214,17 +252,27 @@ def _scans(problem: Any, values: np.ndarray, shape: DipShape) -> dict[str, Any]:
     by_depth = planning.over_depth(problem, values, shape)
     P = abs(shape.P0)
     loud = [replace(shape, noise_P=x * P, noise_Q=x * P) for x in NOISES]
-    scans = {DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth), DURATION: over("duration", DURATIONS)}
+    scans = {
+        DEPTH: (tuple(f.shape.depth for f in by_depth), by_depth),
+        DURATION: over("duration", DURATIONS),
+    }
     scans |= {GRIDS[name][0]: over(name, GRIDS[name][1]) for name in shape.domain.shaped_by}
     scans[RATE] = over("rate", shape.domain.rates(shape.frequency))
-    return scans | {shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])}
+    return scans | {
+        shape.domain.planned_noise: (NOISES, [planning.forecast(problem, values, s) for s in loud])
+    }
 
 
 def _describe_shape(shape: DipShape) -> str:
     memory = f"forgotten within {1000 * shape.memory:.0f} ms" if shape.memory > 0 else "white"
-    first, second = (f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q))
+    first, second = (
+        f"{100 * level / abs(shape.P0):.2g} %" for level in (shape.noise_P, shape.noise_Q)
+    )
     names = shape.domain.channels
-    dip = f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f} Hz"
+    dip = (
+        f"a dip of {100 * shape.depth:.0f} % for {1000 * shape.duration:.0f} ms at {shape.rate:.0f}"
+        " Hz"
+    )
     dip += shape.domain.describe_shape(shape)
     return f"planned: {dip}, noise {first} in {names[0]} and {second} in {names[1]}, of P, {memory}"
 
@@ -246,7 +294,8 @@ def _content(planned: Planned) -> dict[str, Any]:
             for label, (grid, forecasts) in planned.scans.items()
         },
         "best_events": [
-            {"name": c.name, "gain": c.gain, "half": dict(zip(names, c.half, strict=True))} for c in planned.chosen
+            {"name": c.name, "gain": c.gain, "half": dict(zip(names, c.half, strict=True))}
+            for c in planned.chosen
         ],
         "other_events": rest(planned),
     }
@@ -254,10 +303,12 @@ def _content(planned: Planned) -> dict[str, Any]:
 
 @plugin
 class Plan(Task, call=plan):
-    """Forecast the intervals that a recording would give, without fitting it: plan.html and plan.json.
+    """Forecast the intervals that a recording would give, without fitting it: plan.html and
+    plan.json.
 
-    The dip is that of the deepest record in `data`, or as set here. The parameters and the noise are those of the
-    estimate that identify makes of it, or the model's defaults, or those of an earlier result.json.
+    The dip is that of the deepest record in `data`, or as set here. The parameters and the noise
+    are those of the estimate that identify makes of it, or the model's defaults, or those of an
+    earlier result.json.
     """
 
     def logged(self, job: Job, result: Forecasts | Recommended) -> dict[str, Any]:

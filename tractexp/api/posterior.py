@@ -26,7 +26,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sampled(Written):
-    """A sample of the posterior under a flat prior within the bounds. `content` is that of `posterior.json`."""
+    """A sample of the posterior under a flat prior within the bounds. `content` is that of
+    `posterior.json`.
+    """
 
     kind = "posterior"
     page = "posterior.html"
@@ -42,7 +44,9 @@ class Sampled(Written):
         from tractexp.identification.posterior import sample
 
         s = self.settings
-        return self.behind or sample(self.fit.details.uncertainty, s["walkers"], s["steps"], s["seed"])
+        return self.behind or sample(
+            self.fit.details.uncertainty, s["walkers"], s["steps"], s["seed"]
+        )
 
     @property
     def draws(self) -> dict[str, np.ndarray]:
@@ -61,7 +65,8 @@ class Sampled(Written):
     def summary(self) -> Report:
         c, s = self.content, self.settings
         effort = (
-            f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance {c['acceptance']:.2f},"
+            f"{s['steps']} steps of {s['walkers']} walkers in {c['seconds']:.1f} s, acceptance"
+            f" {c['acceptance']:.2f},"
             f" autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
@@ -83,14 +88,20 @@ class Sampled(Written):
 
 @public
 def posterior(
-    fit: Identification, *, walkers: int = 48, steps: int = 2000, seed: int | None = None, progress: Any = None
+    fit: Identification,
+    *,
+    walkers: int = 48,
+    steps: int = 2000,
+    seed: int | None = None,
+    progress: Any = None,
 ) -> Sampled:
-    """Sample the posterior of an identification's free parameters under a flat prior within their bounds.
+    """Sample the posterior of an identification's free parameters under a flat prior within their
+    bounds.
 
-    `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away; `seed` is by default
-    that of the identification. `progress`: None shows how far it is, False does not. Raises `UserError` without the
-    extra [posterior], for fewer walkers than twice the coordinates, and for an identification of which only a
-    `result.json` is known.
+    `walkers` go `steps` steps each (at least 4 and 100), of which the first 30 % are thrown away;
+    `seed` is by default that of the identification. `progress`: None shows how far it is, False
+    does not. Raises `UserError` without the extra [posterior], for fewer walkers than twice the
+    coordinates, and for an identification of which only a `result.json` is known.
     """
     from tractexp.identification.posterior import sample
 
@@ -113,7 +124,9 @@ def posterior(
 
 @plugin
 class Posterior(Task, call=posterior):
-    """Identify, then sample the posterior under a flat prior within the bounds: posterior.html, .json and .npz."""
+    """Identify, then sample the posterior under a flat prior within the bounds: posterior.html,
+    .json and .npz.
+    """
 
     def logged(self, job: Job, result: Sampled) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit

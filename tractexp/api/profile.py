@@ -33,7 +33,8 @@ class Profiled(Written):
     points: int
     content: Mapping[str, Any]
     result: Result  # of the identification, with the intervals and verdicts that the profiles give
-    curvature: Mapping[str, tuple[float, float]]  # the intervals by curvature, about where the profiles start
+    # the intervals by curvature, about where the profiles start
+    curvature: Mapping[str, tuple[float, float]]
     behind: "Profiles | None" = None  # None where it was loaded
 
     @functools.cached_property
@@ -50,7 +51,9 @@ class Profiled(Written):
 
     @property
     def profiles(self) -> Mapping[str, Mapping[str, Any]]:
-        """By name: `values` and the `deviance` there (n,), `interval` (95 %), `ends`, `minima` and `verdict`."""
+        """By name: `values` and the `deviance` there (n,), `interval` (95 %), `ends`, `minima` and
+        `verdict`.
+        """
         return self.content["profiles"]
 
     def table(self) -> Table:
@@ -60,13 +63,21 @@ class Profiled(Written):
             [name, f"{likely[name]:.4g}", span(*self.curvature[name]), span(*p["interval"])]
             for name, p in self.profiles.items()
         ]
-        return Table(["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals")
+        return Table(
+            ["parameter", "most likely", "by curvature", "by profile"], rows, "95 % intervals"
+        )
 
     def summary(self) -> Report:
         c, notes = self.content, self.content["notes"]
-        effort = f"{len(self.profiles)} profiles: {c['simulations']} simulations in {c['seconds']:.2f} s"
+        effort = (
+            f"{len(self.profiles)} profiles: {c['simulations']} simulations in {c['seconds']:.2f} s"
+        )
         verdicts = [f"{name}: {p['verdict']}" for name, p in self.profiles.items()]
-        report = self.fit.summary().add(self.table()).items([*verdicts, *(f"note: {note}" for note in notes)])
+        report = (
+            self.fit.summary()
+            .add(self.table())
+            .items([*verdicts, *(f"note: {note}" for note in notes)])
+        )
         return report.text(effort)
 
     def report(self) -> Report:
@@ -81,14 +92,16 @@ class Profiled(Written):
 
 @public
 def profile(
-    fit: Identification, *,
+    fit: Identification,
+    *,
     points: int = 24,  # at most so many on either side of the optimum
     progress: Any = None,
-) -> Profiled:  # fmt: skip
+) -> Profiled:
     """Find the best fit for each value of each free parameter of an identification in turn.
 
-    `points` (3 to 1000) is how many values are tried on either side of the optimum at most. `progress`: None shows how
-    far it is, False does not. Raises `UserError` for an identification of which only a `result.json` is known.
+    `points` (3 to 1000) is how many values are tried on either side of the optimum at most.
+    `progress`: None shows how far it is, False does not. Raises `UserError` for an identification
+    of which only a `result.json` is known.
     """
     from tractexp.identification.profile import profiles
 
@@ -132,7 +145,9 @@ def _content(scan: "Profiles", seconds: float) -> dict[str, Any]:
 
 @plugin
 class Profile(Task, call=profile):
-    """Identify, then find the best fit for each value of each parameter in turn: profile.html and profile.json."""
+    """Identify, then find the best fit for each value of each parameter in turn: profile.html and
+    profile.json.
+    """
 
     def logged(self, job: Job, result: Profiled) -> dict[str, Any]:
         from tractexp.api.logged import logged_fit

@@ -13,7 +13,17 @@ from tractexp.blocks import Report, Table
 from tractexp.composition import choices
 from tractexp.errors import UserError, among
 from tractexp.outcome import FORMS, Tabulated
-from tractexp.record import Base, Event, Record, Waves, Window, describe, detect, on_own_base, reader_of
+from tractexp.record import (
+    Base,
+    Event,
+    Record,
+    Waves,
+    Window,
+    describe,
+    detect,
+    on_own_base,
+    reader_of,
+)
 from tractexp.record.dips import around
 from tractexp.wording import count_noun
 
@@ -28,7 +38,9 @@ class Dips(Tabulated, list[Event]):
         return Dips(super().__getitem__(k)) if isinstance(k, slice) else super().__getitem__(k)
 
     def look(self) -> Any:
-        """A look (a `Look`) at the files that the events are from, and at the records that are from none."""
+        """A look (a `Look`) at the files that the events are from, and at the records that are from
+        none.
+        """
         from tractexp.api.look import look
 
         return look(*self)
@@ -36,19 +48,41 @@ class Dips(Tabulated, list[Event]):
     def table(self) -> Table:
         """One row for each event."""
         rows = [
-            [e.record.name, e.t_start, f"{e.depth:.0%}", round(1000 * e.duration), round(e.rate), e.P0, e.Q0,
-             "" if e.noise_share is None else f"{e.noise_share:.2%}", " ".join(e.record.channels)]
+            [
+                e.record.name,
+                e.t_start,
+                f"{e.depth:.0%}",
+                round(1000 * e.duration),
+                round(e.rate),
+                e.P0,
+                e.Q0,
+                "" if e.noise_share is None else f"{e.noise_share:.2%}",
+                " ".join(e.record.channels),
+            ]
             for e in self
-        ]  # fmt: skip
-        columns = ["event", "starts [s]", "depth", "lasts [ms]", "rate [Hz]", "P0 [pu]", "Q0 [pu]", "noise of P",
-                   "channels"]  # fmt: skip
+        ]
+        columns = [
+            "event",
+            "starts [s]",
+            "depth",
+            "lasts [ms]",
+            "rate [Hz]",
+            "P0 [pu]",
+            "Q0 [pu]",
+            "noise of P",
+            "channels",
+        ]
         return Table(columns, rows, count_noun(len(self), "dip"), words=(8,))
 
     def summary(self) -> Report:
         """The table, and what a reader or the detection found odd."""
         odd = [sentence.partition(". Note: ") for sentence in map(describe, self)]
         notes = [f"{e.record.name}: {o[2]}" for e, o in zip(self, odd, strict=True) if o[2]]
-        return Report().add(self.table()).text(*notes, *(f"{e.record.name}: {n}" for e in self for n in e.record.notes))
+        return (
+            Report()
+            .add(self.table())
+            .text(*notes, *(f"{e.record.name}: {n}" for e in self for n in e.record.notes))
+        )
 
 
 @public
@@ -65,17 +99,20 @@ def read(
 ) -> Dips:
     """Read records of voltage dips, check them and find the dip in each.
 
-    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2) or of a COMTRADE file (.cfg), a
-    pandas or polars frame or a mapping with those columns, a shipped name ("tibet_50pct"), or a `Record`. Arrays (N,)
-    can be given directly as `t` [s], `U`, `P`, `Q`, `U2` [pu] and `f` [Hz], and are called `name`. Loads count P and Q
-    as positive when consumed. P and Q may have gaps (nan).
+    A source is the path of a CSV file (columns t, U, P, Q and, where recorded, f, U2) or of a
+    COMTRADE file (.cfg), a pandas or polars frame or a mapping with those columns, a shipped name
+    ("tibet_50pct"), or a `Record`. Arrays (N,) can be given directly as `t` [s], `U`, `P`, `Q`,
+    `U2` [pu] and `f` [Hz], and are called `name`. Loads count P and Q as positive when consumed. P
+    and Q may have gaps (nan).
 
-    `settings` are those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA] where a table is not
-    per unit, `frequency` [Hz, nominal]; for COMTRADE `voltages` and `currents` (three channels each, names or numbers
-    from 0), `train` (dips by number from 1), `reverse_current`, `skew`, `encoding`, `pre` and `post` [s].
+    `settings` are those of the reader: `base_voltage` [kV, line to line] and `base_power` [MVA]
+    where a table is not per unit, `frequency` [Hz, nominal]; for COMTRADE `voltages` and `currents`
+    (three channels each, names or numbers from 0), `train` (dips by number from 1),
+    `reverse_current`, `skew`, `encoding`, `pre` and `post` [s].
 
-    All dips of a COMTRADE file that can be used are given, in order of time. Raises `UserError`, naming the file, the
-    place and the value, for what is no record, holds no dip or has settings that its reader does not know.
+    All dips of a COMTRADE file that can be used are given, in order of time. Raises `UserError`,
+    naming the file, the place and the value, for what is no record, holds no dip or has settings
+    that its reader does not know.
     """
     arrays = {"t": t, "U": U, "P": P, "Q": Q, "f": f, "U2": U2}
     columns = {key: values for key, values in arrays.items() if values is not None}
@@ -94,7 +131,9 @@ def dips_of(argument: str, given: Any, least: int = 0) -> Dips:
     listed = given if isinstance(given, Sequence) and not isinstance(given, str) else [given]
     dips = Dips(e for one in listed for e in ([one] if isinstance(one, Event) else read(one)))
     if len(dips) < least:
-        raise UserError(f"{argument} is empty; give at least one event, as tractexp.read gives them")
+        raise UserError(
+            f"{argument} is empty; give at least one event, as tractexp.read gives them"
+        )
     return dips
 
 
@@ -110,7 +149,9 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
     bases = {"base_voltage": None, "base_power": None, "frequency": None}
     for key, value in settings.items():
         if key not in bases:
-            raise UserError(f"{key} is no setting of arrays and frames{among(key, bases, 'Settings')}")
+            raise UserError(
+                f"{key} is no setting of arrays and frames{among(key, bases, 'Settings')}"
+            )
         check_kind(key, value, float | None)
         bases[key] = value
     if missing := [key for key in REQUIRED if key not in columns]:
@@ -118,8 +159,14 @@ def table(columns: Mapping[str, Any], name: str, settings: Mapping[str, Any]) ->
         raise UserError(f"{lack}{among(missing[0], columns, 'Columns')}")
     spare = [str(key) for key in columns if key not in (*REQUIRED, *OPTIONAL)]
     notes = (f"columns not used: {', '.join(spare)}",) if spare else ()
-    values = {key: _array(columns[key], f"{name}: {key}") for key in (*REQUIRED, *OPTIONAL) if key in columns}
-    base = Base(bases["base_voltage"] or 1.0, bases["base_power"] or 1.0, bases["frequency"] or 50.0)
+    values = {
+        key: _array(columns[key], f"{name}: {key}")
+        for key in (*REQUIRED, *OPTIONAL)
+        if key in columns
+    }
+    base = Base(
+        bases["base_voltage"] or 1.0, bases["base_power"] or 1.0, bases["frequency"] or 50.0
+    )
     signals: Any = base.per_unit(values)
     return Record(name, base=base, notes=notes, **signals).uniform().check()
 
@@ -128,7 +175,9 @@ def _array(values: Any, where: str) -> np.ndarray:
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise UserError(f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap") from error
+        raise UserError(
+            f"{where} holds {_odd(values)}, which is no number; give numbers, nan for a gap"
+        ) from error
     if array.ndim != 1:
         raise UserError(f"{where} has shape {array.shape}; one number per sample, (N,), is needed")
     return array
@@ -149,14 +198,22 @@ def _records(source: Any, settings: Mapping[str, Any]) -> Iterator[Record]:
         yield from _file(str(source), settings)
     elif isinstance(source, Record | Event):
         if settings:
-            raise UserError(f"{', '.join(settings)}: a record is taken as it is; leave the settings out")
+            raise UserError(
+                f"{', '.join(settings)}: a record is taken as it is; leave the settings out"
+            )
         yield source.record if isinstance(source, Event) else source
     elif isinstance(source, Mapping) or hasattr(source, "columns"):
-        columns = {str(key): source[key] for key in (source if isinstance(source, Mapping) else source.columns)}
+        columns = {
+            str(key): source[key]
+            for key in (source if isinstance(source, Mapping) else source.columns)
+        }
         yield table(columns, "frame", settings)
     else:
         kind = type(source).__name__
-        raise UserError(f"a {kind} cannot be read; give a path, a frame, a mapping of columns, or t=, U=, P= and Q=")
+        raise UserError(
+            f"a {kind} cannot be read; give a path, a frame, a mapping of columns, or t=, U=, P="
+            " and Q="
+        )
 
 
 def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
@@ -172,31 +229,52 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
         if path in shipped:
             return {**Choice.of(GROUP, path).node, **settings}
         if not Path(path).suffix:
-            raise UserError(f"{path} is neither a file with an ending nor a shipped record{among(path, shipped)}")
+            raise UserError(
+                f"{path} is neither a file with an ending nor a shipped"
+                f" record{among(path, shipped)}"
+            )
     cls = reader_of(path)
     return {"name": cls.name, **cls.of(path), **settings}
 
 
 def record_to_dict(record: Record) -> dict[str, Any]:
     """A record as plain data."""
-    plain = {"base": asdict(record.base), "window": record.window and record.window.to_dict(), "more": {**record.more},
-             "waves": record.waves and record.waves.to_dict(), "identity": {**record.identity},
-             "given_base": record.original_base and asdict(record.original_base)}  # fmt: skip
+    plain = {
+        "base": asdict(record.base),
+        "window": record.window and record.window.to_dict(),
+        "more": {**record.more},
+        "waves": record.waves and record.waves.to_dict(),
+        "identity": {**record.identity},
+        "given_base": record.original_base and asdict(record.original_base),
+    }
     return {f.name: getattr(record, f.name) for f in fields(Record)} | plain
 
 
 def record_from_dict(content: Mapping[str, Any]) -> Record:
     """The record of its plain data."""
-    arrays: Any = {k: np.array(content[k], dtype=float) for k in (*REQUIRED, *OPTIONAL) if content[k] is not None}
+    arrays: Any = {
+        k: np.array(content[k], dtype=float)
+        for k in (*REQUIRED, *OPTIONAL)
+        if content[k] is not None
+    }
     base, notes = Base(**content["base"]), tuple(content["notes"])
     original = Base(**content["given_base"]) if content.get("given_base") else None
     window = Window.of(content["window"]) if content.get("window") else None
     more = {name: np.array(values, dtype=float) for name, values in content.get("more", {}).items()}
     waves = Waves.of(content["waves"]) if content.get("waves") else None
     return Record(
-        content["name"], base=base, source=content["source"], notes=notes, window=window, more=more, waves=waves,
-        original_base=original, identity=content.get("identity", {}), digest=content.get("digest", ""), **arrays,
-    )  # fmt: skip
+        content["name"],
+        base=base,
+        source=content["source"],
+        notes=notes,
+        window=window,
+        more=more,
+        waves=waves,
+        original_base=original,
+        identity=content.get("identity", {}),
+        digest=content.get("digest", ""),
+        **arrays,
+    )
 
 
 FORMS[Dips] = (  # the dips are found again

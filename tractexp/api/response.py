@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Response:
-    """Voltage and calculated power, (N,) each, in pu of the file; where recorded `measured` P and Q, `epsilon` (20)."""
+    """Voltage and calculated power, (N,) each, in pu of the file; where recorded `measured` P and
+    Q, `epsilon` (20).
+    """
 
     title: str
     t: np.ndarray  # s
@@ -30,14 +32,19 @@ class Response:
     measured: tuple[np.ndarray, np.ndarray] | None = None
     epsilon: tuple[float, float] | None = None  # of P and Q, fractions
     notes: tuple[str, ...] = ()
-    currents: Mapping[str, np.ndarray] = field(default_factory=dict)  # of waveforms: t [s] and each phase's [pu]
+    # of waveforms: t [s] and each phase's [pu]
+    currents: Mapping[str, np.ndarray] = field(default_factory=dict)
     epsilon_i: float | None = None
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """What response.csv holds, by name."""
         columns = {"t": self.t, "U": self.U, "P": self.P, "Q": self.Q}
-        return columns | ({"P_measured": self.measured[0], "Q_measured": self.measured[1]} if self.measured else {})
+        return columns | (
+            {"P_measured": self.measured[0], "Q_measured": self.measured[1]}
+            if self.measured
+            else {}
+        )
 
     @property
     def row(self) -> list[str]:
@@ -48,7 +55,11 @@ class Response:
         return [self.title, *(f"{v:.4f}" for v in ends), *errors]
 
     def __repr__(self) -> str:
-        errors = ", epsilon_p {}, epsilon_q {}".format(*map(epsilon, self.epsilon)) if self.epsilon else ""
+        errors = (
+            ", epsilon_p {}, epsilon_q {}".format(*map(epsilon, self.epsilon))
+            if self.epsilon
+            else ""
+        )
         errors += "" if self.epsilon_i is None else f", epsilon_i {epsilon(self.epsilon_i)}"
         return f"{self.title}: t, U, P, Q of {len(self.t)} samples{errors}"
 
@@ -66,7 +77,11 @@ class Response:
     def write(self, stem: Path) -> list[Path]:
         """Write columns to `stem`.csv; of waveforms currents, too."""
         columns = [_csv(stem.with_suffix(".csv"), self.columns)]
-        return columns + ([_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)] if self.currents else [])
+        return columns + (
+            [_csv(stem.with_name(f"{stem.name}_currents.csv"), self.currents)]
+            if self.currents
+            else []
+        )
 
     def draw(self, path: Path) -> Path:
         """Draw the response, against the measurement where there is one."""
@@ -75,7 +90,14 @@ class Response:
         columns = self.P, self.Q
         if self.measured and self.epsilon:
             return figures.fit(
-                path, self.t, self.U, self.measured, columns, title=self.title, epsilon=self.epsilon, notes=self.notes
+                path,
+                self.t,
+                self.U,
+                self.measured,
+                columns,
+                title=self.title,
+                epsilon=self.epsilon,
+                notes=self.notes,
             )
         return figures.response(path, self.t, self.U, columns, title=self.title, notes=self.notes)
 
@@ -87,31 +109,49 @@ def _csv(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
     return files.write(path, text.getvalue())
 
 
-def respond_to(model: "Model", values: np.ndarray, event: Event, own: OwnBase | None = None) -> Response:
+def respond_to(
+    model: "Model", values: np.ndarray, event: Event, own: OwnBase | None = None
+) -> Response:
     """A recorded event played through a model, power and currents on the base of the event's file.
 
-    `own` is the base that the values are on, None that of the event. Raises `UserError` where it has no steady state
-    there.
+    `own` is the base that the values are on, None that of the event. Raises `UserError` where it
+    has no steady state there.
     """
     from tractexp.identification.result import respond
 
-    return response_of(respond(model, values, event if own is None else own.put(event), "validate"), event, own)
+    return response_of(
+        respond(model, values, event if own is None else own.put(event), "validate"), event, own
+    )
 
 
 def response_of(fit: "Fit", event: Event, own: OwnBase | None = None) -> Response:
     """What was calculated of an event on the base `own`, on that of its file."""
-    record = fit.event.record  # of waveforms, as the estimator sees recorded and calculated currents
+    # of waveforms, as the estimator sees recorded and calculated currents
+    record = fit.event.record
     ratio = OwnBase.at(record).ratio if own is not None else 1.0
     P, Q, *measured = (ratio * power for power in (fit.P, fit.Q, record.P, record.Q))
-    errors, notes = (fit.epsilon_p, fit.epsilon_q), tuple(event.record.notes if own is not None else record.notes)
+    errors, notes = (
+        (fit.epsilon_p, fit.epsilon_q),
+        tuple(event.record.notes if own is not None else record.notes),
+    )
     return Response(
-        record.name, record.t, record.U, P, Q, (measured[0], measured[1]), errors, notes, _currents(fit, ratio),
+        record.name,
+        record.t,
+        record.U,
+        P,
+        Q,
+        (measured[0], measured[1]),
+        errors,
+        notes,
+        _currents(fit, ratio),
         fit.epsilon_i,
-    )  # fmt: skip
+    )
 
 
 def _currents(fit: "Fit", ratio: float) -> dict[str, np.ndarray]:
-    """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of phasors."""
+    """t [s] and the currents of each phase [pu of their peak], calculated and measured; none of
+    phasors.
+    """
     if fit.waves is None or fit.currents is None:
         return {}
     part, event = slice(fit.waves.lead, None), fit.waves

@@ -1,4 +1,6 @@
-"""What a call is given: records and a model, and for searches how a residual counts and when they end."""
+"""What a call is given: records and a model, and for searches how a residual counts and when they
+end.
+"""
 
 import functools
 from collections.abc import Iterator, Sequence
@@ -42,14 +44,24 @@ class Setup(Given):
     target: float | None = None
 
     @classmethod
-    def of(cls, records: Any, model: Any, validate: Any = (), objective: Any = None, **given: Any) -> Self:
-        """From the arguments of a call: those of the model replace its own where they are not None."""
+    def of(
+        cls, records: Any, model: Any, validate: Any = (), objective: Any = None, **given: Any
+    ) -> Self:
+        """From the arguments of a call: those of the model replace its own where they
+        are not None.
+        """
         for key, least in LEAST.items():
             check_range(key, given.get(key), least)
         train, held = dips_together(records, validate)
         of_model = {key: given.pop(key) for key in OF_MODEL if key in given}
         load = model_of(model, of_model.get("domain")).with_(**of_model).fitting(train)
-        return cls(train=train, validate=held, model=load, objective=Choice.of("objective", objective), **given)
+        return cls(
+            train=train,
+            validate=held,
+            model=load,
+            objective=Choice.of("objective", objective),
+            **given,
+        )
 
     @functools.cached_property
     def problem(self) -> "Problem":
@@ -59,8 +71,14 @@ class Setup(Given):
         """The identification problem of some events, by default of those fitted; made anew."""
         from tractexp.inference.problem import Problem
 
-        m, loss, events = self.model, self.objective.build("objective"), self.train if train is None else train
-        return Problem(m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss, priors=m.priors)
+        m, loss, events = (
+            self.model,
+            self.objective.build("objective"),
+            self.train if train is None else train,
+        )
+        return Problem(
+            m.model, events, m.bounds, m.fixed, m.substeps, m.per_event, loss=loss, priors=m.priors
+        )
 
     @property
     def limits(self) -> "Limits":
@@ -86,13 +104,20 @@ class Setup(Given):
             return search(self.problem, plugin, seed, self.limits, callback)
 
 
-def describe_records(train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate") -> Iterator[str]:
-    """What is read, a sentence for each event and each of its notes, and of each recording which load it is of."""
+def describe_records(
+    train: Sequence[Event], validate: Sequence[Event], held_out: str = "validate"
+) -> Iterator[str]:
+    """What is read, a sentence for each event and each of its notes, and of each recording which
+    load it is of.
+    """
     said: list[Identity] = []
     for role, group in (("fit", train), (held_out, validate)):
         for event in group:
             yield f"{role}: {describe(event)}"
-            if event.record.source and (identity := Identity.at(event.record).recording) not in said:
+            if (
+                event.record.source
+                and (identity := Identity.at(event.record).recording) not in said
+            ):
                 said.append(identity)
                 yield f"  record: {identity}"
             yield from (f"  note: {note}" for note in event.record.notes)

@@ -20,7 +20,8 @@ from tractexp.identification.result import load
 from tractexp.outcome import Drawing, Written
 from tractexp.plugin import plugin
 
-BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}  # a dip by hand, where nothing else is known
+# a dip by hand, where nothing else is known
+BEFORE = {"U0": 1.0, "P0": 1.0, "Q0": 0.5, "frequency": 50.0}
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,9 @@ class Dip:
         for name in ("duration", "fall", "recovery", "start"):
             check_range(f"task.{name}", getattr(self, name), 0.0)
         check_range("task.rate", self.rate, 1.0, 1e5)
-        check_range("task.length", self.length, max(20 / self.rate, self.start + self.duration), 3600.0)
+        check_range(
+            "task.length", self.length, max(20 / self.rate, self.start + self.duration), 3600.0
+        )
 
     def voltage(self) -> tuple[np.ndarray, np.ndarray]:
         """Times (N,) [s] and the voltage (N,) as a share of that before."""
@@ -53,7 +56,9 @@ class Dip:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Written):
-    """Responses, one for each event; a simulation of one event has its arrays `t`, `U`, `P`, `Q` itself."""
+    """Responses, one for each event; a simulation of one event has its arrays `t`, `U`, `P`, `Q`
+    itself.
+    """
 
     kind = "simulation"
 
@@ -64,7 +69,9 @@ class Simulation(Written):
     def __getattr__(self, name: str) -> Any:
         if name in ("t", "U", "P", "Q") and len(self.responses) == 1:
             return getattr(self.responses[0], name)
-        raise AttributeError(f"a simulation of {len(self.responses)} events has no '{name}'; see .responses")
+        raise AttributeError(
+            f"a simulation of {len(self.responses)} events has no '{name}'; see .responses"
+        )
 
     def table(self) -> Table:
         columns = ["event", "U min", "P min", "P max", "Q min", "Q max", "epsilon_p", "epsilon_q"]
@@ -89,8 +96,14 @@ class Simulation(Written):
             arrays["notes"] = tuple(entry["notes"])
             if entry["measured"]:
                 P, Q = (np.array(values, dtype=float) for values in entry["measured"])
-                arrays |= {"measured": (P, Q), "epsilon": tuple(entry["epsilon"]), "epsilon_i": entry.get("epsilon_i")}
-                arrays["currents"] = {k: np.array(x, dtype=float) for k, x in entry.get("currents", {}).items()}
+                arrays |= {
+                    "measured": (P, Q),
+                    "epsilon": tuple(entry["epsilon"]),
+                    "epsilon_i": entry.get("epsilon_i"),
+                }
+                arrays["currents"] = {
+                    k: np.array(x, dtype=float) for k, x in entry.get("currents", {}).items()
+                }
             return Response(entry["title"], **arrays)
 
         responses = tuple(map(response, content["responses"]))
@@ -98,7 +111,11 @@ class Simulation(Written):
 
     def write_results(self, folder: Path) -> list[Path]:
         """response.csv, with a number from the second event on; of waveforms currents, too."""
-        return [path for k, one in enumerate(self.responses, start=1) for path in one.write(folder / _stem(k))]
+        return [
+            path
+            for k, one in enumerate(self.responses, start=1)
+            for path in one.write(folder / _stem(k))
+        ]
 
     def drawings(self) -> Mapping[str, Drawing]:
         """response.svg, with a number from the second event on."""
@@ -128,25 +145,36 @@ def simulate(
 ) -> Simulation:
     """Calculate the power a load draws in recorded events, or in a dip made by hand.
 
-    `model` is an identification, whose values are taken, or a model as `tractexp.identify` takes it, for which
-    `values` {name: value} gives all; they also replace single values of an identification. Either `records`, events of
-    `tractexp.read` or what it reads, or a dip to `depth` (0 to 1) of the voltage before: from `start` [s] it falls
-    within `fall` [s], and `duration` [s] later it recovers within `recovery` [s]; `length` [s] at `rate` [1/s].
-    `U0`, `P0`, `Q0` [pu] stand before such a dip: by default those of the identification, else 1, 1 and 0.5.
+    `model` is an identification, whose values are taken, or a model as `tractexp.identify` takes
+    it, for which `values` {name: value} gives all; they also replace single values of an
+    identification. Either `records`, events of `tractexp.read` or what it reads, or a dip to
+    `depth` (0 to 1) of the voltage before: from `start` [s] it falls within `fall` [s], and
+    `duration` [s] later it recovers within `recovery` [s]; `length` [s] at `rate` [1/s]. `U0`,
+    `P0`, `Q0` [pu] stand before such a dip: by default those of the identification, else 1, 1 and
+    0.5.
 
-    Powers, given and calculated, are on the base of the records' file. `values` are on the identification's own base
-    where there is one, as its parameters are; without one nothing is rebased, and they are on that of the records.
+    Powers, given and calculated, are on the base of the records' file. `values` are on the
+    identification's own base where there is one, as its parameters are; without one nothing is
+    rebased, and they are on that of the records.
 
-    Raises `UserError` for unknown names, values that are missing, and where there is no steady state.
+    Raises `UserError` for unknown names, values that are missing, and where there is no steady
+    state.
     """
     dip = Dip(0.0 if depth is None else depth, duration, fall, recovery, start, length, rate)
     dip.check()
-    powers = {key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None}
+    powers = {
+        key: value for key, value in {"U0": U0, "P0": P0, "Q0": Q0}.items() if value is not None
+    }
     if depth is None and (
-        needless := [*powers, *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default)]
+        needless := [
+            *powers,
+            *(f.name for f in fields(Dip)[1:] if getattr(dip, f.name) != f.default),
+        ]
     ):
         where = setting(f"task.{needless[0]}")
-        raise UserError(f"{where} describes a dip made by hand; give its depth, too, or leave it out")
+        raise UserError(
+            f"{where} describes a dip made by hand; give its depth, too, or leave it out"
+        )
     fit = model if isinstance(model, Identification) else None
     load = fit.model if fit else model_of(model)
     at = chosen(load.model.names, fit.result.parameters if fit else {}, values or {})
@@ -155,13 +183,23 @@ def simulate(
         raise UserError("give either records to play, or the depth of a dip")
     own = fit.result.base if fit else None
     ratio = own.ratio if own else 1.0
-    before = BEFORE | (fit.result.before if fit else {}) | {k: v if k == "U0" else v / ratio for k, v in powers.items()}
-    played = [respond_to(load.model, at, e, own) for e in events] or [_play_dip(load, at, dip, before, ratio)]
+    before = (
+        BEFORE
+        | (fit.result.before if fit else {})
+        | {k: v if k == "U0" else v / ratio for k, v in powers.items()}
+    )
+    played = [respond_to(load.model, at, e, own) for e in events] or [
+        _play_dip(load, at, dip, before, ratio)
+    ]
     return Simulation(load, dict(zip(load.model.names, at.tolist(), strict=True)), tuple(played))
 
 
-def _play_dip(load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float) -> Response:
-    """The response to a dip made by hand, `ratio` times the power that the model draws on its own base."""
+def _play_dip(
+    load: LoadModel, values: np.ndarray, dip: Dip, before: Mapping[str, float], ratio: float
+) -> Response:
+    """The response to a dip made by hand, `ratio` times the power that the model draws on its own
+    base.
+    """
     t, shape = dip.voltage()
     U = before["U0"] * shape
     P, Q = domain_of(load.model).play(load.model, values, t, U, before)
@@ -173,17 +211,23 @@ def smooth(x: np.ndarray) -> np.ndarray:
     return 0.5 - 0.5 * np.cos(np.pi * np.clip(x, 0.0, 1.0))
 
 
-def chosen(names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str, float]) -> np.ndarray:
-    """Values (d,) in the model's order. Raises `UserError` for unknown names and for what is missing."""
+def chosen(
+    names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str, float]
+) -> np.ndarray:
+    """Values (d,) in the model's order. Raises `UserError` for unknown names and for what is
+    missing.
+    """
     for name in given:
         if name not in names:
             raise UserError(
-                f"{TASK.values}.{name}: this model has no parameter '{name}'{among(name, names, 'Parameters')}"
+                f"{TASK.values}.{name}: this model has no parameter"
+                f" '{name}'{among(name, names, 'Parameters')}"
             )
     values = {**fitted, **given}
     if missing := [name for name in names if name not in values]:
         raise UserError(
-            f"no value for {', '.join(missing)}: give {TASK.parameters}=result.json of an identification,"
+            f"no value for {', '.join(missing)}: give {TASK.parameters}=result.json of an"
+            " identification,"
             f" or {TASK.values}={{{', '.join(f'{name}: ...' for name in missing)}}}"
         )
     return np.array([values[name] for name in names], dtype=float)
@@ -193,8 +237,8 @@ def chosen(names: Sequence[str], fitted: Mapping[str, float], given: Mapping[str
 class Simulate(Task, call=simulate):
     """Simulate recorded events, or the dip that `depth`, `duration` ... describe.
 
-    The parameters are those of a `result.json`, with its model, or `values` for the model chosen; values also replace
-    single parameters of the result.
+    The parameters are those of a `result.json`, with its model, or `values` for the model chosen;
+    values also replace single parameters of the result.
     """
 
     instead = {

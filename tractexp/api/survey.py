@@ -1,4 +1,6 @@
-"""A folder of recordings as a table: what happened in each file, to each load, and what is worth fitting."""
+"""A folder of recordings as a table: what happened in each file, to each load, and what is worth
+fitting.
+"""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -27,15 +29,26 @@ if TYPE_CHECKING:
     from tractexp.identification.plan import ChosenEvent
 
 ROWS = "rows"  # in the folder of `keep`: an entry for each file that was looked at
-MOST_RANKED_EVENTS = 300  # events that are read again to be ranked: those of the greatest depth over noise
+# events that are read again to be ranked: those of the greatest depth over noise
+MOST_RANKED_EVENTS = 300
 LEAST_NOISE = 1e-4  # of P: what shows less is not told from what shows so much
 PICTURES = ("U_picture", "P_picture")
 ABOUT = {
-    "event": "FILE#LOAD.DIP, as data.train takes it", "when": "by the recorder's clock", "start": "s in the file",
-    "duration": "s", "depth": "of the voltage before", "U2": "of U1 before", "jump": "degrees", "P_before": "MW",
-    "Q_before": "Mvar", "P_after": "MW", "Q_after": "Mvar", "unit": "of P: MW, or pu where no base is known",
-    "noise": "of P, before the event", "rate": "Hz, sampled",
-}  # fmt: skip
+    "event": "FILE#LOAD.DIP, as data.train takes it",
+    "when": "by the recorder's clock",
+    "start": "s in the file",
+    "duration": "s",
+    "depth": "of the voltage before",
+    "U2": "of U1 before",
+    "jump": "degrees",
+    "P_before": "MW",
+    "Q_before": "Mvar",
+    "P_after": "MW",
+    "Q_after": "Mvar",
+    "unit": "of P: MW, or pu where no base is known",
+    "noise": "of P, before the event",
+    "rate": "Hz, sampled",
+}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -54,19 +67,29 @@ class Surveyed(Written):
 
     @property
     def rows(self) -> Listed:
-        """One row for each event of each load; for a file without any, or that cannot be read, one that says so."""
-        plain = [{k: v for k, v in row.items() if k not in PICTURES} for row in self.content["rows"]]
+        """One row for each event of each load; for a file without any, or that cannot be read, one
+        that says so.
+        """
+        plain = [
+            {k: v for k, v in row.items() if k not in PICTURES} for row in self.content["rows"]
+        ]
         return Listed(plain, f"events in {self.folder}")
 
     @property
     def unread(self) -> Listed:
         """One row for each file that cannot be read: its name and the reason."""
-        rows = [{"file": row["file"], "why": row["why"]} for row in self.content["rows"] if row["kind"] == UNREAD]
+        rows = [
+            {"file": row["file"], "why": row["why"]}
+            for row in self.content["rows"]
+            if row["kind"] == UNREAD
+        ]
         return Listed(rows, f"files of {self.folder} that cannot be read")
 
     @property
     def informative(self) -> list[str]:
-        """Names of the events that tell most about the model together, the best first; none where not asked for."""
+        """Names of the events that tell most about the model together, the best first; none where
+        not asked for.
+        """
         return [each["event"] for each in self.content["informative"]]
 
     @property
@@ -105,7 +128,8 @@ def survey(
     *,
     informative: int | None = None,  # so many events that tell most about the model together
     model: Any = None,
-    values: Any = "fit",  # of the model there: fit, of the deepest event; default; or the path of a result.json
+    # of the model there: fit, of the deepest event; default; or the path of a result.json
+    values: Any = "fit",
     cores: int | None = None,  # processes; null: all cores
     keep: str | Path | None = None,
     progress: Progress = None,
@@ -113,12 +137,14 @@ def survey(
     fixed: Mapping[str, float] | None = None,
     substeps: int | None = None,
 ) -> Surveyed:
-    """Look at every file below a folder that can be read; what cannot be read is a row with the reason.
+    """Look at every file below a folder that can be read; what cannot be read is a row with the
+    reason.
 
-    `cores` (all) processes look; `keep` is a folder where the rows of each file are stored as they come, so that the
-    next survey with it looks only at files that are new or changed. `informative` asks for so many events that tell
-    most about `model` together (D-optimal), at `values` as `tractexp.plan` takes them. The model is as in
-    `tractexp.identify`. Raises `UserError` for a folder that is not there or holds no file that can be read.
+    `cores` (all) processes look; `keep` is a folder where the rows of each file are stored as they
+    come, so that the next survey with it looks only at files that are new or changed. `informative`
+    asks for so many events that tell most about `model` together (D-optimal), at `values` as
+    `tractexp.plan` takes them. The model is as in `tractexp.identify`. Raises `UserError` for a
+    folder that is not there or holds no file that can be read.
     """
     check_range("task.informative", informative, 1)
     check_range("task.cores", cores, 1)
@@ -133,22 +159,35 @@ def survey(
     with count_parts("files", len(fresh), progress) as count:
         for name, fresh_rows in look_at_files(place, fresh, cores or -1):
             rows[name] = files.plain(fresh_rows)
-            store.write(names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode())
+            store.write(
+                names[name] if keep else "", json.dumps(rows[name], ensure_ascii=False).encode()
+            )
             count()
     content = {
-        "folder": str(folder), "files": len(names), "looked_at": len(fresh), "about": ABOUT,
-        "rows": [row for name in names for row in rows[name]], "informative": [], "command": "",
-    }  # fmt: skip
+        "folder": str(folder),
+        "files": len(names),
+        "looked_at": len(fresh),
+        "about": ABOUT,
+        "rows": [row for name in names for row in rows[name]],
+        "informative": [],
+        "command": "",
+    }
     if informative is None:
         return Surveyed(content)
-    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[:MOST_RANKED_EVENTS]
+    worth = sorted((row for row in content["rows"] if row["worth"]), key=_promise, reverse=True)[
+        :MOST_RANKED_EVENTS
+    ]
     settings = {"bounds": bounds, "fixed": fixed, "substeps": substeps}
     with tell_late_stages(progress) as stage:
         stage(f"choosing among {len(worth)} events")
         best = _best(place, [row["event"] for row in worth], informative, model, values, settings)
-    content["informative"] = files.plain([{"event": c.name, "gain": c.gain, "half": c.half} for c in best])
+    content["informative"] = files.plain(
+        [{"event": c.name, "gain": c.gain, "half": c.half} for c in best]
+    )
     reader = next(cls.name for cls in discover()["data"].values() if getattr(cls, "folders", False))
-    content["command"] = build_typed_command({"name": reader, "path": str(folder), "train": [c.name for c in best]})
+    content["command"] = build_typed_command(
+        {"name": reader, "path": str(folder), "train": [c.name for c in best]}
+    )
     return Surveyed(content)
 
 
@@ -158,7 +197,12 @@ def _promise(row: Mapping[str, Any]) -> float:
 
 
 def _best(
-    folder: Path, names: Sequence[str], most: int, model: Any, values: Any, settings: Mapping[str, Any]
+    folder: Path,
+    names: Sequence[str],
+    most: int,
+    model: Any,
+    values: Any,
+    settings: Mapping[str, Any],
 ) -> "list[ChosenEvent]":
     """The events that tell most together. Raises `UserError` where none is worth fitting."""
     from tractexp.api.plan import chosen_events
@@ -172,10 +216,11 @@ def _best(
 
 @plugin
 class Survey(Task, call=survey, given=("folder", "keep")):
-    """Look at every file of a folder, `data.path`: what happened in it, to which load, and what is worth fitting.
+    """Look at every file of a folder, `data.path`: what happened in it, to which load, and what is
+    worth fitting.
 
-    The rows of each file are kept as they come: a run that was stopped goes on where it was, and the next run looks
-    only at what is new or changed.
+    The rows of each file are kept as they come: a run that was stopped goes on where it was, and
+    the next run looks only at what is new or changed.
     """
 
     resumes = True
@@ -188,17 +233,28 @@ class Survey(Task, call=survey, given=("folder", "keep")):
     def perform(self, job: Job, **instead: Any) -> Surveyed:
         node = job.config["data"]
         if not getattr(get("data", node["name"]), "folders", False):
-            raise UserError(f"data={job.choices['data']} is no folder; leave it out and give {DATA.path}=FOLDER")
+            raise UserError(
+                f"data={job.choices['data']} is no folder; leave it out and give {DATA.path}=FOLDER"
+            )
         if not node["path"]:
-            raise UserError(f"{DATA.path} is missing: give the folder of the recordings, e.g. {DATA.path}=recordings")
+            raise UserError(
+                f"{DATA.path} is missing: give the folder of the recordings, e.g."
+                f" {DATA.path}=recordings"
+            )
         result = super().perform(job, folder=node["path"], keep=job.folder, **instead)
         if not result.informative:
             return result
-        model = [f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"]
+        model = [
+            f"{key}={value}" for key, value in job.given.items() if key.partition(".")[0] == "model"
+        ]
         data = {"name": node["name"], "path": node["path"], "train": result.informative}
         return Surveyed({**result.content, "command": build_typed_command(data, *model)})
 
     def logged(self, job: Job, result: Surveyed) -> dict[str, Any]:
         rows = result.content["rows"]
-        metrics = {"files": result.content["files"], "rows": len(rows), "worth": sum(r["worth"] for r in rows)}
+        metrics = {
+            "files": result.content["files"],
+            "rows": len(rows),
+            "worth": sum(r["worth"] for r in rows),
+        }
         return {"name": f"survey of {Path(result.folder).name}", "metrics": metrics}

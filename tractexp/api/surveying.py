@@ -21,9 +21,30 @@ from tractexp.workers import Workers
 Rows = list[dict[str, Any]]
 
 COLUMNS = (
-    "event", "file", "station", "load", "kind", "when", "start", "duration", "depth", "U2", "jump", "P_before",
-    "Q_before", "P_after", "Q_after", "unit", "noise", "rate", "worth", "why", "command", "U_picture", "P_picture",
-)  # fmt: skip
+    "event",
+    "file",
+    "station",
+    "load",
+    "kind",
+    "when",
+    "start",
+    "duration",
+    "depth",
+    "U2",
+    "jump",
+    "P_before",
+    "Q_before",
+    "P_after",
+    "Q_after",
+    "unit",
+    "noise",
+    "rate",
+    "worth",
+    "why",
+    "command",
+    "U_picture",
+    "P_picture",
+)
 KILLED = "the program was killed at this file, as where the computer's memory is too small for it"
 MOST_OWN_FILES = 2  # files that this process looks at sooner than others have started
 UNRECOGNISED = "no voltages and currents of one load were recognised"
@@ -33,7 +54,9 @@ LONGEST_PICTURED_EVENT = 5.0  # s of an event there
 
 
 def rows_of(folder: str, file: str) -> Rows:
-    """The rows of one file, `file` being its path within the folder. Nothing that happens in here is an error."""
+    """The rows of one file, `file` being its path within the folder. Nothing that happens in here
+    is an error.
+    """
     row: dict[str, Any] = dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
     try:
         view = archive.look_at_file(Path(folder, file))
@@ -46,26 +69,39 @@ def rows_of(folder: str, file: str) -> Rows:
     except UserError as error:
         return [row | {"kind": UNREAD, "why": str(error)}]
     except Exception as error:  # a survey of thousands of files does not end with one of them
-        why = f"the program failed at this file, which is its mistake: {type(error).__name__}: {error}"
+        why = (
+            f"the program failed at this file, which is its mistake: {type(error).__name__}:"
+            f" {error}"
+        )
         return [row | {"kind": UNREAD, "why": why}]
 
 
 def _without_events(view: View) -> dict[str, str]:
-    """What stands in the row of a file without events: that nothing happened, or why nobody can say."""
+    """What stands in the row of a file without events: that nothing happened, or why nobody can
+    say.
+    """
     unexamined = list(dict.fromkeys(shown.unexamined for shown in view.sights if shown.unexamined))
-    if not view.sights or (len(unexamined) and all(shown.unexamined or not shown.loaded for shown in view.sights)):
+    if not view.sights or (
+        len(unexamined) and all(shown.unexamined or not shown.loaded for shown in view.sights)
+    ):
         return {"kind": UNEXAMINED, "why": "; ".join(unexamined) or UNRECOGNISED}
     return {"kind": QUIET, "why": _quiet(view)}
 
 
 def _quiet(view: View) -> str:
-    return "; ".join(dict.fromkeys(said for s in view.sights for said in s.said)) or "the voltage stays as it is"
+    return (
+        "; ".join(dict.fromkeys(said for s in view.sights for said in s.said))
+        or "the voltage stays as it is"
+    )
 
 
 def _common(view: View) -> dict[str, Any]:
     recording = view.recording
     if recording is None:
-        return {"station": "", "rate": view.sights[0].record.rate if view.sights and view.sights[0].record else None}
+        return {
+            "station": "",
+            "rate": view.sights[0].record.rate if view.sights and view.sights[0].record else None,
+        }
     return {"station": recording.station, "rate": max(s.rate for s in recording.segments)}
 
 
@@ -73,23 +109,31 @@ def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) ->
     fields = event_row(seen, view.begun)
     event = seen.event
     return {
-        **_common(view), **{key: value for key, value in fields.items() if key in COLUMNS},
-        "event": archive.event_name(file, number, seen), "load": shown.name, "unit": "pu" if shown.per_unit else "MW",
+        **_common(view),
+        **{key: value for key, value in fields.items() if key in COLUMNS},
+        "event": archive.event_name(file, number, seen),
+        "load": shown.name,
+        "unit": "pu" if shown.per_unit else "MW",
         "noise": event and event.noise_share,
-        "command": command(view, shown) if seen.worth else "", **_pictures(shown, seen),
-    }  # fmt: skip
+        "command": command(view, shown) if seen.worth else "",
+        **_pictures(shown, seen),
+    }
 
 
 def _pictures(shown: Sight, event: LoadEvent) -> dict[str, list[float | None]]:
     """U and P about an event, as shares of the greatest in the picture, few points each."""
     columns = series(shown)
     t, what = columns["t"], event.what
-    first, stop = np.searchsorted(t, [what.start - AROUND[0], min(what.end, what.start + LONGEST_PICTURED_EVENT) + AROUND[1]])
+    first, stop = np.searchsorted(
+        t, [what.start - AROUND[0], min(what.end, what.start + LONGEST_PICTURED_EVENT) + AROUND[1]]
+    )
     return {f"{name}_picture": _few(columns[name][first:stop]) for name in ("U", "P")}
 
 
 def _few(values: np.ndarray) -> list[float | None]:
-    """At most `POINTS` values (n,), the lowest and the highest of each stretch, as shares of the greatest size."""
+    """At most `POINTS` values (n,), the lowest and the highest of each stretch, as shares of the
+    greatest size.
+    """
     if len(values) > PICTURE_POINTS:
         parts = np.array_split(values, PICTURE_POINTS // 2)
         ends = [sorted((int(np.argmin(p)), int(np.argmax(p)))) for p in parts]
@@ -100,26 +144,43 @@ def _few(values: np.ndarray) -> list[float | None]:
 
 
 def look_at_files(folder: Path, names: Sequence[str], cores: int) -> Iterator[tuple[str, Rows]]:
-    """(file, its rows) of files within a folder, as they are done, on so many processes (-1: one for each core).
+    """(file, its rows) of files within a folder, as they are done, on so many processes (-1: one
+    for each core).
 
-    A file at which a process is killed is looked at again by itself; if that one is killed too, its row says so.
+    A file at which a process is killed is looked at again by itself; if that one is killed too, its
+    row says so.
     """
     workers = Workers(cores if len(names) > MOST_OWN_FILES else 1)
-    with contextlib.closing(workers.results(functools.partial(rows_of, str(folder)), names)) as results:
+    with contextlib.closing(
+        workers.results(functools.partial(rows_of, str(folder)), names)
+    ) as results:
         for name, rows in results:
-            yield name, rows or [dict.fromkeys(COLUMNS) | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}]
+            yield (
+                name,
+                rows
+                or [
+                    dict.fromkeys(COLUMNS)
+                    | {"file": name, "kind": UNREAD, "worth": False, "why": KILLED}
+                ],
+            )
 
 
 def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
-    """{file within the folder: key of its rows}: name, size and time of the files of its name, and this program."""
+    """{file within the folder: key of its rows}: name, size and time of the files of its name, and
+    this program.
+    """
     from tractexp import __version__
 
-    beside: dict[Path, list[Path]] = defaultdict(list)  # by folder and stem: each folder is listed once
+    # by folder and stem: each folder is listed once
+    beside: dict[Path, list[Path]] = defaultdict(list)
     for place in {path.parent for path in paths}:
         for path in sorted(place.iterdir()):
             beside[place / path.stem].append(path)
     names = {path: path.relative_to(folder).as_posix() for path in paths}
-    return {names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem])) for path in paths}
+    return {
+        names[path]: key(__version__, names[path], _states(beside[path.parent / path.stem]))
+        for path in paths
+    }
 
 
 def _states(paths: Sequence[Path]) -> list[Any]:

@@ -1,4 +1,6 @@
-"""What a task is: a public call by its command; and what it is given: the configuration as records and a model."""
+"""What a task is: a public call by its command; and what it is given: the configuration as records
+and a model.
+"""
 
 import dataclasses
 import functools
@@ -22,11 +24,18 @@ if TYPE_CHECKING:
     from tractexp.record.identity import Identity
 
 SEARCH = ("objective", "optimizer", "budget", "time_limit", "target")  # the settings of a search
-# The equations of a model, without what is known of its parameters but that they may be held to what machines are
+# The equations of a model, without what is known of its parameters but that they may be held to
+# what machines are
 LOAD = (
-    "model.motor", "model.static", "model.effects", "model.shown_effects", "model.integration", "model.domain",
-    "model.priors", "model.window",
-)  # fmt: skip
+    "model.motor",
+    "model.static",
+    "model.effects",
+    "model.shown_effects",
+    "model.integration",
+    "model.domain",
+    "model.priors",
+    "model.window",
+)
 # Arguments that the model's configuration holds
 OF_MODEL = ("bounds", "fixed", "per_event", "substeps", "domain", "priors")
 ALWAYS = ("task", "experiment", "seed", "tracking", "sweep", "hydra")  # open to every task
@@ -37,12 +46,16 @@ R = TypeVar("R")
 
 
 def call(function: Callable[..., R], *arguments: Any, **keywords: Any) -> R:
-    """A public call past the door for people, whose sentences name arguments: here they name keys."""
+    """A public call past the door for people, whose sentences name arguments: here
+    they name keys.
+    """
     return inspect.unwrap(function)(*arguments, **keywords)
 
 
 class Source(NamedTuple):
-    """Where a call's argument comes from on the command line: the parts of the configuration, and its value."""
+    """Where a call's argument comes from on the command line: the parts of the configuration, and
+    its value.
+    """
 
     reads: tuple[str, ...]
     value: Callable[["Job"], Any]
@@ -55,25 +68,29 @@ SOURCES = {
     "optimizer": Source(("optimizer",), lambda job: job.chosen),
     "seed": Source((), lambda job: job.seed),
     "fit": Source(("data", "model", *SEARCH), lambda job: job.identified()),
-    "check_intervals": Source((), lambda job: not job.of_many),  # of many jobs nobody reads each profile
+    # of many jobs nobody reads each profile
+    "check_intervals": Source((), lambda job: not job.of_many),
     "progress": Source((), lambda job: job.tell),
 } | {
-    key: Source((key,), lambda job, key=key: job.config[key]) for key in ("objective", "budget", "time_limit", "target")
+    key: Source((key,), lambda job, key=key: job.config[key])
+    for key in ("objective", "budget", "time_limit", "target")
 }
 
 
 class Task(Plugin):
     """Base of the tasks, chosen by `task=NAME`. A task is a public call by its command.
 
-    Its settings are the arguments of `call` that the configuration does not hold elsewhere, with their defaults, and
-    what it declares itself; what it `reads` follows from the others.
+    Its settings are the arguments of `call` that the configuration does not hold elsewhere, with
+    their defaults, and what it declares itself; what it `reads` follows from the others.
     """
 
     group: ClassVar[str] = "task"
     sourced: ClassVar[bool] = False
     resumes: ClassVar[bool] = False  # whether the same command goes on where it was stopped
-    reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)  # what is chosen beside these is refused
-    instead: ClassVar[Mapping[str, str]] = {}  # {setting it does not read: what to do, as the refusal's last words}
+    # what is chosen beside these is refused
+    reads: ClassVar[tuple[str, ...]] = ("data", "model", *SEARCH)
+    # {setting it does not read: what to do, as the refusal's last words}
+    instead: ClassVar[Mapping[str, str]] = {}
     function: ClassVar[Callable[..., Any] | None] = None
 
     def __init_subclass__(
@@ -86,9 +103,15 @@ class Task(Plugin):
         cls.function = staticmethod(call)
         arguments = inspect.signature(call).parameters
         sources = [name for name in arguments if name in SOURCES and name not in given]
-        of_model = [f"model.{name}" for name in OF_MODEL if name in arguments and "model" in arguments]
+        of_model = [
+            f"model.{name}" for name in OF_MODEL if name in arguments and "model" in arguments
+        ]
         if "reads" not in vars(cls):
-            cls.reads = tuple(dict.fromkeys([*(part for name in sources for part in SOURCES[name].reads), *of_model]))
+            cls.reads = tuple(
+                dict.fromkeys(
+                    [*(part for name in sources for part in SOURCES[name].reads), *of_model]
+                )
+            )
         own, cls.__annotations__ = vars(cls).get("__annotations__", {}), {}
         for parameter in arguments.values():
             if parameter.name not in (*SOURCES, *OF_MODEL, *given, *own):
@@ -106,7 +129,9 @@ class Task(Plugin):
         return any("data" in SOURCES[name].reads for name in arguments if name in SOURCES)
 
     def perform(self, job: "Job", **instead: Any) -> Any:
-        """Call with the job's configuration and the task's settings; `instead` replaces arguments."""
+        """Call with the job's configuration and the task's settings; `instead`
+        replaces arguments.
+        """
         assert self.function is not None
         arguments = dict.fromkeys(inspect.signature(self.function).parameters, OMITTED)
         for name in arguments:
@@ -116,7 +141,10 @@ class Task(Plugin):
                 arguments[name] = SOURCES[name].value(job)
             elif hasattr(self, name):
                 arguments[name] = getattr(self, name)
-        return call(self.function, **{name: value for name, value in arguments.items() if value is not OMITTED})
+        return call(
+            self.function,
+            **{name: value for name, value in arguments.items() if value is not OMITTED},
+        )
 
     def draws(self, job: "Job") -> bool:
         """Whether pages and figures are made."""
@@ -142,12 +170,16 @@ class Task(Plugin):
         job.log(**content | self.logged(job, result))
 
     def logged(self, job: "Job", result: Any) -> dict[str, Any]:
-        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that were given."""
+        """What is logged of a result: fields of `tractexp.tracking.TrackedRun`, and `values` that
+        were given.
+        """
         return {}
 
 
 def setting_of(parameter: inspect.Parameter) -> tuple[Any, Any]:
-    """Type and default of the setting that stands for an argument: of mappings and lists, plain and empty ones."""
+    """Type and default of the setting that stands for an argument: of mappings and lists, plain and
+    empty ones.
+    """
     kind, default = parameter.annotation, parameter.default
     kinds = get_args(kind) if get_origin(kind) in (Union, UnionType) else (kind,)
     for one in kinds:
@@ -173,12 +205,17 @@ def print_paths(paths: Iterable[Path]) -> None:
 
 
 def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
-    """What an optimizer is called with the settings that were chosen beside it, whatever the seed: "issa levy=false".
+    """What an optimizer is called with the settings that were chosen beside it, whatever the seed:
+    "issa levy=false".
 
     Files go without their folders.
     """
     beside = {key: value for key, value in chosen.items() if key.partition(".")[0] not in ALWAYS}
-    parts = [f"{key.removeprefix('optimizer.')}={value}" for key, value in sorted(beside.items()) if key not in NAMED]
+    parts = [
+        f"{key.removeprefix('optimizer.')}={value}"
+        for key, value in sorted(beside.items())
+        if key not in NAMED
+    ]
     return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
@@ -192,10 +229,13 @@ class Job:
     sweep: str | None = None  # run id of the sweep this job belongs to, where that is logged
     in_sweep: bool = False
     of_many: bool = False  # in a sweep: what only a person looks at may be left out
-    logs: bool = True  # whether it logs what it keeps for the store, which in a sweep its parent does
-    given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}: no defaults
+    # whether it logs what it keeps for the store, which in a sweep its parent does
+    logs: bool = True
+    # what the user chose, {"optimizer": "pso"}: no defaults
+    given: Mapping[str, str] = field(default_factory=dict)
     measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
-    placed: Callable[[Write], list[Path]] | None = None  # how results take the place of an earlier run's
+    # how results take the place of an earlier run's
+    placed: Callable[[Write], list[Path]] | None = None
 
     @functools.cached_property
     def events(self) -> Any:
@@ -207,13 +247,17 @@ class Job:
 
     @functools.cached_property
     def events_of_fit(self) -> Any:
-        """The events fitted and those held out as a fit takes them: on the base of the load in the first."""
+        """The events fitted and those held out as a fit takes them: on the base of the load in the
+        first.
+        """
         from tractexp.api.read import dips_together
 
         return dips_together(self.events.train, self.events.validate)
 
     def holding_out(self, siblings: Mapping[str, list[str]]) -> "Job":
-        """The job with those files held out that belong to its choice of data, where it names none itself."""
+        """The job with those files held out that belong to its choice of data, where it names none
+        itself.
+        """
         data: Mapping[str, Any] = self.config["data"]
         if self.choices["data"] not in siblings or data.get("validate"):
             return self
@@ -236,19 +280,27 @@ class Job:
         """The identification problem (a `Problem`)."""
         from tractexp.api.setup import Setup
 
-        return Setup.of(self.events.train, self.config["model"], objective=self.config["objective"]).problem
+        return Setup.of(
+            self.events.train, self.config["model"], objective=self.config["objective"]
+        ).problem
 
     def write(self, results: Write) -> list[Path]:
-        """Write the results of a run into its folder: an earlier run's are there until these are whole. Their paths."""
+        """Write the results of a run into its folder: an earlier run's are there until these are
+        whole. Their paths.
+        """
         return results(self.folder) if self.placed is None else self.placed(results)
 
     def tell(self, line: str) -> None:
-        """Print a line of a call's progress. The first comes once the input is found right: then MLflow gets ready."""
+        """Print a line of a call's progress. The first comes once the input is found right: then
+        MLflow gets ready.
+        """
         self.prepare_log()
         say(line)
 
     def identified(self, **instead: Any) -> Any:
-        """The identification that model, objective, optimizer and limits describe (an `Identification`)."""
+        """The identification that model, objective, optimizer and limits describe (an
+        `Identification`).
+        """
         return build("task", {"name": "identify"}).perform(self, **instead)
 
     @property
@@ -257,14 +309,17 @@ class Job:
 
     @property
     def variant(self) -> str:
-        """The optimizer and what else was chosen: runs of one variant differ in their seeds alone."""
+        """The optimizer and what else was chosen: runs of one variant differ in their
+        seeds alone.
+        """
         return variant(self.choices["optimizer"], self.given)
 
     @functools.cached_property
     def identities(self) -> "list[Identity]":
         """Which loads the records of a task are of, those fitted first.
 
-        [] for tasks without records, and for data that have a name of their own, as the shipped ones.
+        [] for tasks without records, and for data that have a name of their own, as the shipped
+        ones.
         """
         from tractexp.record.identity import Identity
 
@@ -275,7 +330,9 @@ class Job:
 
     @property
     def label(self) -> str:
-        """Station, load and dips, short, as a run's name says them; "" where no file names a load."""
+        """Station, load and dips, short, as a run's name says them; "" where no file
+        names a load.
+        """
         from tractexp.record.identity import label
 
         fitted = self.identities[: len(self.events.train)] if self.identities else []
@@ -284,7 +341,9 @@ class Job:
 
     @property
     def experiment(self) -> str:
-        """The MLflow experiment: named by the configuration, or after the station, or after task and data."""
+        """The MLflow experiment: named by the configuration, or after the station, or after task
+        and data.
+        """
         stations = {one.station for one in self.identities}
         station = stations.pop() if len(stations) == 1 else ""
         named = self.config["tracking"]["experiment"] or (station and f"station {station}")
@@ -304,7 +363,8 @@ class Job:
         return logger(self.store)
 
     def prepare_log(self) -> None:
-        """Get MLflow ready beside the computation, in a process of its own; call it once the input is found right.
+        """Get MLflow ready beside the computation, in a process of its own; call it once the input
+        is found right.
 
         A job of a sweep leaves it: its worker has MLflow at hand, and the cores are busy.
         """
@@ -312,13 +372,16 @@ class Job:
             _ = self._logger
 
     def log(
-        self, name: str, values: Mapping[str, float] | None = None, tags: Mapping[str, str] | None = None,
+        self,
+        name: str,
+        values: Mapping[str, float] | None = None,
+        tags: Mapping[str, str] | None = None,
         **content: Any,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """Log this job in MLflow with its configuration and tags, and say how to look at it.
 
-        `values` are numbers that were given beside the configuration, `tags` are added to the job's own; `content` are
-        further fields of `tractexp.tracking.TrackedRun`.
+        `values` are numbers that were given beside the configuration, `tags` are added to the job's
+        own; `content` are further fields of `tractexp.tracking.TrackedRun`.
         """
         node = self.config["tracking"]
         self.measured.update(content.get("metrics", {}))
@@ -327,12 +390,18 @@ class Job:
         from tractexp import tracking
 
         parts = {group: self.choices[group] for group in ("task", "model", "optimizer", "data")}
-        parts |= {"variant": self.variant, "seed": str(self.seed), LABEL: self.label, **(tags or {})}
+        parts |= {
+            "variant": self.variant,
+            "seed": str(self.seed),
+            LABEL: self.label,
+            **(tags or {}),
+        }
         run = tracking.TrackedRun(
             experiment=self.experiment,
             name=", ".join(filter(None, (self.label, name))),
             parameters={**tracking.flatten(self.config), **(values or {})},
-            tags={key: text for key, text in parts.items() if text} | {"git_commit": provenance.commit()},
+            tags={key: text for key, text in parts.items() if text}
+            | {"git_commit": provenance.commit()},
             parent=self.sweep,
             **content,
         )
@@ -349,7 +418,8 @@ class Job:
     def send(self, run: Any) -> None:
         """Log a run (`tracking.TrackedRun`), and say how to look at it.
 
-        It is kept in the folder first. Where the store cannot be used, that is a sentence: the results are there.
+        It is kept in the folder first. Where the store cannot be used, that is a sentence: the
+        results are there.
         """
         from tractexp import tracking
         from tractexp.tracking import sweepfile
@@ -358,13 +428,23 @@ class Job:
         entry = None
         try:
             entry = save(self.folder, run, self.store)
-            if not self.logs or (self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder))):
+            if not self.logs or (
+                self.in_sweep and sweepfile.waits(sweepfile.folder_of(self.folder))
+            ):
                 return
-            run_id = self._logger.log(entry.run) if "_logger" in self.__dict__ else tracking.log(entry.run, self.store)
+            run_id = (
+                self._logger.log(entry.run)
+                if "_logger" in self.__dict__
+                else tracking.log(entry.run, self.store)
+            )
             entry.logged(run_id)
         except UserError as error:
             say(f"not logged: {error}")
-            named = f", by {quoting.shell('--uri', uri)}" if (uri := self.config["tracking"]["uri"]) else ""
+            named = (
+                f", by {quoting.shell('--uri', uri)}"
+                if (uri := self.config["tracking"]["uri"])
+                else ""
+            )
             later = f"; 'tractexp sync' logs them when that is mended{named}" if entry else ""
             say(f"  the results are in {self.folder}{later}")
             return

@@ -1,4 +1,6 @@
-"""What a report is made of: blocks of a few kinds, which a terminal, a page, a notebook, Markdown and JSON show."""
+"""What a report is made of: blocks of a few kinds, which a terminal, a page, a notebook, Markdown
+and JSON show.
+"""
 
 import dataclasses
 from collections.abc import Collection, Iterator, Sequence
@@ -64,8 +66,9 @@ class Equation:
 class Table:
     """Rows under columns: cells are numbers, texts or None.
 
-    `words` counts the columns that hold words, beside the first; `detail` those that a page shows and a terminal,
-    a notebook and a frame's reader at a glance do not need. `caption` stands below, `title` above.
+    `words` counts the columns that hold words, beside the first; `detail` those that a page shows
+    and a terminal, a notebook and a frame's reader at a glance do not need. `caption` stands below,
+    `title` above.
     """
 
     columns: Sequence[str]
@@ -77,7 +80,9 @@ class Table:
 
     def __post_init__(self) -> None:
         if wrong := next((row for row in self.rows if len(row) != len(self.columns)), None):
-            raise ValueError(f"a row of {len(wrong)} cells in a table of {len(self.columns)} columns: {wrong}")
+            raise ValueError(
+                f"a row of {len(wrong)} cells in a table of {len(self.columns)} columns: {wrong}"
+            )
 
     @property
     def cells(self) -> list[list[str]]:
@@ -90,7 +95,9 @@ class Table:
         columns = [k for k in range(len(self.columns)) if k not in self.detail]
         words = [at for at, k in enumerate(columns) if k in self.words]
         rows = [[row[k] for k in columns] for row in self.rows]
-        return dataclasses.replace(self, columns=[self.columns[k] for k in columns], rows=rows, words=words, detail=())
+        return dataclasses.replace(
+            self, columns=[self.columns[k] for k in columns], rows=rows, words=words, detail=()
+        )
 
     def __repr__(self) -> str:
         return str(Report().add(self))
@@ -137,7 +144,9 @@ class Figure:
 
 @dataclass(frozen=True)
 class Markup:
-    """HTML of our own, for what a page does and no other block can. What stands in it is escaped already."""
+    """HTML of our own, for what a page does and no other block can. What stands in it is escaped
+    already.
+    """
 
     html: str
 
@@ -169,7 +178,8 @@ Block = (
 class Report:
     """Blocks in order, below a title and a lead. Every method that adds one returns the report.
 
-    A terminal shows what can be read there: no charts, figures and folded blocks, and no columns of detail.
+    A terminal shows what can be read there: no charts, figures and folded blocks, and no columns of
+    detail.
     """
 
     def __init__(self, title: str = "", lead: str = ""):
@@ -200,9 +210,14 @@ class Report:
         return self.add(Equation(latex))
 
     def table(
-        self, columns: Sequence[str], rows: Sequence[Sequence[Any]], caption: str = "", words: Sequence[int] = (),
-        title: str = "", detail: Collection[int] = (),
-    ) -> "Report":  # fmt: skip
+        self,
+        columns: Sequence[str],
+        rows: Sequence[Sequence[Any]],
+        caption: str = "",
+        words: Sequence[int] = (),
+        title: str = "",
+        detail: Collection[int] = (),
+    ) -> "Report":
         return self.add(Table(columns, rows, title, caption, words, detail))
 
     def chart(self, chart: "Chart", caption: str = "") -> "Report":
@@ -251,8 +266,14 @@ class Report:
         return markdown(self)
 
     def to_dict(self) -> dict[str, Any]:
-        """Title, lead and blocks as plain data, each block with its kind; of charts and figures the captions."""
-        return {"title": self.title, "lead": self.lead, "blocks": [_plain(block) for block in self.blocks]}
+        """Title, lead and blocks as plain data, each block with its kind; of charts and figures the
+        captions.
+        """
+        return {
+            "title": self.title,
+            "lead": self.lead,
+            "blocks": [_plain(block) for block in self.blocks],
+        }
 
     def save(self, path: Path | str) -> Path:
         """Write the page, whole or not at all. Raises `UserError` where that is impossible."""
@@ -265,7 +286,10 @@ class Report:
         return plain(self)
 
     def __repr__(self) -> str:
-        return f"a report of {len(self.blocks)} blocks; save(path) writes its page, print() shows what a terminal can"
+        return (
+            f"a report of {len(self.blocks)} blocks; save(path) writes its page, print() shows what"
+            " a terminal can"
+        )
 
     def _repr_html_(self) -> str:
         from tractexp.blocks.html import frame
@@ -275,7 +299,9 @@ class Report:
 
 def _plain(block: Block) -> dict[str, Any]:
     fields = {
-        f.name: getattr(block, f.name) for f in dataclasses.fields(block) if f.name not in ("chart", "svg", "html")
+        f.name: getattr(block, f.name)
+        for f in dataclasses.fields(block)
+        if f.name not in ("chart", "svg", "html")
     }
     for key in ("blocks", "charts"):
         if key in fields:

@@ -1,7 +1,9 @@
-"""Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner, printed as drawn.
+"""Charts that let one look: zoomed by dragging, told by hovering, saved as SVG from their corner,
+printed as drawn.
 
-A `Chart` is data and layout for Plotly.js (MIT), which the package plotly carries and a page that has a chart takes
-along; `chart.js` draws it. Nothing is drawn here and that package is not imported, so that a page costs milliseconds.
+A `Chart` is data and layout for Plotly.js (MIT), which the package plotly carries and a page that
+has a chart takes along; `chart.js` draws it. Nothing is drawn here and that package is not
+imported, so that a page costs milliseconds.
 """
 
 import base64
@@ -17,7 +19,8 @@ from numpy.typing import NDArray
 from tractexp import files, quoting, store
 from tractexp.blocks import plotly, style
 
-MOST_LINE_POINTS = 20_000  # points of a line that are kept: beyond, each stretch keeps its lowest and highest
+# points of a line that are kept: beyond, each stretch keeps its lowest and highest
+MOST_LINE_POINTS = 20_000
 FONT = 'system-ui, "Segoe UI", "Liberation Sans", sans-serif'
 SETTINGS = {
     "responsive": True,
@@ -29,11 +32,13 @@ SETTINGS = {
 }
 LICENSE = "// plotly.js, copyright Plotly, Inc., MIT license"
 PAPER = 680  # pixels, the width of a printed page
-PHONE, ENTRY, LETTER = 240, 45, 7  # pixels: a legend on a phone, one of its entries without the name, a letter
+# pixels: a legend on a phone, one of its entries without the name, a letter
+PHONE, ENTRY, LETTER = 240, 45, 7
 PANEL_GAP = 0.045  # of the height, between panels
 HOVER = "%{y:.5g}"
 DECADE = 20  # an axis that spans less has its ticks between powers of ten
-MOST_DRAWN_POINTS = 2000  # points of a sampled line that are drawn at once: twice as many as a page is wide
+# points of a sampled line that are drawn at once: twice as many as a page is wide
+MOST_DRAWN_POINTS = 2000
 TICK = 28  # letters of a trace's name beside its axis
 GREATEST_CODE = 32767  # the greatest of 16 bits; the least stands for a gap
 
@@ -43,21 +48,28 @@ def script() -> str:
     """What a page with charts needs once: the library, and what draws the charts."""
     drawing = files.read_packaged_text("blocks/chart.js").replace("SETTINGS", json.dumps(SETTINGS))
     drawing = drawing.replace("PAPER", str(PAPER)).replace("SHOWN", str(MOST_DRAWN_POINTS))
-    program = store.TEXTS.get(store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing))
-    return "\n".join([files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");'])
+    program = store.TEXTS.get(
+        store.key("charts", plotly.digest(), drawing), lambda: pack_program(plotly.code() + drawing)
+    )
+    return "\n".join(
+        [files.read_packaged_text("blocks/unpack.js"), LICENSE, f'run("{program.decode()}");']
+    )
 
 
 def pack_program(program: str) -> bytes:
-    """A program as gzip and base 64 pack it: two fifths of its length, and the same for the same program."""
+    """A program as gzip and base 64 pack it: two fifths of its length, and the same for the same
+    program.
+    """
     return base64.b64encode(gzip.compress(program.encode(), mtime=0))
 
 
 class Chart:
-    """Panels above each other that share the axis x. Colors are those of `style`; names may hold any character.
+    """Panels above each other that share the axis x. Colors are those of `style`; names may hold
+    any character.
 
-    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and `log_y` make axes
-    logarithmic. `pixels` is the height of the whole. Without a `legend` names are told by hovering only; where many
-    curves are drawn, `hover` "closest" tells of one.
+    `panels` are the labels of the vertical axes from the top, `heights` their shares. `log_x` and
+    `log_y` make axes logarithmic. `pixels` is the height of the whole. Without a `legend` names are
+    told by hovering only; where many curves are drawn, `hover` "closest" tells of one.
     """
 
     def __init__(
@@ -79,21 +91,41 @@ class Chart:
         self._in_legend: set[str] = set()
         self._panels, self._cursor = panels, None
         self._axes = self._laid_out(panels, heights or [1.0] * len(panels), log_y)
-        self._x: dict[str, Any] = {"title": {"text": quoting.html(x)}, "anchor": _axis("y", len(panels) - 1)}
-        self._x |= {"showgrid": True, "gridcolor": "#E4E4E4", "zeroline": False, "ticks": "outside", "automargin": True}
+        self._x: dict[str, Any] = {
+            "title": {"text": quoting.html(x)},
+            "anchor": _axis("y", len(panels) - 1),
+        }
+        self._x |= {
+            "showgrid": True,
+            "gridcolor": "#E4E4E4",
+            "zeroline": False,
+            "ticks": "outside",
+            "automargin": True,
+        }
         if log_x:
             self._x |= {"type": "log", "dtick": 1, "exponentformat": "power"}
         self._title, self._legend, self._hover = title, legend, hover
         self._pixels = pixels or 130 + 170 * len(panels)
 
     @staticmethod
-    def _laid_out(labels: Sequence[str], heights: Sequence[float], log: bool) -> dict[str, dict[str, Any]]:
+    def _laid_out(
+        labels: Sequence[str], heights: Sequence[float], log: bool
+    ) -> dict[str, dict[str, Any]]:
         room = (1 - PANEL_GAP * (len(labels) - 1)) / sum(heights)
         top, axes = 1.0, {}
         for k, (label, share) in enumerate(zip(labels, heights, strict=True)):
             low = max(top - share * room, 0.0)
-            axis: dict[str, Any] = {"title": {"text": quoting.html(label)}, "domain": [low, top], "ticks": "outside"}
-            axis |= {"gridcolor": "#E4E4E4", "zeroline": False, "automargin": True, "linecolor": "#444"}
+            axis: dict[str, Any] = {
+                "title": {"text": quoting.html(label)},
+                "domain": [low, top],
+                "ticks": "outside",
+            }
+            axis |= {
+                "gridcolor": "#E4E4E4",
+                "zeroline": False,
+                "automargin": True,
+                "linecolor": "#444",
+            }
             if log:
                 axis |= {"type": "log", "exponentformat": "power"}
             axes[_axis("yaxis", k)] = axis
@@ -101,10 +133,20 @@ class Chart:
         return axes
 
     def line(
-        self, name: str, x: np.ndarray, y: np.ndarray, color: str, panel: int = 0, *, width: float = 1.6,
-        dash: str = "solid", step: bool = False, legend: bool = True,
-    ) -> "Chart":  # fmt: skip
-        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value until the next.
+        self,
+        name: str,
+        x: np.ndarray,
+        y: np.ndarray,
+        color: str,
+        panel: int = 0,
+        *,
+        width: float = 1.6,
+        dash: str = "solid",
+        step: bool = False,
+        legend: bool = True,
+    ) -> "Chart":
+        """A curve; equal names are one entry of the legend. nan is a gap; `step` holds each value
+        until the next.
 
         Without `legend` it is named where it is pointed at only.
         """
@@ -115,113 +157,264 @@ class Chart:
         return self._add(name, panel, mode="lines", line=line, silent=not legend, **packed)
 
     def samples(
-        self, name: str, start: float, step: float, y: np.ndarray, color: str, panel: int = 0, *,
-        width: float = 1.2, dash: str = "solid", label: str = "",
-    ) -> "Chart":  # fmt: skip
-        """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a gap.
+        self,
+        name: str,
+        start: float,
+        step: float,
+        y: np.ndarray,
+        color: str,
+        panel: int = 0,
+        *,
+        width: float = 1.2,
+        dash: str = "solid",
+        label: str = "",
+    ) -> "Chart":
+        """A curve (n,) sampled every `step` from `start` on, all of it kept, in 16 bits; nan is a
+        gap.
 
-        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample is drawn. At the
-        cursor it is named `label`.
+        Of what is shown each stretch has its lowest and highest sample, and zoomed in every sample
+        is drawn. At the cursor it is named `label`.
         """
         line = {"color": color, "width": width, "dash": dash}
         reading: dict[str, Any] = {"panel": self._panels[panel], "label": label or name}
-        return self._add(name, panel, mode="lines", line=line, samples=_encode_curve(start, step, y), **reading)
+        return self._add(
+            name, panel, mode="lines", line=line, samples=_encode_curve(start, step, y), **reading
+        )
 
     def phasors(
-        self, name: str, start: float, step: float, y: NDArray[np.complex128], color: str, panel: int
+        self,
+        name: str,
+        start: float,
+        step: float,
+        y: NDArray[np.complex128],
+        color: str,
+        panel: int,
     ) -> "Chart":
-        """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as arrows."""
+        """Complex values (n,), every `step` from `start` on, that are seen at the cursor only, as
+        arrows.
+        """
         coded = {"re": _encode_curve(start, step, y.real), "im": _encode_curve(start, step, y.imag)}
-        return self._add(name, panel, mode="lines", line={"color": color}, silent=True, x=[None], y=[None],
-                         phasor=coded, panel=self._panels[panel])  # fmt: skip
+        return self._add(
+            name,
+            panel,
+            mode="lines",
+            line={"color": color},
+            silent=True,
+            x=[None],
+            y=[None],
+            phasor=coded,
+            panel=self._panels[panel],
+        )
 
-    def states(self, courses: Sequence[tuple[str, np.ndarray, np.ndarray]], panel: int, color: str) -> "Chart":
-        """States 0 and 1 as (name, times, states), each a trace below the other: the state from each time on."""
+    def states(
+        self, courses: Sequence[tuple[str, np.ndarray, np.ndarray]], panel: int, color: str
+    ) -> "Chart":
+        """States 0 and 1 as (name, times, states), each a trace below the other: the state from
+        each time on.
+        """
         for row, (name, t, states) in enumerate(courses):
             course = {"at": t.tolist(), "states": states.tolist()}
             line = {"color": color, "width": 1.6, "shape": "hv"}
-            self._add(name, panel, mode="lines", line=line, silent=True, x=t.tolist(), y=(0.7 * states - row).tolist(),
-                      course=course, panel=self._panels[panel], label=name)  # fmt: skip
+            self._add(
+                name,
+                panel,
+                mode="lines",
+                line=line,
+                silent=True,
+                x=t.tolist(),
+                y=(0.7 * states - row).tolist(),
+                course=course,
+                panel=self._panels[panel],
+                label=name,
+            )
         self._axes[_axis("yaxis", panel)]["title"] = {"text": ""}  # the traces' names stand there
-        self.ticks(panel, [0.35 - row for row in range(len(courses))], [_short(name) for name, *_ in courses])
+        self.ticks(
+            panel,
+            [0.35 - row for row in range(len(courses))],
+            [_short(name) for name, *_ in courses],
+        )
         return self.limits(panel, 0.3 - len(courses), 1.0)
 
     def cursor(self, x: float) -> "Chart":
-        """Values of all curves beside each other where the cursor is, instead of labels; at first those at `x`."""
+        """Values of all curves beside each other where the cursor is, instead of labels; at first
+        those at `x`.
+        """
         self._cursor = x
-        self._x |= {"showspikes": True, "spikemode": "across", "spikesnap": "cursor", "spikethickness": 1}
+        self._x |= {
+            "showspikes": True,
+            "spikemode": "across",
+            "spikesnap": "cursor",
+            "spikethickness": 1,
+        }
         self._x |= {"spikecolor": style.FAINT, "spikedash": "solid"}
         return self
 
     def points(
-        self, name: str, x: Sequence[Any] | np.ndarray, y: Sequence[Any] | np.ndarray, color: str, panel: int = 0, *,
-        size: float = 7, symbol: str = "circle", hover: Sequence[str] = (), spans: np.ndarray | None = None,
-    ) -> "Chart":  # fmt: skip
-        """Marks; `hover` is what each says when pointed at, `spans` (n, 2) are the ends of intervals along x."""
+        self,
+        name: str,
+        x: Sequence[Any] | np.ndarray,
+        y: Sequence[Any] | np.ndarray,
+        color: str,
+        panel: int = 0,
+        *,
+        size: float = 7,
+        symbol: str = "circle",
+        hover: Sequence[str] = (),
+        spans: np.ndarray | None = None,
+    ) -> "Chart":
+        """Marks; `hover` is what each says when pointed at, `spans` (n, 2) are the ends of
+        intervals along x.
+        """
         trace: dict[str, Any] = {"marker": {"color": color, "size": size, "symbol": symbol}}
         if spans is not None:
             middle = np.asarray(x, dtype=float)
             trace["error_x"] = {
-                "type": "data", "symmetric": False, "color": color, "thickness": 2, "width": 5,
-                "array": (spans[:, 1] - middle).tolist(), "arrayminus": (middle - spans[:, 0]).tolist(),
-            }  # fmt: skip
+                "type": "data",
+                "symmetric": False,
+                "color": color,
+                "thickness": 2,
+                "width": 5,
+                "array": (spans[:, 1] - middle).tolist(),
+                "arrayminus": (middle - spans[:, 0]).tolist(),
+            }
         if hover:
-            trace |= {"text": [quoting.html(t) for t in hover], "hovertemplate": "%{text}<extra></extra>"}
+            trace |= {
+                "text": [quoting.html(t) for t in hover],
+                "hovertemplate": "%{text}<extra></extra>",
+            }
         return self._add(name, panel, mode="markers", x=_list_values(x), y=_list_values(y), **trace)
 
     def bars(
-        self, name: str, labels: Sequence[str], values: Sequence[float], color: str | Sequence[str], panel: int = 0, *,
+        self,
+        name: str,
+        labels: Sequence[str],
+        values: Sequence[float],
+        color: str | Sequence[str],
+        panel: int = 0,
+        *,
         hover: Sequence[str] = (),
-    ) -> "Chart":  # fmt: skip
+    ) -> "Chart":
         """Horizontal bars, the first label on top."""
         self._axes[_axis("yaxis", panel)] |= {"autorange": "reversed", "type": "category"}
-        trace: dict[str, Any] = {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
+        trace: dict[str, Any] = (
+            {"text": [quoting.html(t) for t in hover], "textposition": "auto"} if hover else {}
+        )
         return self._add(
-            name, panel, kind="bar", orientation="h", x=_list_values(values), y=_list_values(labels),
+            name,
+            panel,
+            kind="bar",
+            orientation="h",
+            x=_list_values(values),
+            y=_list_values(labels),
             marker={"color": color if isinstance(color, str) else list(color)},
-            hovertemplate="%{y}: %{x:.4g}<extra></extra>", **trace,
-        )  # fmt: skip
+            hovertemplate="%{y}: %{x:.4g}<extra></extra>",
+            **trace,
+        )
 
     def band(
-        self, name: str, x: np.ndarray, lower: np.ndarray, upper: np.ndarray, color: str, panel: int = 0, *,
+        self,
+        name: str,
+        x: np.ndarray,
+        lower: np.ndarray,
+        upper: np.ndarray,
+        color: str,
+        panel: int = 0,
+        *,
         step: bool = False,
-    ) -> "Chart":  # fmt: skip
+    ) -> "Chart":
         """What lies between two curves, lightly filled."""
         line = {"width": 0, "color": color, **({"shape": "hv"} if step else {})}
         quiet: dict[str, Any] = {"mode": "lines", "line": line, "hoverinfo": "skip"}
         quiet["x"] = _pack_numbers(np.asarray(x, dtype=float), "f8")
         self._add(name, panel, y=_pack_numbers(lower, "f4"), silent=True, **quiet)
-        return self._add(name, panel, y=_pack_numbers(upper, "f4"), fill="tonexty", fillcolor=_faint(color), **quiet)
+        return self._add(
+            name,
+            panel,
+            y=_pack_numbers(upper, "f4"),
+            fill="tonexty",
+            fillcolor=_faint(color),
+            **quiet,
+        )
 
     def shade(
-        self, start: float, end: float, color: str, panel: int | None = None, name: str = "", opacity: float = 0.3,
+        self,
+        start: float,
+        end: float,
+        color: str,
+        panel: int | None = None,
+        name: str = "",
+        opacity: float = 0.3,
         text: str = "",
-    ) -> "Chart":  # fmt: skip
-        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once, `text` at its top."""
+    ) -> "Chart":
+        """A stretch of the axis x, in one panel or in all; `name` stands in the legend once, `text`
+        at its top.
+        """
         self._shapes.append(
-            {"type": "rect", "xref": "x", "x0": start, "x1": end, **_height(panel), "fillcolor": color,
-             "opacity": opacity, "line": {"width": 0}, "layer": "below"}
-        )  # fmt: skip
+            {
+                "type": "rect",
+                "xref": "x",
+                "x0": start,
+                "x1": end,
+                **_height(panel),
+                "fillcolor": color,
+                "opacity": opacity,
+                "line": {"width": 0},
+                "layer": "below",
+            }
+        )
         self._note(text, _height(panel)["yref"], x=start, y=1, bgcolor="#ffffffcc")
         if name and name not in self._in_legend:
-            square = {"color": color, "size": 11, "symbol": "square", "opacity": min(1.0, 2 * opacity)}
-            self._add(name, panel or 0, mode="markers", x=[None], y=[None], marker=square, hoverinfo="skip")
+            square = {
+                "color": color,
+                "size": 11,
+                "symbol": "square",
+                "opacity": min(1.0, 2 * opacity),
+            }
+            self._add(
+                name,
+                panel or 0,
+                mode="markers",
+                x=[None],
+                y=[None],
+                marker=square,
+                hoverinfo="skip",
+            )
         return self
 
     def edge(
-        self, x: float, color: str = style.FAINT, dash: str = "dot", panel: int | None = None, text: str = ""
+        self,
+        x: float,
+        color: str = style.FAINT,
+        dash: str = "dot",
+        panel: int | None = None,
+        text: str = "",
     ) -> "Chart":
-        """A vertical line, in one panel or through all, with a `text` below the panel (the first)."""
+        """A vertical line, in one panel or through all, with a `text` below the panel
+        (the first).
+        """
         self._note(text, _height(panel or 0)["yref"], color, x=x, y=0)
         line = {"color": color, "width": 1, "dash": dash}
-        self._shapes.append({"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line})
+        self._shapes.append(
+            {"type": "line", "xref": "x", "x0": x, "x1": x, **_height(panel), "line": line}
+        )
         return self
 
-    def level(self, y: float, text: str = "", panel: int = 0, color: str = style.FAINT, dash: str = "dash") -> "Chart":
+    def level(
+        self, y: float, text: str = "", panel: int = 0, color: str = style.FAINT, dash: str = "dash"
+    ) -> "Chart":
         """A horizontal line across a panel, with a word at its right end."""
         axis, line = _axis("y", panel), {"color": color, "width": 1, "dash": dash}
         self._shapes.append(
-            {"type": "line", "xref": "x domain", "x0": 0, "x1": 1, "yref": axis, "y0": y, "y1": y, "line": line}
+            {
+                "type": "line",
+                "xref": "x domain",
+                "x0": 0,
+                "x1": 1,
+                "yref": axis,
+                "y0": y,
+                "y1": y,
+                "line": line,
+            }
         )
         log = self._axes[_axis("yaxis", panel)].get("type") == "log"
         at = float(np.log10(y)) if log else y
@@ -232,7 +425,13 @@ class Chart:
         """Words at a place, beside what they belong to; none where there is no text."""
         if text:
             font = {"size": 11, **({"color": color} if color else {})}
-            note = {"text": quoting.html(text), "xref": "x", "xanchor": "left", "yref": yref, "yanchor": "top"}
+            note = {
+                "text": quoting.html(text),
+                "xref": "x",
+                "xanchor": "left",
+                "yref": yref,
+                "yanchor": "top",
+            }
             self._notes.append({**note, "showarrow": False, "font": font, **more})
 
     def limits(self, panel: int | None, low: float, high: float) -> "Chart":
@@ -244,38 +443,73 @@ class Chart:
         return self
 
     def ticks(
-        self, panel: int | None, at: Sequence[float], labels: Sequence[str] = (), turned: bool = False
-    ) -> "Chart":  # fmt: skip
-        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x where it is None."""
+        self,
+        panel: int | None,
+        at: Sequence[float],
+        labels: Sequence[str] = (),
+        turned: bool = False,
+    ) -> "Chart":
+        """Where an axis is marked, and with which words instead of numbers: of a panel, or of x
+        where it is None.
+        """
         axis = self._x if panel is None else self._axes[_axis("yaxis", panel)]
         words = [quoting.html(label) for label in labels] or [f"{v:g}" for v in at]
         axis |= {"tickmode": "array", "tickvals": list(at), "ticktext": words}
         if labels:
-            axis |= {"tickfont": {"size": 9 if turned else 11}, **({"tickangle": -90} if turned else {})}
+            axis |= {
+                "tickfont": {"size": 9 if turned else 11},
+                **({"tickangle": -90} if turned else {}),
+            }
         return self
 
     def plain(self) -> dict[str, Any]:
         """Data and layout as Plotly reads them."""
-        names = [trace["name"] for trace in self._data if trace["showlegend"]] if self._legend else []
-        above = 30 if not names else 66 if len(names) <= 6 else 86  # pixels; a narrow legend has three rows
+        names = (
+            [trace["name"] for trace in self._data if trace["showlegend"]] if self._legend else []
+        )
+        # pixels; a narrow legend has three rows
+        above = 30 if not names else 66 if len(names) <= 6 else 86
         layout = {
-            "height": self._pixels, "font": {"family": FONT, "size": 13, "color": "#1d1d1f"}, "hovermode": self._hover,
-            "hoversubplots": "axis", "paper_bgcolor": "#fff", "plot_bgcolor": "#fff", "bargap": 0.25,
+            "height": self._pixels,
+            "font": {"family": FONT, "size": 13, "color": "#1d1d1f"},
+            "hovermode": self._hover,
+            "hoversubplots": "axis",
+            "paper_bgcolor": "#fff",
+            "plot_bgcolor": "#fff",
+            "bargap": 0.25,
             "margin": {"l": 60, "r": 12, "t": above + 20 * bool(self._title), "b": 48},
             "showlegend": self._legend,
-            "legend": {"orientation": "h", "x": 0, "y": 1.0, "yanchor": "bottom", "yref": "paper", **_above(names)},
-            "shapes": self._shapes, "annotations": self._notes, "xaxis": self._x, **self._axes,
-        }  # fmt: skip
-        kinds = {trace["type"] for trace in self._data} | {trace.get("mode", "") for trace in self._data}
+            "legend": {
+                "orientation": "h",
+                "x": 0,
+                "y": 1.0,
+                "yanchor": "bottom",
+                "yref": "paper",
+                **_above(names),
+            },
+            "shapes": self._shapes,
+            "annotations": self._notes,
+            "xaxis": self._x,
+            **self._axes,
+        }
+        kinds = {trace["type"] for trace in self._data} | {
+            trace.get("mode", "") for trace in self._data
+        }
         if "lines" not in kinds:
             layout |= {"hovermode": "closest"}
         if self._title:
-            layout["title"] = {"text": quoting.html(self._title), "x": 0, "xref": "paper", "font": {"size": 14}}
+            layout["title"] = {
+                "text": quoting.html(self._title),
+                "x": 0,
+                "xref": "paper",
+                "font": {"size": 14},
+            }
             if not self._legend:  # just above the panels, below the buttons
                 layout["title"] |= {"yref": "paper", "y": 1, "yanchor": "bottom", "pad": {"b": 8}}
         if self._cursor is None:
             return {"data": self._data, "layout": layout}
-        data = [{**trace, "hoverinfo": "none", "hovertemplate": None} for trace in self._data]  # read out beside it
+        # read out beside it
+        data = [{**trace, "hoverinfo": "none", "hovertemplate": None} for trace in self._data]
         return {"data": data, "layout": layout, "cursor": self._cursor}
 
     def element(self, label: str) -> str:
@@ -283,17 +517,27 @@ class Chart:
         kind = "readout arrows" if any("phasor" in trace for trace in self._data) else "readout"
         above = "" if self._cursor is None else f'<div class="{kind}"></div>'
         return (
-            f'{above}<div class="chart" role="img" aria-label="{quoting.html(label)}" style="height:{self._pixels}px">'
+            f'{above}<div class="chart" role="img" aria-label="{quoting.html(label)}"'
+            f' style="height:{self._pixels}px">'
             "</div>"
             f'<script type="application/json">{data}</script>'
         )
 
-    def _add(self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any) -> "Chart":
+    def _add(
+        self, name: str, at: int, /, kind: str = "scatter", silent: bool = False, **more: Any
+    ) -> "Chart":
         shown = bool(name) and name not in self._in_legend and not silent
         if shown:
             self._in_legend.add(name)
-        trace = {"type": kind, "name": quoting.html(name), "legendgroup": name, "showlegend": shown, "xaxis": "x",
-                 "yaxis": _axis("y", at), "hovertemplate": HOVER}  # fmt: skip
+        trace = {
+            "type": kind,
+            "name": quoting.html(name),
+            "legendgroup": name,
+            "showlegend": shown,
+            "xaxis": "x",
+            "yaxis": _axis("y", at),
+            "hovertemplate": HOVER,
+        }
         self._data.append(trace | more)
         return self
 
@@ -318,18 +562,25 @@ def _height(panel: int | None) -> dict[str, Any]:
 
 
 def _encode_curve(start: float, step: float, y: np.ndarray) -> dict[str, Any]:
-    """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan is a gap."""
+    """Values (n,), every `step` from `start` on, in 16 bits between the lowest and the highest; nan
+    is a gap.
+    """
     finite = np.isfinite(y)
     low, high = (float(y[finite].min()), float(y[finite].max())) if finite.any() else (0.0, 0.0)
     offset, scale = (low + high) / 2, max((high - low) / (2 * GREATEST_CODE), 1e-300)
-    held = np.where(finite, np.round((np.where(finite, y, offset) - offset) / scale), -GREATEST_CODE - 1).astype("<i2")
+    held = np.where(
+        finite, np.round((np.where(finite, y, offset) - offset) / scale), -GREATEST_CODE - 1
+    ).astype("<i2")
     coded = {"bdata": base64.b64encode(held.tobytes()).decode(), "start": start, "step": step}
     return coded | {"offset": offset, "scale": scale}
 
 
 def _pack_numbers(values: np.ndarray, kind: str) -> dict[str, str]:
     """Numbers as Plotly's typed arrays: exact, and a third of the length of their digits."""
-    return {"dtype": kind, "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode()}
+    return {
+        "dtype": kind,
+        "bdata": base64.b64encode(np.asarray(values, dtype=f"<{kind}").tobytes()).decode(),
+    }
 
 
 def _list_values(values: Sequence[Any] | np.ndarray) -> list[Any]:

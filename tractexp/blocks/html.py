@@ -1,7 +1,7 @@
 """A report as a page in one file: readable offline and on paper.
 
-Everything given as text is escaped. Charts carry their data and the library that draws them, figures are inline SVG,
-equations are typeset into SVG; nothing is loaded from elsewhere.
+Everything given as text is escaped. Charts carry their data and the library that draws them,
+figures are inline SVG, equations are typeset into SVG; nothing is loaded from elsewhere.
 """
 
 import functools
@@ -23,19 +23,26 @@ def page(report: Report) -> str:
     """A whole page that needs nothing else."""
     figures = itertools.count(1)
     title, lead = quoting.html(report.title), quoting.html(report.lead)
-    head = f'<meta charset="utf-8"><meta name="viewport" content="width=device-width"><title>{title}</title>'
+    head = (
+        '<meta charset="utf-8"><meta name="viewport"'
+        f' content="width=device-width"><title>{title}</title>'
+    )
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""
     body = "\n".join([top, *(_element(block, figures) for block in report.blocks), draws])
     return (
-        f'<!DOCTYPE html>\n<html lang="en"><head>{head}<style>{style}</style></head>\n<body>\n{body}\n</body></html>\n'
+        "<!DOCTYPE html>\n<html"
+        f' lang="en"><head>{head}<style>{style}</style></head>\n<body>\n{body}\n</body></html>\n'
     )
 
 
 def frame(report: Report) -> str:
     """The page within another one."""
-    return f'<iframe srcdoc="{quoting.html(page(report))}" style="width:100%;height:40rem;border:0"></iframe>'
+    return (
+        f'<iframe srcdoc="{quoting.html(page(report))}"'
+        ' style="width:100%;height:40rem;border:0"></iframe>'
+    )
 
 
 def fragment(report: Report) -> str:
@@ -51,13 +58,17 @@ def fragment(report: Report) -> str:
             parts.append(_untypeset(_table(block.brief)))
         elif isinstance(block, blocks.Equation):
             parts.append(f"<p>$${quoting.html(block.latex)}$$</p>")
-        elif not isinstance(block, blocks.ChartBlock | blocks.Charts | blocks.Figure | blocks.Markup | blocks.Fold):
+        elif not isinstance(
+            block, blocks.ChartBlock | blocks.Charts | blocks.Figure | blocks.Markup | blocks.Fold
+        ):
             parts.append(_untypeset(_element(block, itertools.count(1))))
     return "\n".join(parts)
 
 
 def _untypeset(element: str) -> str:
-    return f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
+    return (
+        f'<div class="mathjax_ignore tex2jax_ignore">{element}</div>' if "$" in element else element
+    )
 
 
 def _draws(block: blocks.Block) -> bool:
@@ -75,28 +86,43 @@ def _element(block: blocks.Block, figures: "itertools.count[int]") -> str:
         case blocks.Paragraphs(texts):
             return "\n".join(f"<p>{quoting.html(text)}</p>" for text in texts)
         case blocks.VerdictBlock(texts, kind):
-            return f'<div class="verdict {kind}">\n{_element(blocks.Paragraphs(texts), figures)}\n</div>'
+            return (
+                '<div class="verdict'
+                f' {kind}">\n{_element(blocks.Paragraphs(texts), figures)}\n</div>'
+            )
         case blocks.Items(texts):
-            return "\n".join(["<ul>", *(f"<li>{quoting.html(text)}</li>" for text in texts), "</ul>"])
+            return "\n".join(
+                ["<ul>", *(f"<li>{quoting.html(text)}</li>" for text in texts), "</ul>"]
+            )
         case blocks.CodeBlock(text):
             return f"<pre>{quoting.html(text)}</pre>"  # a click selects it whole
         case blocks.Equation(latex):
             drawing = _typeset(latex)
-            inside = _inline(drawing, f"f{next(figures)}-", latex) if drawing else f"<code>{quoting.html(latex)}</code>"
+            inside = (
+                _inline(drawing, f"f{next(figures)}-", latex)
+                if drawing
+                else f"<code>{quoting.html(latex)}</code>"
+            )
             return f'<div class="equation">{inside}</div>'
         case Table():
             return _table(block)
         case blocks.ChartBlock(chart, caption):
             return f"<figure>{chart.element(caption)}{_below(caption)}</figure>"
         case blocks.Charts(charts):
-            return "\n".join(['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"])
+            return "\n".join(
+                ['<div class="charts">', *(_element(chart, figures) for chart in charts), "</div>"]
+            )
         case blocks.Figure(svg, caption):
-            return f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}{_below(caption)}</figure>"
+            return (
+                f"<figure>{_inline(svg, f'f{next(figures)}-', caption)}{_below(caption)}</figure>"
+            )
         case blocks.Markup(markup):
             return markup
         case blocks.Fold(summary, parts):
             inside = (_element(inner, figures) for inner in parts)
-            return "\n".join([f"<details><summary>{quoting.html(summary)}</summary>", *inside, "</details>"])
+            return "\n".join(
+                [f"<details><summary>{quoting.html(summary)}</summary>", *inside, "</details>"]
+            )
 
 
 def _below(caption: str) -> str:
@@ -104,24 +130,37 @@ def _below(caption: str) -> str:
 
 
 def _table(table: Table) -> str:
-    """A table; the first column is to the left, the others are figures but for those that hold words."""
-    long = [any(len(row[i]) > LONGEST_UNBROKEN_WORD for row in table.cells) for i in range(len(table.columns))]
+    """A table; the first column is to the left, the others are figures but for those that hold
+    words.
+    """
+    long = [
+        any(len(row[i]) > LONGEST_UNBROKEN_WORD for row in table.cells)
+        for i in range(len(table.columns))
+    ]
     kinds = {i: "words" if long[i] else "short" for i in table.words}
-    marks = [f'<{{0}} class="{kinds[i]}">' if i in kinds else "<{0}>" for i in range(len(table.columns))]
+    marks = [
+        f'<{{0}} class="{kinds[i]}">' if i in kinds else "<{0}>" for i in range(len(table.columns))
+    ]
 
     def line(cells: Sequence[str], tag: str) -> str:
         marked = zip(marks, cells, strict=True)
-        return f"<tr>{''.join(f'{m.format(tag)}{quoting.html(str(c))}</{tag}>' for m, c in marked)}</tr>"
+        return (
+            f"<tr>{''.join(f'{m.format(tag)}{quoting.html(str(c))}</{tag}>' for m, c in marked)}"
+            "</tr>"
+        )
 
     body = "\n".join(line(row, "td") for row in table.cells)
     head = f"<thead>{line(table.columns, 'th')}</thead>" if table.columns else ""
     above = f"<caption>{quoting.html(table.title)}</caption>" if table.title else ""
     grid = f'<div class="wide"><table>{above}{head}<tbody>\n{body}\n</tbody></table></div>'
-    return f'<figure class="table">{grid}{_below(table.caption)}</figure>'  # the caption stays where a table scrolls
+    # the caption stays where a table scrolls
+    return f'<figure class="table">{grid}{_below(table.caption)}</figure>'
 
 
 def _inline(drawing: str, prefix: str, label: str) -> str:
-    """An SVG document as an element of a page: without header and metadata, its ids unlike any other figure's."""
+    """An SVG document as an element of a page: without header and metadata, its ids unlike any
+    other figure's.
+    """
     drawing = drawing[drawing.index("<svg") :].strip()
     drawing = re.sub(r"<metadata>.*?</metadata>", "", drawing, flags=re.DOTALL)
     drawing = re.sub(r'\sxmlns(:\w+)?="[^"]*"', "", drawing).replace("xlink:href=", "href=")
@@ -130,9 +169,13 @@ def _inline(drawing: str, prefix: str, label: str) -> str:
 
 
 def _enlarge_fractions(latex: str) -> str:
-    """Fractions that are inside nothing else in their full size, as LaTeX has them in a displayed equation."""
+    """Fractions that are inside nothing else in their full size, as LaTeX has them in a displayed
+    equation.
+    """
     depth = itertools.accumulate((c == "{") - (c == "}") for c in latex)
-    outside = {m.start() for m in re.finditer(r"\\frac", latex)} & {i for i, d in enumerate(depth) if d == 0}
+    outside = {m.start() for m in re.finditer(r"\\frac", latex)} & {
+        i for i, d in enumerate(depth) if d == 0
+    }
     return "".join(r"\d" if i in outside else c for i, c in enumerate(latex))
 
 

@@ -8,8 +8,12 @@ from tractexp.blocks import block as blocks
 
 
 def markdown(report: Report) -> str:
-    parts = [f"# {quoting.markdown(report.title)}"] + [quoting.markdown(report.lead)] * bool(report.lead)
-    return "\n\n".join([*parts, *(part for block in report.blocks for part in _parts(block))]) + "\n"
+    parts = [f"# {quoting.markdown(report.title)}"] + [quoting.markdown(report.lead)] * bool(
+        report.lead
+    )
+    return (
+        "\n\n".join([*parts, *(part for block in report.blocks for part in _parts(block))]) + "\n"
+    )
 
 
 def _parts(block: blocks.Block) -> Iterator[str]:
@@ -45,5 +49,7 @@ def _parts(block: blocks.Block) -> Iterator[str]:
 def _table(table: Table) -> str:
     """The first column and those of words are to the left."""
     marks = ["---" if i == 0 or i in table.words else "---:" for i in range(len(table.columns))]
-    head, *rows = [[quoting.markdown(str(cell)) for cell in line] for line in (table.columns, *table.cells)]
+    head, *rows = [
+        [quoting.markdown(str(cell)) for cell in line] for line in (table.columns, *table.cells)
+    ]
     return "\n".join(f"| {' | '.join(line)} |" for line in (head, marks, *rows))

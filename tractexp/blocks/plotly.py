@@ -1,8 +1,9 @@
 """Plotly.js with what our charts draw and nothing else: a quarter of it.
 
-The library is one file of modules that esbuild has wrapped, each a top-level variable holding a function that makes the
-module at its first call; the last one registers the kinds of traces. Where that registers those of our charts alone,
-what nothing calls any more is left out. A file that is made otherwise is taken whole.
+The library is one file of modules that esbuild has wrapped, each a top-level variable holding a
+function that makes the module at its first call; the last one registers the kinds of traces. Where
+that registers those of our charts alone, what nothing calls any more is left out. A file that is
+made otherwise is taken whole.
 """
 
 import hashlib
@@ -12,8 +13,11 @@ from pathlib import Path
 
 from tractexp.errors import UserError
 
-TRACE = 'moduleType:"trace",name:"bar"'  # the kind that charts need beside lines, which are part of the core
-COMMON = re.compile(r"[ ,]([\w$]+)=\([\w$]+,[\w$]+\)=>\(\)=>\{try\{return [\w$]+\|\|[\w$]+\(\([\w$]+=\{exports:")
+# the kind that charts need beside lines, which are part of the core
+TRACE = 'moduleType:"trace",name:"bar"'
+COMMON = re.compile(
+    r"[ ,]([\w$]+)=\([\w$]+,[\w$]+\)=>\(\)=>\{try\{return [\w$]+\|\|[\w$]+\(\([\w$]+=\{exports:"
+)
 LAZY = re.compile(r"[ ,]([\w$]+)=\([\w$]+,[\w$]+,[\w$]+\)=>\(\)=>\{if\([\w$]+\)throw")
 REGISTERED = re.compile(r"\.register\(\[((?:[\w$]+\(\),?)+)\]\)")
 CALLED = re.compile(r"([\w$]+)\(\)")
@@ -25,7 +29,10 @@ def library() -> Path:
     for folder in (spec and spec.submodule_search_locations) or ():
         if (path := Path(folder, "package_data", "plotly.min.js")).is_file():
             return path
-    raise UserError("pages need the package plotly, which is not installed whole; install it by: pip install plotly")
+    raise UserError(
+        "pages need the package plotly, which is not installed whole; install it by: pip install"
+        " plotly"
+    )
 
 
 def code() -> str:
@@ -44,19 +51,33 @@ def select_needed_modules(whole: str) -> str:
     if not (common and lazy):
         return whole
     wraps = f"{re.escape(common[1])}|{re.escape(lazy[1])}"
-    begins = [m.start() for m in re.finditer(rf"(?<=[;\n])var [\w$]+={re.escape(common[1])}\(\(", whole)]
+    begins = [
+        m.start() for m in re.finditer(rf"(?<=[;\n])var [\w$]+={re.escape(common[1])}\(\(", whole)
+    ]
     parts = [whole[a:b] for a, b in zip(begins, [*begins[1:], len(whole)], strict=True)]
-    where = {name: k for k, part in enumerate(parts) for name in re.findall(rf"([\w$]+)=(?:{wraps})\(", part)}
+    where = {
+        name: k
+        for k, part in enumerate(parts)
+        for name in re.findall(rf"([\w$]+)=(?:{wraps})\(", part)
+    }
     registered = REGISTERED.search(parts[-1]) if parts else None
-    calls = {k: {where[name] for name in CALLED.findall(part) if name in where} for k, part in enumerate(parts)}
+    calls = {
+        k: {where[name] for name in CALLED.findall(part) if name in where}
+        for k, part in enumerate(parts)
+    }
     kinds = registered[1].rstrip(",").split(",") if registered else []
-    bars = [kind for kind in kinds if any(TRACE in parts[k] for k in calls[where.get(kind[:-2], -1)])]
+    bars = [
+        kind for kind in kinds if any(TRACE in parts[k] for k in calls[where.get(kind[:-2], -1)])
+    ]
     if registered is None or len(bars) != 1:
         return whole
     parts[-1] = parts[-1].replace(registered[0], f".register([{bars[0]}])")
     calls[len(parts) - 1] = {where[name] for name in CALLED.findall(parts[-1]) if name in where}
     head = whole[: begins[0]]
-    modules, todo = set[int](), {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)}
+    modules, todo = (
+        set[int](),
+        {len(parts) - 1, *(where[name] for name in CALLED.findall(head) if name in where)},
+    )
     while todo:
         modules.add(k := todo.pop())
         todo |= calls[k] - modules

@@ -1,4 +1,6 @@
-"""How figures look: sizes, colors, the settings that make them small, alike on every machine and reproducible."""
+"""How figures look: sizes, colors, the settings that make them small, alike on every machine and
+reproducible.
+"""
 
 import io
 from pathlib import Path
@@ -41,8 +43,11 @@ SETTINGS: Any = {
 }
 
 
-def thin(x: np.ndarray, y: np.ndarray, points: int = MOST_POINTS_A_LINE) -> tuple[np.ndarray, np.ndarray]:
-    """At most about `points` of (x, y), both (n,): the lowest and highest of each of `points`/2 stretches, and gaps.
+def thin(
+    x: np.ndarray, y: np.ndarray, points: int = MOST_POINTS_A_LINE
+) -> tuple[np.ndarray, np.ndarray]:
+    """At most about `points` of (x, y), both (n,): the lowest and highest of each of `points`/2
+    stretches, and gaps.
 
     No dip or spike is lost, however short. nan is kept, so that a gap stays a gap.
     """
@@ -52,19 +57,27 @@ def thin(x: np.ndarray, y: np.ndarray, points: int = MOST_POINTS_A_LINE) -> tupl
     rows = np.full((parts, -(-len(y) // parts)), np.nan)
     rows.ravel()[: len(y)] = y
     missing = np.isnan(rows)
-    low, high = np.where(missing, np.inf, rows).argmin(1), np.where(missing, -np.inf, rows).argmax(1)
+    low, high = (
+        np.where(missing, np.inf, rows).argmin(1),
+        np.where(missing, -np.inf, rows).argmax(1),
+    )
     gap = np.where(missing.any(1), missing.argmax(1), low)
     chosen = np.concatenate(
-        [np.arange(parts) * rows.shape[1] + column for column in (low, high, gap)] + [[0, len(y) - 1]]
+        [np.arange(parts) * rows.shape[1] + column for column in (low, high, gap)]
+        + [[0, len(y) - 1]]
     )
     index = np.unique(chosen[chosen < len(y)])
     return x[index], y[index]
 
 
 def save(figure: "Figure", path: Path) -> Path:
-    """Write a figure as SVG or PNG, by the suffix; the same figure gives the same bytes. Raises `UserError`."""
+    """Write a figure as SVG or PNG, by the suffix; the same figure gives the same bytes. Raises
+    `UserError`.
+    """
     path = Path(path)
-    metadata = {"Date": None, "Creator": "tractexp"} if path.suffix == ".svg" else {"Software": "tractexp"}
+    metadata = (
+        {"Date": None, "Creator": "tractexp"} if path.suffix == ".svg" else {"Software": "tractexp"}
+    )
     drawn = io.BytesIO()
     figure.savefig(drawn, format=path.suffix[1:], metadata=metadata, dpi=150)
     return files.write(path, drawn.getvalue())

@@ -42,7 +42,15 @@ def plain(report: Report) -> str:
 
     text = io.StringIO()
     show(
-        report, Console(file=text, highlight=False, soft_wrap=True, width=PLAIN_LINE_WIDTH, color_system=None, force_jupyter=False)
+        report,
+        Console(
+            file=text,
+            highlight=False,
+            soft_wrap=True,
+            width=PLAIN_LINE_WIDTH,
+            color_system=None,
+            force_jupyter=False,
+        ),
     )
     return "\n".join(line.rstrip() for line in text.getvalue().rstrip().splitlines())
 
@@ -54,10 +62,15 @@ def _table(table: Table, console: Any) -> None:
 
     if not table.columns:
         return
-    grid = Grid(title=one_line(table.title) or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False)
+    grid = Grid(
+        title=one_line(table.title) or None, title_justify="left", box=SIMPLE_HEAD, pad_edge=False
+    )
     last = len(table.columns) - 1
     for i, column in enumerate(table.columns):
-        justify, fixed = "left" if i == 0 or i in table.words else "right", i < last and i not in table.words
+        justify, fixed = (
+            "left" if i == 0 or i in table.words else "right",
+            i < last and i not in table.words,
+        )
         grid.add_column(one_line(column), justify=justify, no_wrap=fixed)
     for row in table.cells:
         grid.add_row(*map(one_line, row))

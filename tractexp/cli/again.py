@@ -1,4 +1,6 @@
-"""`tractexp again RUN_FOLDER [KEY=VALUE ...]`: the configuration of an earlier run, with other settings on top."""
+"""`tractexp again RUN_FOLDER [KEY=VALUE ...]`: the configuration of an earlier run, with other
+settings on top.
+"""
 
 import argparse
 import os
@@ -21,15 +23,24 @@ SEARCHED = "--config-dir"
 
 
 def build_repeat_command(arguments: list[str]) -> list[str]:
-    """The arguments of `tractexp` that repeat a run with other settings, in the folder where that ran.
+    """The arguments of `tractexp` that repeat a run with other settings, in the folder where that
+    ran.
 
-    What the task does not read is left out, and a setting of a group goes with the choice of another there. A task that
-    takes a result (`task.parameters`) is given that of the run. The folder may be somebody else's: what it may say is
-    in `repeatable`. Raises `UserError` where it holds no run, or says more.
+    What the task does not read is left out, and a setting of a group goes with the choice of
+    another there. A task that takes a result (`task.parameters`) is given that of the run. The
+    folder may be somebody else's: what it may say is in `repeatable`. Raises `UserError` where it
+    holds no run, or says more.
     """
-    parser = argparse.ArgumentParser(prog="tractexp again", description=(build_repeat_command.__doc__ or "").partition("\n")[0])
+    parser = argparse.ArgumentParser(
+        prog="tractexp again", description=(build_repeat_command.__doc__ or "").partition("\n")[0]
+    )
     parser.add_argument("folder", metavar="RUN_FOLDER", help="the folder of an earlier run")
-    parser.add_argument("settings", metavar="KEY=VALUE", nargs="*", help="what is to be different, as task=discrepancy")
+    parser.add_argument(
+        "settings",
+        metavar="KEY=VALUE",
+        nargs="*",
+        help="what is to be different, as task=discrepancy",
+    )
     parser.add_argument(SEARCHED, help="a folder of configurations of your own that the run used")
     chosen = parser.parse_args(arguments)
     folder = Path(chosen.folder).absolute()
@@ -39,7 +50,8 @@ def build_repeat_command(arguments: list[str]) -> list[str]:
     lines, cwd, searched = _read_stored_run(folder)
     if searched and chosen.config_dir is None:
         raise UserError(
-            f"{folder} used configurations in {searched[0]}, which only you can name: where they are yours, give"
+            f"{folder} used configurations in {searched[0]}, which only you can name: where they"
+            " are yours, give"
             f" {SEARCHED} {quoting.shell(searched[0])} too"
         )
     given = [SEARCHED, str(Path(chosen.config_dir).absolute())] if chosen.config_dir else []
@@ -50,16 +62,21 @@ def build_repeat_command(arguments: list[str]) -> list[str]:
 
 
 def merge_settings(arguments: Iterable[str], settings: Iterable[str], folder: Path) -> list[str]:
-    """Earlier settings that still count beside newer ones, and these. Raises `UserError` for one not taken over."""
+    """Earlier settings that still count beside newer ones, and these. Raises `UserError` for one
+    not taken over.
+    """
     settings = list(settings)
     keys = {_key(text) for text in settings}
     groups = {key for key in keys if key == group_of(key)}
-    stay = [text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups]
+    stay = [
+        text for text in arguments if _key(text) not in keys and group_of(_key(text)) not in groups
+    ]
     for text in stay:
         if why := refusal(text):
             key = text.partition("=")[0]
             raise UserError(
-                f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it is meant, say so:"
+                f"{folder}: {key:.80} is not taken over from the folder of a run ({why}); where it"
+                " is meant, say so:"
                 f" {quoting.shell('tractexp', 'again', str(folder), f'{_key(text):.80}=VALUE')}"
             )
     names = [text.partition("=")[2] for text in (*stay, *settings) if _key(text) == "task"]
@@ -75,18 +92,32 @@ def _key(text: str) -> str:
 
 
 def _read_stored_run(folder: Path) -> tuple[list[str], Path, list[str]]:
-    """The settings that were chosen for a run, where it ran, and the folders that it read configurations from."""
+    """The settings that were chosen for a run, where it ran, and the folders that it read
+    configurations from.
+    """
     try:
-        whole, arguments = (files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml"))
+        whole, arguments = (
+            files.read_yaml(folder / FOLDER / name) for name in ("hydra.yaml", "overrides.yaml")
+        )
         runtime = whole["hydra"]["runtime"]
-        sources = [s["path"] for s in runtime.get("config_sources", []) if s["provider"] == "command-line"]
-        return [str(text) for text in arguments], Path(runtime["cwd"]), [str(path) for path in sources]
+        sources = [
+            s["path"] for s in runtime.get("config_sources", []) if s["provider"] == "command-line"
+        ]
+        return (
+            [str(text) for text in arguments],
+            Path(runtime["cwd"]),
+            [str(path) for path in sources],
+        )
     except (FileNotFoundError, LookupError, TypeError, AttributeError) as error:
-        raise UserError(f"{folder} holds no run ({FOLDER} is missing or damaged); give the folder of one") from error
+        raise UserError(
+            f"{folder} holds no run ({FOLDER} is missing or damaged); give the folder of one"
+        ) from error
 
 
 def _enter(cwd: Path, folder: Path) -> None:
-    """Go where the run was, since its settings name files from there: to a folder that holds its own, to no other."""
+    """Go where the run was, since its settings name files from there: to a folder that holds its
+    own, to no other.
+    """
     if not cwd.is_dir() or cwd.resolve() == Path.cwd().resolve():
         return
     if folder.resolve().is_relative_to(cwd.resolve()):

@@ -12,7 +12,9 @@ OF = {"domain": "model.domain"}  # groups that choose for another, and what
 
 
 def collect_chosen_settings(overrides: Iterable[str], choices: Mapping[str, Any]) -> dict[str, str]:
-    """{key: value} of what was chosen on the command line, by a sweep or by an experiment, and not by default."""
+    """{key: value} of what was chosen on the command line, by a sweep or by an experiment, and not
+    by default.
+    """
     experiment = choices.get("experiment")
     chosen = dict(_by_experiment(str(experiment))) if experiment else {}
     for text in overrides:
@@ -22,21 +24,35 @@ def collect_chosen_settings(overrides: Iterable[str], choices: Mapping[str, Any]
 
 
 def refuse_unread(task: Any, chosen: Mapping[str, str], needless: Collection[str] = ()) -> None:
-    """Raise `UserError` for the first setting chosen that a task (class or instance) does not read."""
+    """Raise `UserError` for the first setting chosen that a task (class or instance)
+    does not read.
+    """
     for key, value in chosen.items():
         if not reads(task, key, needless):
-            instead = (task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part))
-            raise UserError(f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}")
+            instead = (
+                task.instead[part] for part in task.instead if _overlap(OF.get(key, key), part)
+            )
+            raise UserError(
+                f"{key}={value} is not read by task={task.name}; {next(instead, 'leave it out')}"
+            )
 
 
 def reads(task: Any, key: str, needless: Collection[str] = ()) -> bool:
     """Whether a task (class or instance) reads a setting, or any task does."""
-    return any(_overlap(OF.get(key, key), part) for part in (*ALWAYS, *task.reads) if part not in needless)
+    return any(
+        _overlap(OF.get(key, key), part) for part in (*ALWAYS, *task.reads) if part not in needless
+    )
 
 
 def _overlap(a: str, b: str) -> bool:
-    """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too, but no domain."""
-    return a == b or f"{a}.".startswith(f"{b}.") or (f"{b}.".startswith(f"{a}.") and b not in OF.values())
+    """Whether one key is the other or a part of it: choosing `model` chooses `model.motor` too, but
+    no domain.
+    """
+    return (
+        a == b
+        or f"{a}.".startswith(f"{b}.")
+        or (f"{b}.".startswith(f"{a}.") and b not in OF.values())
+    )
 
 
 @functools.cache
@@ -47,4 +63,6 @@ def _by_experiment(experiment: str) -> Mapping[str, str]:
     from tractexp.composition import folders, set_by_experiment
 
     sources = HydraConfig.get().runtime.config_sources if HydraConfig.initialized() else ()
-    return set_by_experiment(experiment, [*(Path(s.path) for s in sources if s.schema == "file"), *folders()])
+    return set_by_experiment(
+        experiment, [*(Path(s.path) for s in sources if s.schema == "file"), *folders()]
+    )

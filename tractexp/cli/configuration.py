@@ -1,4 +1,6 @@
-"""The configuration that lies beside the results of a run, in `.hydra`: never beside those of another."""
+"""The configuration that lies beside the results of a run, in `.hydra`: never beside those of
+another.
+"""
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,4 +1,6 @@
-"""`tractexp doctor`: whether everything a run stands on is sound; what can be healed without loss is."""
+"""`tractexp doctor`: whether everything a run stands on is sound; what can be healed without loss
+is.
+"""
 
 import argparse
 import os
@@ -18,7 +20,10 @@ from tractexp.run_folder import WHOLE, settle
 from tractexp.tracking import owner
 from tractexp.tracking.store import database_of, open_store, sentences
 
-DOES = "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what is wrong."
+DOES = (
+    "Check versions, cores, caches, disk, the MLflow store and its runs; heal what can be, say what"
+    " is wrong."
+)
 LEAST_FREE_BYTES = 500e6  # bytes of a disk that is not nearly full
 BUSY = 2.0  # s to wait for a store that another process writes to
 
@@ -29,11 +34,20 @@ SOUND, HEALED, WRONG = "well", "healed", "WRONG"
 def doctor(arguments: list[str]) -> int:
     """Check and heal; returns the exit code, 2 where something is left that is wrong."""
     parser = argparse.ArgumentParser(prog="tractexp doctor", description=DOES)
-    parser.add_argument("folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}")
-    parser.add_argument("--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=FOLDER, help=f"of runs; default: {FOLDER}"
+    )
+    parser.add_argument(
+        "--uri", help="the MLflow store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here"
+    )
     chosen = parser.parse_args(arguments)
     uri = tracking.address(chosen.uri)
-    wrong = sum(map(print_findings, (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder))))
+    wrong = sum(
+        map(
+            print_findings,
+            (versions(), cores(), disk(chosen.folder), caches(), leavings(chosen.folder)),
+        )
+    )
     if print_findings(store(uri)):
         return 2
     wrong += print_findings(runs(uri))
@@ -76,8 +90,8 @@ def versions() -> Iterator[Finding]:
 def cores() -> Iterator[Finding]:
     """How many cores a sweep may use, and whether a worker starts.
 
-    However long it takes, and as often as a sweep tries it: on a machine that is short of time or memory the first may
-    be killed before it begins.
+    However long it takes, and as often as a sweep tries it: on a machine that is short of time or
+    memory the first may be killed before it begins.
     """
     from joblib import cpu_count
 
@@ -86,19 +100,28 @@ def cores() -> Iterator[Finding]:
     try:
         list(Workers(1, apart=True).results(abs, [1], trace=lambda item: False))
     except Exception as error:
-        yield WRONG, f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot run"
+        yield (
+            WRONG,
+            f"no worker process starts ({type(error).__name__}: {error}): sweeps and surveys cannot"
+            " run",
+        )
         return
     yield SOUND, f"{cpu_count()} of {os.cpu_count()} cores may be used, and a worker starts"
 
 
 def disk(folder: Path) -> Iterator[Finding]:
     """Whether there is room for results."""
-    place = next((p for p in (folder.absolute(), *folder.absolute().parents) if p.is_dir()), Path.cwd())
+    place = next(
+        (p for p in (folder.absolute(), *folder.absolute().parents) if p.is_dir()), Path.cwd()
+    )
     free = shutil.disk_usage(place).free
     if not os.access(place, os.W_OK):
         yield WRONG, f"{place} may not be written: results need another folder (hydra.run.dir=...)"
     elif free < LEAST_FREE_BYTES:
-        yield WRONG, f"only {free / 1e6:.0f} MB are free on the disk of {place}: make room before a sweep"
+        yield (
+            WRONG,
+            f"only {free / 1e6:.0f} MB are free on the disk of {place}: make room before a sweep",
+        )
     else:
         yield SOUND, f"{free / 1e9:.1f} GB are free on the disk of {place}"
 
@@ -109,7 +132,9 @@ def caches() -> Iterator[Finding]:
 
     try:
         folder = cache_folder()
-        files.write(folder / "doctor.txt", "written and removed by tractexp doctor\n", lasting=False).unlink()
+        files.write(
+            folder / "doctor.txt", "written and removed by tractexp doctor\n", lasting=False
+        ).unlink()
     except (OSError, UserError) as error:
         yield WRONG, f"nothing can be kept of what is compiled: {error}"
         return
@@ -131,27 +156,44 @@ def leavings(folder: Path) -> Iterator[Finding]:
     for whole in [*folder.rglob(WHOLE)] if folder.is_dir() else []:
         try:
             if settle(whole.parent):
-                yield HEALED, f"the results in {whole.parent} have their places; a run was killed before they had"
+                yield (
+                    HEALED,
+                    f"the results in {whole.parent} have their places; a run was killed before they"
+                    " had",
+                )
         except UserError as error:
             yield WRONG, str(error)
 
 
 def store(uri: str) -> Iterator[Finding]:
-    """Whether the store can be used; a damaged one is set aside, for the runs are kept beside their results."""
+    """Whether the store can be used; a damaged one is set aside, for the runs are kept beside their
+    results.
+    """
     database = database_of(uri)
     if database is not None and not database.exists():
         yield SOUND, f"there is no MLflow store {database} yet: it is made when something is logged"
         return
     if database is not None and (problem := _unsound(database)):
         if problem == "locked":
-            yield WRONG, f"the MLflow store {database} is locked by another process: runs are kept until it lets go"
+            yield (
+                WRONG,
+                f"the MLflow store {database} is locked by another process: runs are kept until it"
+                " lets go",
+            )
             return
         if not _ours(database):
-            yield WRONG, f"{database} is no MLflow store ({problem}) and is left as it is: name another by --uri"
+            yield (
+                WRONG,
+                f"{database} is no MLflow store ({problem}) and is left as it is: name another by"
+                " --uri",
+            )
             return
         aside = database.with_name(f"{database.name}.damaged-{time.strftime('%Y-%m-%d_%H-%M-%S')}")
         files.move(database, aside)
-        yield HEALED, f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}"
+        yield (
+            HEALED,
+            f"the MLflow store {database} is damaged ({problem}); it is set aside as {aside.name}",
+        )
     try:
         tracking.open_store(uri)
     except UserError as error:
@@ -161,13 +203,17 @@ def store(uri: str) -> Iterator[Finding]:
 
 
 def _ours(database: Path) -> bool:
-    """Whether a damaged file was a store of MLflow's, as far as what is left of it says; an empty one is nobody's."""
+    """Whether a damaged file was a store of MLflow's, as far as what is left of it says; an empty
+    one is nobody's.
+    """
     content = files.read(database)
     return not content.strip(b"\0") or b"alembic_version" in content or b"mlflow." in content
 
 
 def _unsound(database: Path) -> str:
-    """What is wrong with an SQLite file, in a few words; "locked" for one that is in use, "" for a sound one."""
+    """What is wrong with an SQLite file, in a few words; "locked" for one that is in use, "" for a
+    sound one.
+    """
     try:
         with closing(sqlite3.connect(database, timeout=BUSY)) as connection:
             (verdict,) = connection.execute("PRAGMA quick_check(1)").fetchone()
@@ -178,7 +224,13 @@ def _unsound(database: Path) -> str:
                 connection.execute("BEGIN IMMEDIATE")
                 connection.rollback()
     except sqlite3.OperationalError as error:
-        return "locked" if "locked" in str(error) else "" if "unable to open" in str(error) else str(error)
+        return (
+            "locked"
+            if "locked" in str(error)
+            else ""
+            if "unable to open" in str(error)
+            else str(error)
+        )
     except sqlite3.DatabaseError as error:
         return str(error)
     return ""
@@ -199,8 +251,15 @@ def runs(uri: str) -> Iterator[Finding]:
     for run in unknown:
         where = run.data.tags.get(owner.TAG, "").partition("/")[0] or "a process that is not known"
         yield (
-            WRONG, f"run '{run.info.run_name}' ({run.info.run_id}) says it is running on {where}, which cannot be told"
+            WRONG,
+            f"run '{run.info.run_name}' ({run.info.run_id}) says it is running on {where}, which"
+            " cannot be told"
             " from here; where it is not, run tractexp doctor there, or delete the run in MLflow",
-        )  # fmt: skip
+        )
     if not unknown:
-        yield SOUND, f"{len(running)} runs are running" if running else "no run says it is running that is not"
+        yield (
+            SOUND,
+            f"{len(running)} runs are running"
+            if running
+            else "no run says it is running that is not",
+        )

@@ -1,4 +1,6 @@
-"""`tractexp FOLDER`: the page of a run that is in it; of a folder of recordings, the table of what happened."""
+"""`tractexp FOLDER`: the page of a run that is in it; of a folder of recordings, the table of what
+happened.
+"""
 
 from pathlib import Path
 
@@ -11,7 +13,9 @@ PAGES = tuple(name for name in (*RESULTS, "look.html") if name.endswith(".html")
 
 
 def choose_command(folder: str, *settings: str) -> list[str]:
-    """The arguments that survey a folder by these settings; [] where it holds a run's pages, which are told instead."""
+    """The arguments that survey a folder by these settings; [] where it holds a run's pages, which
+    are told instead.
+    """
     pages = [path for name in PAGES if (path := Path(folder, name).absolute()).is_file()]
     for page in pages:
         say(f"page: {page}")

@@ -1,4 +1,6 @@
-"""`tractexp look FILE...`: what files hold, which loads they show, what happened, and the command that fits it."""
+"""`tractexp look FILE...`: what files hold, which loads they show, what happened, and the command
+that fits it.
+"""
 
 import argparse
 import re
@@ -11,22 +13,39 @@ from tractexp.errors import UserError
 from tractexp.progress import console
 
 FOLDER = Path("outputs", "looks")
-DOES = "Look at files without saying which channels they have: loads, events, what is worth fitting, and the command."
+DOES = (
+    "Look at files without saying which channels they have: loads, events, what is worth fitting,"
+    " and the command."
+)
 SETTING = re.compile(r"(?:data\.)?([a-z_]+)=(.*)", re.DOTALL)
 
 
 def look(arguments: list[str]) -> int:
-    """Print and write a look at files; returns the exit code. Raises `UserError` for what cannot be read."""
+    """Print and write a look at files; returns the exit code. Raises `UserError` for what cannot be
+    read.
+    """
     parser = argparse.ArgumentParser(prog="tractexp look", description=DOES)
     parser.add_argument("file", nargs="+", metavar="FILE", help="any file that can be read")
-    parser.add_argument("--folder", type=Path, help=f"where the page is written; default: a new one in {FOLDER}")
-    parser.add_argument("--all", action="store_true", help="print channels, reasons, all events and all commands too")
-    parser.epilog = "Settings of the reader are given as KEY=VALUE, such as 'voltages=[4,5,6]' or encoding=gbk."
+    parser.add_argument(
+        "--folder", type=Path, help=f"where the page is written; default: a new one in {FOLDER}"
+    )
+    parser.add_argument(
+        "--all",
+        action="store_true",
+        help="print channels, reasons, all events and all commands too",
+    )
+    parser.epilog = (
+        "Settings of the reader are given as KEY=VALUE, such as 'voltages=[4,5,6]' or encoding=gbk."
+    )
     chosen = parser.parse_args(arguments)
-    settings = [s for each in chosen.file if not Path(each).exists() and (s := SETTING.fullmatch(each))]
+    settings = [
+        s for each in chosen.file if not Path(each).exists() and (s := SETTING.fullmatch(each))
+    ]
     paths = [each for each in chosen.file if Path(each).exists() or not SETTING.fullmatch(each)]
     if not paths:
-        raise UserError("tractexp look: give a file beside the settings, e.g. tractexp look station.cfg")
+        raise UserError(
+            "tractexp look: give a file beside the settings, e.g. tractexp look station.cfg"
+        )
     from tractexp.api.look import look as looked
     from tractexp.api.task import call, print_paths
     from tractexp.blocks.terminal import show

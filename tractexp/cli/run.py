@@ -29,14 +29,27 @@ def run(config: Any) -> None:
         with contextlib.suppress(OSError):  # where it is not empty
             folder.rmdir()
         raise
-    with run_folder(folder, configuration.contents(config), configuration.list_named_files(plain)) as place:
+    with run_folder(
+        folder, configuration.contents(config), configuration.list_named_files(plain)
+    ) as place:
         try:
             provenance.remember_folder(folder)
-            perform(Job(plain, choices, folder, given=collect_chosen_settings(hydra.overrides.task, choices), placed=place.place))
+            perform(
+                Job(
+                    plain,
+                    choices,
+                    folder,
+                    given=collect_chosen_settings(hydra.overrides.task, choices),
+                    placed=place.place,
+                )
+            )
             place.conclude()
         except KeyboardInterrupt as stop:
             saved = so_far(stop, place)
-            raise Stopped(f"{_how(stop)}; {saved or describe_stopped_task(config)}", getattr(stop, "code", 130)) from None
+            raise Stopped(
+                f"{_how(stop)}; {saved or describe_stopped_task(config)}",
+                getattr(stop, "code", 130),
+            ) from None
 
 
 def _how(stop: KeyboardInterrupt) -> str:
@@ -44,7 +57,9 @@ def _how(stop: KeyboardInterrupt) -> str:
 
 
 def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
-    """Keep what a search had found when it was stopped; a sentence on it, "" where there is nothing."""
+    """Keep what a search had found when it was stopped; a sentence on it, "" where there is
+    nothing.
+    """
     if (state := getattr(stop, "result", None)) is None:
         return ""
     from tractexp.identification.result import write_history
@@ -56,7 +71,8 @@ def so_far(stop: KeyboardInterrupt, place: RunFolder) -> str:
         ]
     )
     return (
-        f"the best of {state.result.simulations} simulations so far, objective {state.result.objective:.4g} pu², is in"
+        f"the best of {state.result.simulations} simulations so far, objective"
+        f" {state.result.objective:.4g} pu², is in"
         f" {path}; it is neither polished nor judged, and not logged"
     )
 
@@ -69,7 +85,9 @@ def describe_stopped_task(config: Any) -> str:
 
 
 def perform(job: Job) -> None:
-    """Check a job's configuration and run its task: the same for a single job and for one of a sweep."""
+    """Check a job's configuration and run its task: the same for a single job and for one of a
+    sweep.
+    """
     from tractexp.schema import check
 
     check(job.config)

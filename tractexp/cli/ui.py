@@ -6,19 +6,26 @@ from tractexp.errors import UserError
 
 
 def ui(arguments: list[str]) -> int:
-    """Serve the store of the current folder (or `--uri`) on loopback until interrupted; returns the exit code.
+    """Serve the store of the current folder (or `--uri`) on loopback until interrupted; returns the
+    exit code.
 
     The address printed opens on the comparison of the newest experiment, by variant.
     """
-    parser = argparse.ArgumentParser(prog="tractexp ui", description="Open the MLflow UI on this computer only.")
-    parser.add_argument("--uri", help="tracking store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here")
+    parser = argparse.ArgumentParser(
+        prog="tractexp ui", description="Open the MLflow UI on this computer only."
+    )
+    parser.add_argument(
+        "--uri", help="tracking store; default: MLFLOW_TRACKING_URI, else outputs/mlflow.db here"
+    )
     parser.add_argument("--port", type=int, default=5000)
     parser.add_argument("--open", action="store_true", help="open it in the browser")
     chosen = parser.parse_args(arguments)
     from tractexp import tracking
     from tractexp.tracking.ui import serve
 
-    return serve(tracking.address(chosen.uri), port=chosen.port, page=_page, open_browser=chosen.open)
+    return serve(
+        tracking.address(chosen.uri), port=chosen.port, page=_page, open_browser=chosen.open
+    )
 
 
 def _page(uri: str) -> str:
@@ -28,5 +35,8 @@ def _page(uri: str) -> str:
     try:
         return comparison_view(uri)
     except UserError as error:
-        print(f"tractexp ui: opens on MLflow's plain page, because the comparison view could not be stored: {error}")
+        print(
+            "tractexp ui: opens on MLflow's plain page, because the comparison view could not be"
+            f" stored: {error}"
+        )
         return ""

@@ -1,16 +1,17 @@
-"""Hydra's store of schemas: one for all copies of what refers to it, and schemas that are made when they are read.
+"""Hydra's store of schemas: one for all copies of what refers to it, and schemas that are made when
+they are read.
 
-What: `CachingConfigRepository` (in `hydra._internal`) deep-copies its sources to protect their list, and with a source
-the one `ConfigStore` it refers to, with every schema in it. The store gets a `__deepcopy__` that returns it as it
-is. That is safe because `ConfigStore.load` copies the schema it hands out. And `ConfigStore.store` makes a node of
-every schema at once: in the tree `ConfigStore.repo` a `Later` stands where a `ConfigNode` would, and makes its own.
-Why: 20 to 40 ms a copy with our 42 schemas, two or three copies in each composition (a third of its time); 2 to 3 ms
-a node, of which a command reads about ten.
-Since: Hydra 1.1 (facebookresearch/hydra#1541); looked at in 1.3.2 to 1.3.8.
-Upstream: facebookresearch/hydra#1543, and mit-ll-responsible-ai/hydra-zen#769 with the same cure;
-facebookresearch/hydra#2928 (merged for the version after 1.3) no longer keeps the store in the source. Of the nodes
-not reported yet.
-When mended: drop this module and its calls; `ConfigStore.store` takes the schema itself.
+What: `CachingConfigRepository` (in `hydra._internal`) deep-copies its sources to protect their
+list, and with a source the one `ConfigStore` it refers to, with every schema in it. The store gets
+a `__deepcopy__` that returns it as it is. That is safe because `ConfigStore.load` copies the schema
+it hands out. And `ConfigStore.store` makes a node of every schema at once: in the tree
+`ConfigStore.repo` a `Later` stands where a `ConfigNode` would, and makes its own. Why: 20 to 40 ms
+a copy with our 42 schemas, two or three copies in each composition (a third of its time); 2 to 3 ms
+a node, of which a command reads about ten. Since: Hydra 1.1 (facebookresearch/hydra#1541); looked
+at in 1.3.2 to 1.3.8. Upstream: facebookresearch/hydra#1543, and mit-ll-responsible-ai/hydra-zen#769
+with the same cure; facebookresearch/hydra#2928 (merged for the version after 1.3) no longer keeps
+the store in the source. Of the nodes not reported yet. When mended: drop this module and its calls;
+`ConfigStore.store` takes the schema itself.
 """
 
 from collections.abc import Callable
@@ -37,7 +38,13 @@ class Later(ConfigNode):
     """A node of the store that is made when it is read."""
 
     def __init__(self, name: str, group: str, schema: Callable[[], type]):
-        self.name, self.group, self.package, self.provider, self.schema = name, group, None, None, schema
+        self.name, self.group, self.package, self.provider, self.schema = (
+            name,
+            group,
+            None,
+            None,
+            schema,
+        )
 
     def __getattr__(self, name: str) -> Any:
         if name != "node":

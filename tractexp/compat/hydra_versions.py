@@ -1,9 +1,11 @@
-"""Names by which Hydra 1.3 and 1.4 and OmegaConf 2.3 and 2.4 call the same things, each without a warning.
+"""Names by which Hydra 1.3 and 1.4 and OmegaConf 2.3 and 2.4 call the same things, each without a
+warning.
 
-What: OmegaConf 2.4 calls `register_new_resolver` `register_resolver`, which in 2.3 is the one of OmegaConf 1; and
-`hydra.main` of Hydra 1.4 deprecates `version_base`, without which 1.3 warns and changes the working directory.
-Since: looked at in Hydra 1.3.4 to 1.4.0rc3, OmegaConf 2.3.0 to 2.4.1rc1.
-When mended: once the oldest versions allowed are Hydra 1.4 and OmegaConf 2.4, call the new names.
+What: OmegaConf 2.4 calls `register_new_resolver` `register_resolver`, which in 2.3 is the one of
+OmegaConf 1; and `hydra.main` of Hydra 1.4 deprecates `version_base`, without which 1.3 warns and
+changes the working directory. Since: looked at in Hydra 1.3.4 to 1.4.0rc3, OmegaConf 2.3.0 to
+2.4.1rc1. When mended: once the oldest versions allowed are Hydra 1.4 and OmegaConf 2.4, call the
+new names.
 """
 
 import inspect
@@ -17,7 +19,9 @@ NEW = (1, 4)  # the version of Hydra from which on `version_base` is deprecated
 
 
 def register_resolver() -> Callable[..., None]:
-    """`OmegaConf.register_resolver(name, resolver, replace=...)`, by the name that the installed version takes."""
+    """`OmegaConf.register_resolver(name, resolver, replace=...)`, by the name that the installed
+    version takes.
+    """
     renamed: Any = getattr(OmegaConf, "register_resolver", None)
     if renamed is not None and "replace" in inspect.signature(renamed).parameters:
         return renamed

@@ -1,12 +1,11 @@
 """MLflow's server, for its own pages alone.
 
-What: MLflow lets in the pages of every server on this computer, whatever origins it is told to allow, and answers
-them with the credentials of its own: another user's server, or a page under development, reads and changes every run.
-Here a request from a page of another origin ends before it reaches MLflow.
-Why not through MLflow: `--cors-allowed-origins` adds origins and takes none away; `--app-name` needs an entry point.
-Since: at least MLflow 3.10; looked at in 3.17.2.
-Upstream: not reported yet.
-When mended: drop this module, and start `mlflow server` by itself.
+What: MLflow lets in the pages of every server on this computer, whatever origins it is told to
+allow, and answers them with the credentials of its own: another user's server, or a page under
+development, reads and changes every run. Here a request from a page of another origin ends before
+it reaches MLflow. Why not through MLflow: `--cors-allowed-origins` adds origins and takes none
+away; `--app-name` needs an entry point. Since: at least MLflow 3.10; looked at in 3.17.2. Upstream:
+not reported yet. When mended: drop this module, and start `mlflow server` by itself.
 """
 
 import os
@@ -29,7 +28,9 @@ class OwnOrigin:
         self.app, self.origins = app, origins
 
     async def __call__(self, scope: Message, receive: Receive, send: Send) -> None:
-        origins = [value.decode("latin-1") for name, value in scope.get("headers", ()) if name == b"origin"]
+        origins = [
+            value.decode("latin-1") for name, value in scope.get("headers", ()) if name == b"origin"
+        ]
         if self.origins.issuperset(origins):
             await self.app(scope, receive, send)
         elif scope["type"] == "http":
@@ -60,7 +61,8 @@ def main() -> None:
     def command(*arguments: Any, **settings: Any) -> list[str]:
         words = build(*arguments, **settings)
         words[words.index(THEIRS)] = OURS  # where it is another, there is no server
-        # Uvicorn looks for modules in the folder of the application first: by default the current one, of records.
+        # Uvicorn looks for modules in the folder of the application first: by default the current
+        # one, of records.
         at = words.index("uvicorn") + 1
         words[at:at] = ["--app-dir", str(Path(mlflow.server.__file__).parents[2])]
         return words

@@ -1,1 +1,3 @@
-"""Where simulation and measurement disagree, which missing effect explains it, and how sure that is."""
+"""Where simulation and measurement disagree, which missing effect explains it, and how sure that
+is.
+"""

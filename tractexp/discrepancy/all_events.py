@@ -1,7 +1,7 @@
 """Fitted and held-out events together, and explanations fitted to all of them.
 
-What the fitted events leave open, such as the level of a relay between the depths of two dips, may be wrong on the
-held-out ones though the effect is there.
+What the fitted events leave open, such as the level of a relay between the depths of two dips, may
+be wrong on the held-out ones though the effect is there.
 """
 
 import functools
@@ -25,22 +25,29 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted ones."""
+    """An explanation fitted to fitted and held-out events together, in coordinates of the fitted
+    ones.
+    """
 
     fit: Refit
-    louder: float  # by how much all events speak louder for it than the fitted ones alone, of the deviance
+    # by how much all events speak louder for it than the fitted ones alone, of the deviance
+    louder: float
     p_left: float  # how often chance leaves as much as it does
 
     def is_confirmed(self, criteria: Criteria) -> bool:
-        """Whether all events bear it out: they speak louder for it than the fitted ones, and it leaves nothing."""
+        """Whether all events bear it out: they speak louder for it than the fitted ones, and it
+        leaves nothing.
+        """
         return self.louder > 0 and self.p_left >= criteria.adequate_p
 
 
 @dataclass(frozen=True, eq=False)
 class AllEvents:
-    """The context of all events beside that of the fitted ones, with the `noise` and the base model `bare` there.
+    """The context of all events beside that of the fitted ones, with the `noise` and the base model
+    `bare` there.
 
-    `faults` are those of the measurement in every explanation, `refits` all sets that were fitted to the fitted events.
+    `faults` are those of the measurement in every explanation, `refits` all sets that were fitted
+    to the fitted events.
     """
 
     fitted: Context
@@ -67,10 +74,19 @@ class AllEvents:
     @functools.cached_property
     def plain(self) -> Refit:
         """The base model, fitted to all events."""
-        return refit(self.context, self.level, [((), self.context.coordinates.widened(self.bare.unit))], faults=())[0]
+        return refit(
+            self.context,
+            self.level,
+            [((), self.context.coordinates.widened(self.bare.unit))],
+            faults=(),
+        )[0]
 
-    def fit_jointly(self, alone: Sequence[Refit], seed: int, *, anew: bool = False) -> list[JointFit]:
-        """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from every setting."""
+    def fit_jointly(
+        self, alone: Sequence[Refit], seed: int, *, anew: bool = False
+    ) -> list[JointFit]:
+        """Explanations as fitted to the fitted events `alone`, fitted to all: from there, or from
+        every setting.
+        """
         by_name, effort = {fit.names: fit for fit in alone}, self.context.effort
         _ = self.plain  # once, before processes are forked
         refitted = each_apart(lambda fit: self._refit(fit, anew=anew), alone, effort)
@@ -80,25 +96,43 @@ class AllEvents:
     def is_undoubted(self, fits: Sequence[Refit]) -> bool:
         """Whether there is one explanation only, a single effect by the textbook's law."""
         names = fits[0].names
-        return len(fits) == 1 and len(names) + len(self.faults) == 1 and names == self.fitted.catalogue.textbook(names)
+        return (
+            len(fits) == 1
+            and len(names) + len(self.faults) == 1
+            and names == self.fitted.catalogue.textbook(names)
+        )
 
     def compare(self, alone: Sequence[Refit], seed: int) -> list[JointFit]:
-        """Explanations fitted to all events from where they were, and what leaves something there from every setting,
-        too."""
+        """Explanations fitted to all events from where they were, and what leaves something there
+        from every setting, too.
+        """
         joint = {t.fit.names: t for t in self.fit_jointly(alone, seed)}
         doubtful = [f for f in alone if joint[f.names].p_left < self.fitted.criteria.false_alarms]
-        better = [t for t in self.fit_jointly(doubtful, seed, anew=True) if t.fit.cost < joint[t.fit.names].fit.cost]
+        better = [
+            t
+            for t in self.fit_jointly(doubtful, seed, anew=True)
+            if t.fit.cost < joint[t.fit.names].fit.cost
+        ]
         return list({**joint, **{t.fit.names: t for t in better}}.values())
 
     def without_each(self, fit: Refit) -> dict[str, Refit]:
-        """A set of several effects as it fits the fitted events without each of them, by the one left out; from where
-        the set fits, and from where it was found."""
-        rest = {name: tuple(n for n in fit.names if n != name) for name in fit.names if len(fit.names) > 1}
+        """A set of several effects as it fits the fitted events without each of them, by the one
+        left out; from where the set fits, and from where it was found.
+        """
+        rest = {
+            name: tuple(n for n in fit.names if n != name)
+            for name in fit.names
+            if len(fit.names) > 1
+        }
         at = self.fitted.coordinates
         wanted = [(names, at.without(fit.unit, [left])) for left, names in rest.items()]
         there = [self.refits[names] for names, _ in wanted if names in self.refits]
         wanted += [(f.names, at.without_faults(f.unit, self.faults)) for f in there]
-        fits = {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)} if wanted else {}
+        fits = (
+            {f.names: f for f in refit(self.fitted, self.noise, wanted, self.faults)}
+            if wanted
+            else {}
+        )
         return {left: fits[names] for left, names in rest.items()}
 
     def fit_to_all(self, fits: Mapping[str, Refit]) -> dict[str, Refit]:
@@ -107,19 +141,24 @@ class AllEvents:
         return {key: replace(fit, unit=self._narrow(fit)) for key, fit in joint.items()}
 
     def p_left(self, local_minima: Sequence[np.ndarray], seed: int) -> float:
-        """How often chance leaves as much as the base model does of all events; 1 where it has no steady state there.
+        """How often chance leaves as much as the base model does of all events; 1 where it has no
+        steady state there.
 
         `local_minima` (D,) are its own on the fitted events.
         """
         if not np.isfinite(self.plain.deviance):
             return 1.0
-        wide = [self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)]
+        wide = [
+            self.context.coordinates.widened(minimum) for minimum in (self.bare.unit, *local_minima)
+        ]
         return disagreement(fitted_from(self.context, wide, wide[1:]), seed).p_left
 
     def _refit(self, alone: Refit, *, anew: bool) -> list[Refit]:
         at, settings = self.context.coordinates, list[Mapping[str, float]]([{}])
         if anew:  # from every setting of the scanned parameters of one of the effects, too
-            settings += itertools.chain.from_iterable(self.context.catalogue[name].settings for name in alone.names)
+            settings += itertools.chain.from_iterable(
+                self.context.catalogue[name].settings for name in alone.names
+            )
         wanted = [(alone.names, at.placed(at.widened(alone.unit), setting)) for setting in settings]
         return (wide_refit if anew else refit)(self.context, self.level, wanted, self.faults)
 

@@ -24,7 +24,9 @@ MISSED = 20.0  # factor by which scales that are not exact may miss p
 
 @dataclass(frozen=True, eq=False)
 class Disagreement:
-    """The tests at one fit: what each further effect would gain, what is left, and how often chance does as much."""
+    """The tests at one fit: what each further effect would gain, what is left, and how often chance
+    does as much.
+    """
 
     fit: Refit
     noise: Noise
@@ -36,12 +38,16 @@ class Disagreement:
 
     @property
     def root(self) -> np.ndarray:
-        """Rows (k, d) whose inverse products are the covariance of all that is free, in its coordinates."""
+        """Rows (k, d) whose inverse products are the covariance of all that is free, in its
+        coordinates.
+        """
         return self.projection.R if self.robust is None else self.robust
 
     @property
     def freedom(self) -> float:
-        """What standard errors stand on: samples, or blocks of them where what is left is no noise."""
+        """What standard errors stand on: samples, or blocks of them where what is left
+        is no noise.
+        """
         fitted = self.root.shape[1]
         if self.robust is None:
             return self.context.samples - fitted
@@ -123,22 +129,28 @@ class Disagreement:
     def faults(self) -> tuple[str, ...]:
         """The faults of the measurement that are not at their null.
 
-        None where the voltage is noisy: whatever smooths the calculated power would seem to be there.
+        None where the voltage is noisy: whatever smooths the calculated power would seem to be
+        there.
         """
         if self.noise.loudest_input_mode > BLURRED:
             return ()
-        return tuple(sorted(name for name, p in self.projection.fault_p().items() if p[0] < self.level))
+        return tuple(
+            sorted(name for name, p in self.projection.fault_p().items() if p[0] < self.level)
+        )
 
 
 def disagreement(base: BaseFit, seed: int) -> Disagreement:
     return examine_fit(base.quiet, base.fit, base.noise, seed)
 
 
-def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False) -> Disagreement:
-    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it as known.
+def examine_fit(
+    quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: bool = False
+) -> Disagreement:
+    """All tests at one fit, under the noise of what no candidate explains there; `plain` takes it
+    as known.
 
-    Taken as known the noise makes every test sharper: what even those do not doubt needs no draws that estimate it
-    anew, which cost a hundred times as much.
+    Taken as known the noise makes every test sharper: what even those do not doubt needs no draws
+    that estimate it anew, which cost a hundred times as much.
     """
     context = quiet.context
     t = tangent(context, fit, noise)
@@ -156,5 +168,7 @@ def examine_fit(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int, plain: b
     if not plain and result.doubtful:
         result = replace(result, chance=chance_at(t, projection, noise, quiet, seed, plain=False))
     if result.undecided:
-        result = replace(result, chance=replace(result.chance, scales=scales(t, projection, noise, seed)))
+        result = replace(
+            result, chance=replace(result.chance, scales=scales(t, projection, noise, seed))
+        )
     return result

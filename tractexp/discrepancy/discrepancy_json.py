@@ -1,4 +1,6 @@
-"""`discrepancy.json`: the investigation for machines, as the design fixes it, and the extended model for Hydra."""
+"""`discrepancy.json`: the investigation for machines, as the design fixes it, and the extended
+model for Hydra.
+"""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -39,12 +41,15 @@ def content(investigation: Findings) -> dict[str, Any]:
         "complete": investigation.verdict.complete,
         "reason": investigation.reason,
         "effects": list(dict.fromkeys(investigation.catalogue.textbook(investigation.names))),
-        "name_sets": [list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets],
+        "name_sets": [
+            list(investigation.catalogue.textbook(names)) for names in investigation.verdict.sets
+        ],
         "forms": by_name(forms(investigation)),
         "where": [asdict(place) for place in investigation.places],
         "gap": gaps(investigation),
         "contributions": [
-            {"effects": list(names), "model_error": files.plain(error)} for names, error in investigation.contributions
+            {"effects": list(names), "model_error": files.plain(error)}
+            for names, error in investigation.contributions
         ],
         "left": investigation.last.left,
         "nearest": _nearest(investigation),
@@ -53,7 +58,9 @@ def content(investigation: Findings) -> dict[str, Any]:
         "proposal": proposal_dict(investigation.proposed, PLUGIN),
         "no_proposal": investigation.proposed.why or None,
         "recommendation": recommendation(investigation),
-        "next_event": None if investigation.next_event is None else investigation.next_event.to_dict(),
+        "next_event": None
+        if investigation.next_event is None
+        else investigation.next_event.to_dict(),
         "base_adequacy": investigation.base_grade.adequacy.to_dict(),
         "adequacy": investigation.final_grade.adequacy.to_dict(),
         "held": investigation.held,
@@ -86,24 +93,40 @@ def recommendation(investigation: Findings) -> str:
         return recommend_confirmation(investigation)
     if investigation.verdict.word in (NAMED, CANDIDATE):
         if grade is not Grade.ADEQUATE:
-            return "find what is missing still: by further events, or with the extended model as the base model"
+            return (
+                "find what is missing still: by further events, or with the extended model as the"
+                " base model"
+            )
         held = investigation.held
-        rest = f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
+        rest = (
+            f"; these events cannot tell {join_words(list(held))}, which it holds" if held else ""
+        )
         return f"use the extended model{rest}; judge it on further events as they come"
-    return "use the base model; what is missing, if anything, is below the limits given for each effect"
+    return (
+        "use the base model; what is missing, if anything, is below the limits given for each"
+        " effect"
+    )
 
 
 def recommend_confirmation(findings: Findings) -> str:
     """Which event would confirm a candidate, as a sentence."""
     names, evidence = join_words(findings.names), findings.evidence
     if evidence.is_predicted:
-        return f"record a further event and hold it out, too: those held out took part in choosing {names}"
+        return (
+            "record a further event and hold it out, too: those held out took part in choosing"
+            f" {names}"
+        )
     expected = np.array(findings.train.by_event)
     most, shown = float(expected.max()), findings.context.criteria.shown
     deepest = findings.context.events[int(expected.argmax())].record.name
     if most - SPREAD * most**0.5 < shown:
-        return f"record a deeper dip than those fitted and hold it out: none of them shows {names} by itself"
-    gain = f"{names}, if right, gains a deviance of about {most:.0f} there, and {shown:g} confirms it"
+        return (
+            f"record a deeper dip than those fitted and hold it out: none of them shows {names} by"
+            " itself"
+        )
+    gain = (
+        f"{names}, if right, gains a deviance of about {most:.0f} there, and {shown:g} confirms it"
+    )
     if len(expected) > 1 and not findings.all_fitted:
         return f"hold out {deepest}, or a further dip as deep: {gain}"
     return f"record a further dip as deep as {deepest} and hold it out: {gain}"
@@ -111,15 +134,21 @@ def recommend_confirmation(findings: Findings) -> str:
 
 def parameters(investigation: Findings) -> dict[str, dict[str, float]]:
     """Parameters of the extended model, each with its standard error where the fit gives one."""
-    return {e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after}
+    return {
+        e.parameter.name: {"value": e.value, "standard_error": e.error} for e in investigation.after
+    }
 
 
 def gaps(investigation: Findings) -> dict[str, Any]:
-    """How far off the graded models are: the base model before, the one that the investigation ends with after.
+    """How far off the graded models are: the base model before, the one that the investigation ends
+    with after.
 
-    chi2 is that of the fits by which effects were ranked; None where there is none of the held-out events.
+    chi2 is that of the fits by which effects were ranked; None where there is none of the held-out
+    events.
     """
-    before, after = (investigation.misfits(one) for one in (investigation.base_grade, investigation.final_grade))
+    before, after = (
+        investigation.misfits(one) for one in (investigation.base_grade, investigation.final_grade)
+    )
     ranked = {"train": investigation.train, "validate": investigation.validate}
     rows: dict[str, Any] = {
         role: was and now and _graded_gap(was, now, ranked[role])
@@ -129,49 +158,76 @@ def gaps(investigation: Findings) -> dict[str, Any]:
 
 
 def _graded_gap(before: Misfit, after: Misfit, ranked: GapTest | None) -> dict[str, Any]:
-    was, now = (None, None) if ranked is None else (ranked.before.chi2_per_sample, ranked.after.chi2_per_sample)
+    was, now = (
+        (None, None)
+        if ranked is None
+        else (ranked.before.chi2_per_sample, ranked.after.chi2_per_sample)
+    )
     closed = share_closed(before.error, after.error)
-    return {"before": _misfit(before, was), "after": _misfit(after, now), "closed": files.plain(closed)}
+    return {
+        "before": _misfit(before, was),
+        "after": _misfit(after, now),
+        "closed": files.plain(closed),
+    }
 
 
 def _misfit(misfit: Misfit, chi2: float | None) -> dict[str, Any]:
     own = {} if misfit.epsilon_i is None else {"epsilon_i": misfit.epsilon_i}
     errors = {"epsilon_p": misfit.epsilon_p, "epsilon_q": misfit.epsilon_q}
-    return files.plain({"model_error": _error(misfit.error)} | errors | own | {"chi2_per_sample": chi2})
+    return files.plain(
+        {"model_error": _error(misfit.error)} | errors | own | {"chi2_per_sample": chi2}
+    )
 
 
 def _gap(before: Curves, after: Curves) -> dict[str, Any]:
-    return {"before": _curves(before), "after": _curves(after), "closed": files.plain(measure_closed_share(before, after))}
+    return {
+        "before": _curves(before),
+        "after": _curves(after),
+        "closed": files.plain(measure_closed_share(before, after)),
+    }
 
 
 def _nearest(investigation: Findings) -> dict[str, Any] | None:
-    """The set that comes nearest where nothing explains the disagreement, and what it makes of the gap."""
+    """The set that comes nearest where nothing explains the disagreement, and what it makes of the
+    gap.
+    """
     near = investigation.nearest
     if near is None:
         return None
     assert near.row.tests is not None
-    by_name = {e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)}
+    by_name = {
+        e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)
+    }
     on = {"train": near.curves, "validate": near.carried}
     return {
         "effects": list(near.names),
         "gap": {role: both and _gap(*both) for role, both in on.items()},
-        "others": [{"effects": list(names), "closed": files.plain(share)} for names, share in near.others],
-        "parameters": {p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)},
+        "others": [
+            {"effects": list(names), "closed": files.plain(share)} for names, share in near.others
+        ],
+        "parameters": {
+            p.name: by_name[p.name].plain() for p in investigation.catalogue.parameters(near.names)
+        },
     }
 
 
 def _remainder(investigation: Findings) -> dict[str, Any] | None:
-    """What is left where it is more than noise: its size, on held-out events where there are any, the share of the
-    base model's squared error that it is, how often chance leaves as much, which test it surprises most, and shapes.
+    """What is left where it is more than noise: its size, on held-out events where there are any,
+    the share of the base model's squared error that it is, how often chance leaves as much, which
+    test it surprises most, and shapes.
     """
     if investigation.verdict.complete:
         return None
     near, tests = investigation.nearest, investigation.tests
     nearest = near and (near.carried or near.curves)[1].error
-    before, after = (investigation.judged(one) for one in (investigation.base_grade, investigation.final_grade))
+    before, after = (
+        investigation.judged(one) for one in (investigation.base_grade, investigation.final_grade)
+    )
     return {
         "model_error": _error(nearest or after.error),
-        "share": files.plain(1 - share_closed(before.error, after.error)) if investigation.names else None,
+        "share": files.plain(1 - share_closed(before.error, after.error))
+        if investigation.names
+        else None,
         "p": tests.p_left,
         "where": tests.loudest,
         "sentence": investigation.headline,
@@ -183,7 +239,9 @@ def _remainder(investigation: Findings) -> dict[str, Any] | None:
 
 
 def _best_term(investigation: Findings) -> dict[str, Any] | None:
-    """The term of the library that predicts the held-out events best, where it was a rival of names."""
+    """The term of the library that predicts the held-out events best, where it was a rival of
+    names.
+    """
     best = investigation.evidence.term
     if best is None or best.prediction is None:
         return None
@@ -195,14 +253,18 @@ def _error(error: ModelError) -> dict[str, Any]:
 
 
 def write_left(investigation: Findings, path: Path) -> Path:
-    """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each channel."""
+    """Write what the best model leaves, measured less calculated [pu], as CSV: event, t [s], each
+    channel.
+    """
     drive, nearest = investigation.context.drive, investigation.nearest
     near = (investigation.train.after if nearest is None else nearest.curves[1]).calculated
     lines = [",".join(["event", "t", *drive.names])]
     for e, event in enumerate(investigation.context.events):
         left = drive.measured[:, drive.part(e)] - near[:, drive.part(e)]
         rows = list(zip(event.record.t, *left, strict=True))[event.first :]
-        lines += [",".join([quoting.csv(event.record.name), *(f"{x:.9g}" for x in row)]) for row in rows]
+        lines += [
+            ",".join([quoting.csv(event.record.name), *(f"{x:.9g}" for x in row)]) for row in rows
+        ]
     return files.write(path, "\n".join(lines) + "\n")
 
 
@@ -215,21 +277,38 @@ def write_plugin(investigation: Findings, path: Path) -> Path:
 def _curves(curves: Curves) -> dict[str, Any]:
     own = {} if curves.epsilon_i is None else {"epsilon_i": curves.epsilon_i}
     errors = {"epsilon_p": curves.epsilon_p, "epsilon_q": curves.epsilon_q}
-    return {"model_error": _error(curves.error)} | errors | own | {"chi2_per_sample": curves.chi2_per_sample}
+    return (
+        {"model_error": _error(curves.error)}
+        | errors
+        | own
+        | {"chi2_per_sample": curves.chi2_per_sample}
+    )
 
 
 def sets(investigation: Findings) -> list[dict[str, Any]]:
-    """The refitted sets that were compared, with the model's error on held-out events where that decided."""
+    """The refitted sets that were compared, with the model's error on held-out events where that
+    decided.
+    """
     rows, at = [], investigation.context.coordinates
     for set_evidence in investigation.evidence.rows:
         names = set_evidence.fit.names
         if not names:
             continue
         own = investigation.catalogue.parameters(names)
-        values = {p.name: {"value": at.value(p.name, set_evidence.fit.unit), "standard_error": None} for p in own}
+        values = {
+            p.name: {"value": at.value(p.name, set_evidence.fit.unit), "standard_error": None}
+            for p in own
+        }
         ratio = files.plain(set_evidence.lowered)
-        status = find_status(set_evidence, investigation.verdict, investigation.evidence, investigation.context)
-        row = {"effects": list(names), "status": status, "likelihood_ratio": ratio, "parameters": values}
+        status = find_status(
+            set_evidence, investigation.verdict, investigation.evidence, investigation.context
+        )
+        row = {
+            "effects": list(names),
+            "status": status,
+            "likelihood_ratio": ratio,
+            "parameters": values,
+        }
         predicted = set_evidence.prediction
         error = {} if predicted is None else {"model_error": predicted.error}
         rows.append(row | files.plain(error | {"evidence": _evidence(set_evidence)}))
@@ -256,7 +335,13 @@ def _singles(investigation: Findings) -> list[dict[str, Any]]:
             }
         ratio = None if j.score is None else files.plain(j.score.drop)
         rows.append(
-            {"effects": [j.name], "status": j.status, "why": j.why, "likelihood_ratio": ratio, "parameters": values}
+            {
+                "effects": [j.name],
+                "status": j.status,
+                "why": j.why,
+                "likelihood_ratio": ratio,
+                "parameters": values,
+            }
         )
     return rows
 
@@ -267,8 +352,12 @@ def use_of(domain: str, model: Path | str) -> str:
 
 
 def investigate_with(domain: str, model: Path | str) -> str:
-    """The command that investigates the model of a file as the base model, by the records and settings of this run."""
-    return build_again_command("task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task"))
+    """The command that investigates the model of a file as the base model, by the records and
+    settings of this run.
+    """
+    return build_again_command(
+        "task=discrepancy", *DOMAINS[domain].setting.split(), f"model={model}", of=("data", "task")
+    )
 
 
 def adopt_term(plugin: Path) -> str:
@@ -276,23 +365,34 @@ def adopt_term(plugin: Path) -> str:
     return quoting.shell("tractexp", "new", "effect", generate.NAME, "--from", str(plugin))
 
 
-def write_model(investigation: Findings, node: Mapping[str, Any], path: Path, home: Path | None = None) -> Path:
-    """Write the extended model with all that the investigation took into account, as a file that is a model by itself.
+def write_model(
+    investigation: Findings, node: Mapping[str, Any], path: Path, home: Path | None = None
+) -> Path:
+    """Write the extended model with all that the investigation took into account, as a file that is
+    a model by itself.
 
-    `node` is the base model: parts, bounds, fixed values and what else is not as usual. `home` is the path by which its
-    first line names the file, by default where it is written.
+    `node` is the base model: parts, bounds, fixed values and what else is not as usual. `home` is
+    the path by which its first line names the file, by default where it is written.
     """
     effects = sorted({*node.get("effects", ()), *investigation.names})
-    settings = {part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")}
+    settings = {
+        part: {k: v for k, v in node[part].items() if k != "name"} for part in ("motor", "static")
+    }
     held, window = investigation.held, recorder_window(investigation)
     extended: dict[str, Any] = {
-        "defaults": [{"motor": node["motor"]["name"]}, {"static": node["static"]["name"]}, "_self_"],
+        "defaults": [
+            {"motor": node["motor"]["name"]},
+            {"static": node["static"]["name"]},
+            "_self_",
+        ],
         "effects": effects,
         "bounds": {n: list(b) for n, b in node["bounds"].items()},
         "fixed": {**node["fixed"], **held},
     }
     extended |= {part: chosen for part, chosen in settings.items() if chosen}
-    extended |= {key: node[key] for key in ("integration", "domain", "substeps", "priors") if node.get(key)}
+    extended |= {
+        key: node[key] for key in ("integration", "domain", "substeps", "priors") if node.get(key)
+    }
     if window is not None:
         extended["window"] = window
     command = use_of(investigation.context.load.domain, (home or path).absolute())
@@ -301,12 +401,16 @@ def write_model(investigation: Findings, node: Mapping[str, Any], path: Path, ho
     return files.write(path, comments + quoting.yaml(extended))
 
 
-def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mapping[str, float]) -> list[str]:
+def _explain_model(
+    investigation: Findings, node: Mapping[str, Any], held: Mapping[str, float]
+) -> list[str]:
     """What the extended model is, and why it holds what it holds, a sentence each."""
     lines = [f"The base model with what was found missing: {join_words(investigation.names)}."]
     if not investigation.verdict.complete:
         left = investigation.judged(investigation.final_grade).error.value
-        lines.append(f"Something is missing still: it misses {in_percent(left)} of the load's response.")
+        lines.append(
+            f"Something is missing still: it misses {in_percent(left)} of the load's response."
+        )
     if (window := investigation.context.records.window) is not None:
         lines.append(f"window: {window.describe()}.")
     elif investigation.context.load.window is not None:
@@ -315,7 +419,8 @@ def _explain_model(investigation: Findings, node: Mapping[str, Any], held: Mappi
         lines.append(f"fixed {join_words(given)}: as in the base model.")
     if held:
         lines.append(
-            f"fixed {join_words(list(held))}: the events of the investigation cannot tell; leave out what yours can tell."
+            f"fixed {join_words(list(held))}: the events of the investigation cannot tell; leave"
+            " out what yours can tell."
         )
     return lines
 

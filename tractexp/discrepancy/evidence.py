@@ -1,10 +1,11 @@
-"""What is known of every set of effects: a table with a row for each set, whose columns the steps fill.
+"""What is known of every set of effects: a table with a row for each set, whose columns the steps
+fill.
 
-`rival_sets` fills `fit`, `lowered`, `behind`, `p_left`: the fit to the fitted events, what it gains, how far behind the
-best set it is, and how often chance leaves as much. `held_out` fills `final`, `gap`, `without`, `p_of_all` and
-`behind_of_all`: the fit that is told, what it and each of its members gain on the held-out events, and the same as
-before of a fit to all events. `incomplete` fills `prediction`: what it leaves of the held-out events, where every set
-leaves more than noise.
+`rival_sets` fills `fit`, `lowered`, `behind`, `p_left`: the fit to the fitted events, what it
+gains, how far behind the best set it is, and how often chance leaves as much. `held_out` fills
+`final`, `gap`, `without`, `p_of_all` and `behind_of_all`: the fit that is told, what it and each of
+its members gain on the held-out events, and the same as before of a fit to all events. `incomplete`
+fills `prediction`: what it leaves of the held-out events, where every set leaves more than noise.
 
 `decide` reads the numbers of this table and nothing else.
 """
@@ -29,8 +30,9 @@ LEAST_SQUARED_ERROR = 1e-12  # pu^2, the least squared error of a model without 
 class PredictedError:
     """What a fit leaves of the held-out events in S, in blocks of time.
 
-    `squares` (b,) is what is left in each block [pu^2], noise included; `noise` (b,) of that is expected of the noise,
-    and `response` (b,) is what the load did. `unit` (D,) are the coordinates on the held-out events.
+    `squares` (b,) is what is left in each block [pu^2], noise included; `noise` (b,) of that is
+    expected of the noise, and `response` (b,) is what the load did. `unit` (D,) are the coordinates
+    on the held-out events.
     """
 
     squares: np.ndarray
@@ -50,7 +52,9 @@ class PredictedError:
         return float(np.sqrt(self.left / max(self.response.sum(), 1e-30)))
 
     def is_clear_of(self, other: "Prediction") -> bool:
-        """Whether it leaves less by more than chance: a jackknife of the ratio's logarithm over the blocks."""
+        """Whether it leaves less by more than chance: a jackknife of the ratio's logarithm over the
+        blocks.
+        """
         assert isinstance(other, PredictedError)
         own_sum, other_sum = self.squares.sum(), other.squares.sum()
         if not np.isfinite(own_sum):
@@ -65,10 +69,11 @@ class PredictedError:
 
 @dataclass(frozen=True, eq=False)
 class PredictedDeviance:
-    """What a fit leaves of the deviance on the held-out events, where the base model leaves no more than the noise.
+    """What a fit leaves of the deviance on the held-out events, where the base model leaves no more
+    than the noise.
 
-    `beyond_chance` is what pushes into the balances would still gain; up to `least` that may be chance.
-    `is_rejected` tells whether the fitted events reject the set.
+    `beyond_chance` is what pushes into the balances would still gain; up to `least` that may be
+    chance. `is_rejected` tells whether the fitted events reject the set.
     """
 
     beyond_chance: float
@@ -86,7 +91,9 @@ class PredictedDeviance:
         return self.curves.error.value
 
     def is_clear_of(self, other: "Prediction") -> bool:
-        """Whether it leaves less by more than chance, or the fitted events reject the other alone."""
+        """Whether it leaves less by more than chance, or the fitted events reject the
+        other alone.
+        """
         assert isinstance(other, PredictedDeviance)
         gain = other.curves.deviance - self.curves.deviance
         return gain >= self.least or (other.is_rejected and not self.is_rejected)
@@ -99,8 +106,8 @@ Prediction = PredictedError | PredictedDeviance
 class SetEvidence:
     """What is known of one set of effects. A column that no step has filled has its default.
 
-    `names` are its effects with the faults of the measurement beside them, `family` its effects by the names of the
-    catalogue.
+    `names` are its effects with the faults of the measurement beside them, `family` its effects by
+    the names of the catalogue.
     """
 
     fit: Refit
@@ -108,9 +115,11 @@ class SetEvidence:
     family: Names
     lowered: float = np.nan  # by how much its deviance is below that of the base model
     behind: float = np.nan  # the best set of its size, of Akaike's criterion
-    p_left: float = np.nan  # how often chance leaves as much of the fitted events; nan where that was not asked
+    # how often chance leaves as much of the fitted events; nan where that was not asked
+    p_left: float = np.nan
     gap: GapTest | None = None  # on the held-out events
-    without: Mapping[str, GapTest] = field(default_factory=dict)  # against the set without each of several effects
+    # against the set without each of several effects
+    without: Mapping[str, GapTest] = field(default_factory=dict)
     p_of_all: float = 1.0  # how often chance leaves as much as a fit to all events does
     behind_of_all: float = 0.0  # the best fit to all events, of Akaike's criterion
     is_fitted_to_all: bool = False  # whether `final` is the fit to all events
@@ -121,7 +130,9 @@ class SetEvidence:
 
     @property
     def gaps(self) -> tuple[GapTest, ...]:
-        """What held-out events say of the set and of each of several effects; none where that was not asked."""
+        """What held-out events say of the set and of each of several effects; none where that was
+        not asked.
+        """
         return () if self.gap is None else (self.gap, *self.without.values())
 
     @property
@@ -138,18 +149,21 @@ class SetEvidence:
 
 @dataclass(frozen=True, eq=False)
 class Evidence:
-    """The table. `base` is the row of the base model alone, `rows` are those of the sets that are compared: the one
-    chosen by the search first, or those kept, then the best. `others` were fitted beside them, but are not told.
+    """The table. `base` is the row of the base model alone, `rows` are those of the sets that are
+    compared: the one chosen by the search first, or those kept, then the best. `others` were fitted
+    beside them, but are not told.
     """
 
     base: SetEvidence
     rows: tuple[SetEvidence, ...]
     others: tuple[SetEvidence, ...] = ()
-    term: SetEvidence | None = None  # that predicts best of the library of terms, where a set predicts well enough
+    # that predicts best of the library of terms, where a set predicts well enough
+    term: SetEvidence | None = None
     faults: Names = ()  # of the measurement, in every set
     noise: Noise | None = None  # under which all were fitted
     last: Disagreement | None = None  # the tests of the best set
-    there: Context | None = None  # the held-out events, where sets are compared by the model's error
+    # the held-out events, where sets are compared by the model's error
+    there: Context | None = None
 
     @property
     def every(self) -> Iterator[SetEvidence]:
@@ -158,7 +172,9 @@ class Evidence:
 
     @property
     def is_predicted(self) -> bool:
-        """Whether every set leaves more than noise, so that sets are judged by what they predict."""
+        """Whether every set leaves more than noise, so that sets are judged by what
+        they predict.
+        """
         return self.base.prediction is not None
 
     def row_of(self, names: Names) -> SetEvidence | None:
@@ -166,11 +182,17 @@ class Evidence:
         return next((row for row in self.every if row.fit.names == tuple(names)), None)
 
     def contributions(self, names: Names) -> list[SetEvidence]:
-        """The base model, then with one member more at a time, the one that helps most: what each is good for."""
+        """The base model, then with one member more at a time, the one that helps most: what each
+        is good for.
+        """
         steps, missing = [self.base], set(names)
         while missing:
             wanted = [tuple(sorted((*steps[-1].fit.names, name))) for name in missing]
-            found = [row for row in map(self.row_of, wanted) if row is not None and row.prediction is not None]
+            found = [
+                row
+                for row in map(self.row_of, wanted)
+                if row is not None and row.prediction is not None
+            ]
             if not found:
                 break
             steps.append(min(found, key=lambda row: row.predicted.left))

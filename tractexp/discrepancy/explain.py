@@ -1,4 +1,6 @@
-"""The verdict in words: the sentence, what comes nearest where nothing explains, and what to record next."""
+"""The verdict in words: the sentence, what comes nearest where nothing explains, and what to record
+next.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +42,8 @@ class Nearest:
     """Where nothing explains the disagreement: the set that comes nearest, and what it leaves."""
 
     row: SetEvidence
-    others: list[tuple[tuple[str, ...], float]]  # the next ones, and what share of the gap they close on fitted events
+    # the next ones, and what share of the gap they close on fitted events
+    others: list[tuple[tuple[str, ...], float]]
     curves: tuple[Curves, Curves]  # of the base model and with these, on the fitted events
     carried: tuple[Curves, Curves] | None  # on the held-out ones
 
@@ -50,12 +53,20 @@ class Nearest:
 
     @property
     def closed(self) -> tuple[float, float]:
-        """The share of the gap that is closed on the fitted and on the held-out events, nan without any."""
-        return measure_closed_share(*self.curves), measure_closed_share(*self.carried) if self.carried else np.nan
+        """The share of the gap that is closed on the fitted and on the held-out events, nan without
+        any.
+        """
+        return measure_closed_share(*self.curves), measure_closed_share(
+            *self.carried
+        ) if self.carried else np.nan
 
 
-def find_nearest_sets(verdict: Verdict, evidence: Evidence, validate: Sequence[Event]) -> Nearest | None:
-    """The best of the sets that were compared; None where something explains, or that is the base model."""
+def find_nearest_sets(
+    verdict: Verdict, evidence: Evidence, validate: Sequence[Event]
+) -> Nearest | None:
+    """The best of the sets that were compared; None where something explains, or that is the base
+    model.
+    """
     assert evidence.last is not None
     assert evidence.base.tests is not None
     context, rows = evidence.base.tests.context, evidence.rows[:MOST_NEAR]
@@ -68,8 +79,12 @@ def find_nearest_sets(verdict: Verdict, evidence: Evidence, validate: Sequence[E
     if validate:
         other, units, noise = carry_fits(context, validate, fits[:2])
         pair = curves(other, units[0], noise), curves(other, units[1], noise, fits[1].names)
-        there = pair if np.isfinite([one.deviance for one in pair]).all() else None  # else no steady state there
-    others = [(row.fit.names, measure_closed_share(before, one)) for row, one in zip(rows[1:], after[1:], strict=True)]
+        # else no steady state there
+        there = pair if np.isfinite([one.deviance for one in pair]).all() else None
+    others = [
+        (row.fit.names, measure_closed_share(before, one))
+        for row, one in zip(rows[1:], after[1:], strict=True)
+    ]
     return Nearest(rows[0], others, (before, after[0]), there)
 
 
@@ -84,9 +99,16 @@ def choose_next_event(verdict: Verdict, evidence: Evidence, context: Context) ->
 
 
 def explain(
-    verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context, *, all_fitted: bool = False
+    verdict: Verdict,
+    evidence: Evidence,
+    nearest: Nearest | None,
+    context: Context,
+    *,
+    all_fitted: bool = False,
 ) -> str:
-    """The sentence behind a verdict; `all_fitted` tells whether events were fitted that were to be held out."""
+    """The sentence behind a verdict; `all_fitted` tells whether events were fitted that were to be
+    held out.
+    """
     clauses = [_explain_word(verdict, evidence, nearest, context)]
     gaps = [row.gap for row in verdict.kept if row.gap is not None]
     if gaps and all(gap.is_mild for gap in gaps):
@@ -94,7 +116,9 @@ def explain(
     elif verdict.word == CANDIDATE:
         clauses.append(_explain_doubt(verdict.kept[0], evidence, all_fitted=all_fitted))
     if any(row.is_fitted_to_all for row in verdict.kept):
-        clauses.append("what the fitted events leave open of it was fitted to the held-out ones, too")
+        clauses.append(
+            "what the fitted events leave open of it was fitted to the held-out ones, too"
+        )
     if (window := context.records.window) is not None:
         clauses.append(f"{window.describe()}, which is taken into account")
     tests = evidence.base.tests if verdict.chosen is None else verdict.chosen.tests or evidence.last
@@ -103,10 +127,16 @@ def explain(
     return "; ".join(clauses)
 
 
-def _explain_word(verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context) -> str:
+def _explain_word(
+    verdict: Verdict, evidence: Evidence, nearest: Nearest | None, context: Context
+) -> str:
     sets = verdict.sets
     if evidence.there is not None:
-        return describe_prediction(verdict, evidence, context) if sets else explain_distance(evidence, context)
+        return (
+            describe_prediction(verdict, evidence, context)
+            if sets
+            else explain_distance(evidence, context)
+        )
     if evidence.is_predicted:
         return describe_deviance(verdict, evidence, context)
     if verdict.word in (NAMED, CANDIDATE):
@@ -121,7 +151,10 @@ def _explain_word(verdict: Verdict, evidence: Evidence, nearest: Nearest | None,
         return _explain_denial(verdict.word, seemed, adequate[0], context)
     if verdict.word == UNEXPLAINED:
         return "the fitted events alone show no disagreement, but all events together do"
-    return f"no disagreement above the noise, at a false-alarm rate of {context.criteria.false_alarms:.0%}"
+    return (
+        "no disagreement above the noise, at a false-alarm rate of"
+        f" {context.criteria.false_alarms:.0%}"
+    )
 
 
 def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) -> str:
@@ -129,9 +162,14 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
     if is_confirmed(row, evidence):
         return "the model with it does not describe this load, so it is no name"
     if evidence.is_predicted:
-        return "the fitted events alone put another set first, and no further event confirms the choice"
+        return (
+            "the fitted events alone put another set first, and no further event confirms the"
+            " choice"
+        )
     if all_fitted:
-        return "only all events together show it, so all were fitted, and none is left to confirm it"
+        return (
+            "only all events together show it, so all were fitted, and none is left to confirm it"
+        )
     if row.gap is None:
         return "no event was held out to confirm it"
     doubtful = [name for name, gap in row.without.items() if not gap.is_shown]
@@ -139,7 +177,9 @@ def _explain_doubt(row: SetEvidence, evidence: Evidence, *, all_fitted: bool) ->
 
 
 def label_effects(names: Sequence[str], context: Context) -> list[str]:
-    """Effects as a sentence tells them: by the names of the catalogue, and what differs from its law or place."""
+    """Effects as a sentence tells them: by the names of the catalogue, and what differs from its
+    law or place.
+    """
     return [context.catalogue.spoken(name) for name in names]
 
 
@@ -155,19 +195,28 @@ def _describe_name(names: Sequence[str], evidence: Evidence, context: Context) -
             else sentence
         )
     tested, comma = len(context.catalogue.candidates), "," if ", " in labels[0] else ""
-    rest = f"none of the {tested - 1} other effects tested does" if tested > 1 else "no other effect was tested"
+    rest = (
+        f"none of the {tested - 1} other effects tested does"
+        if tested > 1
+        else "no other effect was tested"
+    )
     return f"{labels[0]}{comma} explains the disagreement, and {rest}"
 
 
 def _describe_tie(sets: Sequence[Sequence[str]]) -> str:
     """Several explanations, told as the alternatives they are."""
     each = "either" if len(sets) == 2 else "each"
-    return f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them apart"
+    return (
+        f"{alternatives(sets)}: {each} explains the disagreement, and these events cannot tell them"
+        " apart"
+    )
 
 
 def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) -> str:
     """What the sets explain on the held-out events, and what became of the others."""
-    shares = list_figures([row.gap.explained for row in verdict.kept if row.gap is not None], percent)
+    shares = list_figures(
+        [row.gap.explained for row in verdict.kept if row.gap is not None], percent
+    )
     labels = alternatives([label_effects(names, context) for names in verdict.sets])
     others = sum(bool(context.criteria.rejects(row.behind)) for row in evidence.rows)
     verb = "explains" if len(verdict.kept) == 1 and len(verdict.names) == 1 else "explain"
@@ -182,14 +231,17 @@ def describe_deviance(verdict: Verdict, evidence: Evidence, context: Context) ->
 
 
 def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) -> str:
-    """How far the sets that predict best, the base model and the next set are off on the held-out events."""
+    """How far the sets that predict best, the base model and the next set are off on the held-out
+    events.
+    """
     chosen = verdict.kept
     first = chosen[0]
     size, most = len(first.fit.names), first.predicted.left
     rest = [
-        row for row in rank_sets(evidence, context.criteria)
+        row
+        for row in rank_sets(evidence, context.criteria)
         if len(row.fit.names) <= size and row not in chosen and row.predicted.left > most
-    ]  # fmt: skip  # what leaves less does so by chance
+    ]  # what leaves less does so by chance
     worse = [f"the base model misses {_size(evidence.base)}"]
     if rest:
         following = join_words(label_effects(rest[0].names, context))
@@ -199,19 +251,30 @@ def describe_prediction(verdict: Verdict, evidence: Evidence, context: Context) 
     off = list_figures([row.predicted.error for row in chosen], in_percent)
     if len(chosen) > 1:
         sentence = (
-            f"{labels}: they predict the held-out events within {off} of the response, which cannot tell them apart"
+            f"{labels}: they predict the held-out events within {off} of the response, which cannot"
+            " tell them apart"
         )
     else:
-        sentence = f"{labels} {'predicts' if size == 1 else 'predict'} the held-out events within {off} of the response"
-    return f"{sentence}, where {join_words(worse)}{_describe_shared(first, evidence, context)}; {CHOSEN_BY}"
+        sentence = (
+            f"{labels} {'predicts' if size == 1 else 'predict'} the held-out events within {off} of"
+            " the response"
+        )
+    return (
+        f"{sentence}, where {join_words(worse)}{_describe_shared(first, evidence, context)};"
+        f" {CHOSEN_BY}"
+    )
 
 
 def _describe_shared(chosen: SetEvidence, evidence: Evidence, context: Context) -> str:
-    """Of a name that does not divide the error by as much as names must: what the best of all sets misses, which has
-    it, as the end of a sentence."""
+    """Of a name that does not divide the error by as much as names must: what the best of all sets
+    misses, which has it, as the end of a sentence.
+    """
     if divides(chosen, evidence.base, context.criteria.divides):
         return ""
-    best = min((row for row in evidence.every if row.prediction is not None), key=lambda row: row.predicted.left)
+    best = min(
+        (row for row in evidence.every if row.prediction is not None),
+        key=lambda row: row.predicted.left,
+    )
     labels = join_words(label_effects(best.names, context))
     return f"; {labels} miss {_size(best)}, the least, and all sets that come near have it"
 
@@ -223,9 +286,16 @@ def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) 
     chance = f"would come about by chance with a probability of {by_draws(best.p_left)}"
     loudest = f"the most surprised of the tests looks for {best.tests.loudest}"
     if nearest is None and not evidence.faults:
-        return f"{_deny_all(context)} helps more than chance does: what the base model leaves {chance}; {loudest}"
+        return (
+            f"{_deny_all(context)} helps more than chance does: what the base model leaves"
+            f" {chance}; {loudest}"
+        )
     names, faults = label_effects(best.fit.names, context), label_effects(evidence.faults, context)
-    sentence = f"{join_words(names)} beside {join_words(faults)}" if names and faults else join_words(names or faults)
+    sentence = (
+        f"{join_words(names)} beside {join_words(faults)}"
+        if names and faults
+        else join_words(names or faults)
+    )
     ending = "s" if len(names or faults) == 1 else ""
     share = f"help{ending}"
     if nearest and np.isfinite(nearest.closed[0]):
@@ -235,7 +305,9 @@ def explain_rest(evidence: Evidence, nearest: Nearest | None, context: Context) 
 
 
 def explain_distance(evidence: Evidence, context: Context) -> str:
-    """How far the set that predicts the held-out events best is from dividing what the base model leaves of them."""
+    """How far the set that predicts the held-out events best is from dividing what the base model
+    leaves of them.
+    """
     criteria, bare = context.criteria, _size(evidence.base)
     near = find_nearest(evidence, criteria)
     if not near.fit.names:
@@ -250,8 +322,15 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
     why = f"a name must divide that by {criteria.divides:g}"
     if divides(near, evidence.base, criteria.divides):
         needed = needs_all(near, evidence, criteria)
-        why = "that may be chance in so few blocks" if needed else "one of them alone does hardly worse"
-    none = f"{_deny_all(context, len(near.names))} predicts the held-out events well enough to be named"
+        why = (
+            "that may be chance in so few blocks"
+            if needed
+            else "one of them alone does hardly worse"
+        )
+    none = (
+        f"{_deny_all(context, len(near.names))} predicts the held-out events well enough to be"
+        " named"
+    )
     misses = f"{'misses' if len(near.names) == 1 else 'miss'} {_size(near)} of the response there"
     return f"{none}: {labels}, the nearest, {misses}, where the base model misses {bare}; {why}"
 
@@ -259,7 +338,10 @@ def explain_distance(evidence: Evidence, context: Context) -> str:
 def _describe_term(evidence: Evidence) -> str:
     """What the best term is, and how far it is off, as the end of a sentence."""
     assert evidence.term is not None
-    return f"the best term of the library ({term(evidence.term.names[0]).words}) {_size(evidence.term)}"
+    return (
+        f"the best term of the library ({term(evidence.term.names[0]).words})"
+        f" {_size(evidence.term)}"
+    )
 
 
 def _size(row: SetEvidence) -> str:
@@ -268,7 +350,9 @@ def _size(row: SetEvidence) -> str:
 
 
 def _deny_all(context: Context, most: int = 1) -> str:
-    """How a sentence begins that says what no effect does, nor a set of so many where the nearest is one."""
+    """How a sentence begins that says what no effect does, nor a set of so many where the nearest
+    is one.
+    """
     together = f", alone or up to {most} together," if most > 1 else ""
     tested = len(context.catalogue.candidates)
     return f"the model and the records disagree, and none of the {tested} effects tested{together}"
@@ -278,11 +362,14 @@ def _explain_denial(word: str, seemed: str, best: SetEvidence, context: Context)
     """What the held-out events have against the explanations of the fitted ones."""
     if word == NONE:
         return (
-            f"what seemed to help on the fitted events, {seemed}, is not borne out by the held-out ones, and what the"
+            f"what seemed to help on the fitted events, {seemed}, is not borne out by the held-out"
+            " ones, and what the"
             " base model leaves is no more than chance leaves"
         )
     why = _describe_objection(best, context)
-    return f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {why}"
+    return (
+        f"what explains the fitted events, {seemed}, is not borne out by the held-out ones: {why}"
+    )
 
 
 def _describe_objection(best: SetEvidence, context: Context) -> str:
@@ -290,7 +377,10 @@ def _describe_objection(best: SetEvidence, context: Context) -> str:
     if best.gap.is_denied:
         return "there it fits no better than the base model"
     if needless := [name for name, gap in best.without.items() if gap.is_denied]:
-        return f"there it fits no better than without {join_words(label_effects(needless, context), 'or')}"
+        return (
+            "there it fits no better than without"
+            f" {join_words(label_effects(needless, context), 'or')}"
+        )
     return (
         "what a fit to all events together leaves would come about by chance with a probability of"
         f" {by_draws(best.p_of_all)}"

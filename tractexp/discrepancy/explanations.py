@@ -1,7 +1,8 @@
-"""Which effects: candidates scored, the best refitted, and one more added as long as chance cannot explain the gain.
+"""Which effects: candidates scored, the best refitted, and one more added as long as chance cannot
+explain the gain.
 
-Subsets are ranked exhaustively on the linearised problem, because forward selection alone stalls where effects
-look alike; the shortlist is refitted nonlinearly from several starts, side by side.
+Subsets are ranked exhaustively on the linearised problem, because forward selection alone stalls
+where effects look alike; the shortlist is refitted nonlinearly from several starts, side by side.
 """
 
 import itertools
@@ -17,7 +18,13 @@ from tractexp.discrepancy.window_search import behind_window
 from tractexp.inference.base_fit import BaseFit
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fit_effort import BOX_APART, BOX_POINTS, BOX_STARTS, NEAR_BEST, NESTED_TOLERANCE
+from tractexp.inference.fit_effort import (
+    BOX_APART,
+    BOX_POINTS,
+    BOX_STARTS,
+    NEAR_BEST,
+    NESTED_TOLERANCE,
+)
 from tractexp.inference.fitting import (
     Names,
     Refit,
@@ -28,13 +35,14 @@ from tractexp.inference.fitting import (
     refit,
     rough_refit,
     wide_refits,
-)  # fmt: skip
+)
 from tractexp.inference.multistart import DISTINCT
 from tractexp.inference.score_test import Score
 from tractexp.noise import Noise
 from tractexp.parameter import best_distinct, even
 
-MOST_EFFECTS = 2  # of some 3,000 data sets that were judged, three named four times, and never the right ones
+# of some 3,000 data sets that were judged, three named four times, and never the right ones
+MOST_EFFECTS = 2
 MOST_STEPS = 6  # of adding and leaving out
 SHORTLIST = {1: 10, 2: 8}  # sets of each size that are refitted
 COMBINED = 14  # effects whose sets are ranked exhaustively
@@ -49,7 +57,9 @@ Refits = Mapping[Names, Refit]
 
 @dataclass(frozen=True, eq=False)
 class Explanations:
-    """The tests before the first effect, after the first, and so on, and the best fit of every set that was tried."""
+    """The tests before the first effect, after the first, and so on, and the best fit of every set
+    that was tried.
+    """
 
     base: BaseFit
     steps: tuple[Disagreement, ...]
@@ -71,12 +81,17 @@ class Explanations:
 
     @property
     def empty(self) -> bool:
-        """Whether neither an effect of the load nor a fault of the measurement helps more than chance."""
+        """Whether neither an effect of the load nor a fault of the measurement helps more than
+        chance.
+        """
         return not self.chosen.names and not self.faults
 
 
-def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: bool = False) -> Explanations:
-    """Add effects one by one as long as the best one helps more than chance, searching all sets of each size.
+def explanations(
+    base: BaseFit, first: Disagreement, seed: int, window_settled: bool = False
+) -> Explanations:
+    """Add effects one by one as long as the best one helps more than chance, searching all sets of
+    each size.
 
     Begun anew behind the recorder's window, where one takes the place of faults of the measurement.
     """
@@ -87,7 +102,9 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
         ground = beneath(first, steps[-1].fit) if size > 1 else first
         fits = search_effect_sets([ground, *steps[1:]], refits, size, base.context.effort.say)
         refits |= {f.names: f for f in fits}
-        if not window_settled and (behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)):
+        if not window_settled and (
+            behind := behind_window(base, first.fit, fits[0], steps[-1].noise, seed)
+        ):
             return explanations(behind, disagreement(behind, seed), seed, window_settled=True)
         tests = sufficient(base, fits, steps[-1].noise, seed + size)
         if size == 1:
@@ -106,33 +123,49 @@ def explanations(base: BaseFit, first: Disagreement, seed: int, window_settled: 
 
 
 def worth_another(steps: Sequence[Disagreement]) -> bool:
-    """Whether one more effect is tried beside those of the last tests; not where one led back to the same set."""
+    """Whether one more effect is tried beside those of the last tests; not where one led back to
+    the same set.
+    """
     same = len(steps) > 1 and steps[-2].fit.names == steps[-1].fit.names
     return len(steps[-1].fit.names) < MOST_EFFECTS and not same
 
 
-def without_needless(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
-    """The tests with an effect less, where its size at the null costs no more than a further name must gain.
+def without_needless(
+    base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int
+) -> Disagreement:
+    """The tests with an effect less, where its size at the null costs no more than a further name
+    must gain.
 
-    A larger set may have led to a better place of its own subset than any start of that. Adds to `refits`.
+    A larger set may have led to a better place of its own subset than any start of that. Adds to
+    `refits`.
     """
     fit, context = tests.fit, base.context
     at = context.coordinates
     if len(fit.names) < 2:
         return tests
-    wanted = [(tuple(n for n in fit.names if n != left), at.without(fit.unit, [left])) for left in fit.names]
+    wanted = [
+        (tuple(n for n in fit.names if n != left), at.without(fit.unit, [left]))
+        for left in fit.names
+    ]
     fewer = refit(context, tests.noise, wanted)[0]
-    gained, parameters = max(fewer.deviance - fit.deviance, 0.0), max(fit.parameters - fewer.parameters, 1)
+    gained, parameters = (
+        max(fewer.deviance - fit.deviance, 0.0),
+        max(fit.parameters - fewer.parameters, 1),
+    )
     if chdtrc(parameters, gained) < context.criteria.further_name_p:
         return tests
     refits[fewer.names] = fewer
     return without_needless(base, examine_fit(base.quiet, fewer, tests.noise, seed), refits, seed)
 
 
-def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int) -> Disagreement:
-    """The tests at a member of a family that leaves nothing and explains more than these; else these. Adds to `refits`.
+def with_families(
+    base: BaseFit, tests: Disagreement, refits: dict[Names, Refit], seed: int
+) -> Disagreement:
+    """The tests at a member of a family that leaves nothing and explains more than these; else
+    these. Adds to `refits`.
 
-    None is tried at a `further_name_p` of 0, and none of waveforms: no criterion was calibrated with members.
+    None is tried at a `further_name_p` of 0, and none of waveforms: no criterion was calibrated
+    with members.
     """
     if not base.context.domain.calibrated or not base.context.criteria.further_name_p:
         return tests
@@ -141,9 +174,11 @@ def with_families(base: BaseFit, tests: Disagreement, refits: dict[Names, Refit]
     return tests
 
 
-def search_effect_sets(steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]) -> list[Refit]:
-    """The most promising sets of one size refitted, single effects from all over the base model's box, too; the best
-    first. `steps` begin with one without effects.
+def search_effect_sets(
+    steps: Sequence[Disagreement], refits: Refits, size: int, say: Callable[[str], None]
+) -> list[Refit]:
+    """The most promising sets of one size refitted, single effects from all over the base model's
+    box, too; the best first. `steps` begin with one without effects.
     """
     context, noise = steps[0].context, steps[-1].noise
     if not (wanted := shortlist(steps, size)):
@@ -154,7 +189,9 @@ def search_effect_sets(steps: Sequence[Disagreement], refits: Refits, size: int,
     if size == 1:
         boxes = each_apart(lambda fit: in_the_box(context, fit), fits, context.effort)
         fits = best_of([*fits, *refit_sets(context, noise, list(itertools.chain(*boxes)))])
-    return best_of(no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits))
+    return best_of(
+        no_worse_than_subsets(context, noise, {**refits, **{f.names: f for f in fits}}, fits)
+    )
 
 
 def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[Refit]:
@@ -166,14 +203,18 @@ def refit_sets(context: Context, noise: Noise, begin: Sequence[Start]) -> list[R
 
 
 def beneath(first: Disagreement, fit: Refit) -> Disagreement:
-    """The tests of the base model in the valley of a fit with an effect, where its best fit lies in another."""
+    """The tests of the base model in the valley of a fit with an effect, where its best fit lies in
+    another.
+    """
     context = first.context
     bare = refit(context, first.noise, [((), context.coordinates.without(fit.unit, fit.names))])[0]
     away = np.linalg.norm((bare.unit - first.fit.unit)[context.coordinates.base])
     return first.at(context, bare, first.noise) if away > DISTINCT else first
 
 
-def searched_widely(base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement) -> list[Refit]:
+def searched_widely(
+    base: BaseFit, first: Disagreement, refits: Refits, best: Disagreement
+) -> list[Refit]:
     """Single effects that have thresholds or times, searched from all their settings.
 
     None where the best so far leaves nothing.
@@ -187,24 +228,36 @@ def searched_widely(base: BaseFit, first: Disagreement, refits: Refits, best: Di
 
 
 def wide_starts(context: Context, bare: np.ndarray, refits: Refits) -> list[list[Start]]:
-    """Starts for each single effect that has thresholds or times: its fit, and all settings beside the base model."""
+    """Starts for each single effect that has thresholds or times: its fit, and all settings beside
+    the base model.
+    """
     singles = [f for f in refits.values() if len(f.names) == 1]
     unlike = [f for f in singles if len(context.catalogue[f.names[0]].settings) > 1]
     grounds = bare, *off_bounds(context, bare)
-    return [[(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))] for f in unlike]
+    return [
+        [(f.names, f.unit), *(s for unit in grounds for s in _every_setting(context, f, unit))]
+        for f in unlike
+    ]
 
 
 def _every_setting(context: Context, fit: Refit, unit: np.ndarray) -> list[Start]:
-    """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all its settings."""
+    """Starts for a single effect at coordinates (D,): of the size that it was fitted with, at all
+    its settings.
+    """
     at, sized = context.coordinates, unit.copy()
     sized[at.sizes(fit.names)] = fit.unit[at.sizes(fit.names)]
-    return [(fit.names, at.placed(sized, setting)) for setting in context.catalogue[fit.names[0]].settings]
+    return [
+        (fit.names, at.placed(sized, setting))
+        for setting in context.catalogue[fit.names[0]].settings
+    ]
 
 
 def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) -> Disagreement:
-    """The tests at the best fit, or at the first of those close to it that asks for no further effect where it does.
+    """The tests at the best fit, or at the first of those close to it that asks for no further
+    effect where it does.
 
-    Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the better.
+    Formulas are not the physics: of two that fit nearly alike, the one that needs no patch is the
+    better.
     """
     best = examine_fit(base.quiet, ranked[0], noise, seed)
     if not best.asks_for_more:
@@ -217,7 +270,9 @@ def sufficient(base: BaseFit, ranked: Sequence[Refit], noise: Noise, seed: int) 
 
 
 def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
-    """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by adding one."""
+    """The sets of `size` effects that lower the linearised deviance most: from the base fit, and by
+    adding one.
+    """
     first, last = steps[0], steps[-1]
     sets: dict[Names, float] = {}
     for score in last.scores[: SHORTLIST[size]]:
@@ -236,11 +291,15 @@ def shortlist(steps: Sequence[Disagreement], size: int) -> list[Names]:
 def _column(at: Disagreement, score: Score) -> np.ndarray:
     """The projected column of a candidate at its best setting."""
     pairs = zip(at.tangent.columns, at.projection.blocks, strict=True)
-    return next(b for c, b in pairs if c.candidate.name == score.name and c.setting == score.setting)
+    return next(
+        b for c, b in pairs if c.candidate.name == score.name and c.setting == score.setting
+    )
 
 
 def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[Start]:
-    """Starts for one set: each subset's fit with the others at their one-step size, at their best two settings."""
+    """Starts for one set: each subset's fit with the others at their one-step size, at their best
+    two settings.
+    """
     begin: list[Start] = []
     for left in names:
         rest = tuple(n for n in names if n != left)
@@ -250,17 +309,19 @@ def starts(steps: Sequence[Disagreement], refits: Refits, names: Names) -> list[
         for rank in range(RANKS):
             point = from_fit.unit
             for name in missing:
-                point = _place_candidate(at if name in {s.name for s in at.scores} else steps[0], name, rank, point)
+                point = _place_candidate(
+                    at if name in {s.name for s in at.scores} else steps[0], name, rank, point
+                )
             begin.append((names, point))
     return begin
 
 
 def in_the_box(context: Context, fit: Refit) -> list[Start]:
-    """Starts of one effect from all over the base model's box, by one simulation each: the effect as it was fitted, but
-    of relevant size.
+    """Starts of one effect from all over the base model's box, by one simulation each: the effect
+    as it was fitted, but of relevant size.
 
-    Where an effect is missing, a wrong valley of the base model may fit better than the right one. There a right effect
-    may have no size at all.
+    Where an effect is missing, a wrong valley of the base model may fit better than the right one.
+    There a right effect may have no size at all.
     """
     at, candidate = context.coordinates, context.catalogue[fit.names[0]]
     points = even(BOX_POINTS, len(at.base))

@@ -1,9 +1,11 @@
-"""Members of families: the kind of a textbook effect at another place, or its place with another law.
+"""Members of families: the kind of a textbook effect at another place, or its place with another
+law.
 
-All are tried beside the best single textbook effect, whether or not that leaves nothing: a wrong formula may suffice
-where the right one is that of a member. A member that leaves nothing takes its place where it explains more beyond what
-its further parameters cost, or where it fits nearly as well and the textbook effect leaves something. Beside an effect
-that suffices those that were searched are rivals, whether or not they explain more.
+All are tried beside the best single textbook effect, whether or not that leaves nothing: a wrong
+formula may suffice where the right one is that of a member. A member that leaves nothing takes its
+place where it explains more beyond what its further parameters cost, or where it fits nearly as
+well and the textbook effect leaves something. Beside an effect that suffices those that were
+searched are rivals, whether or not they explain more.
 """
 
 import itertools
@@ -28,10 +30,11 @@ BEGUN = 0.5  # smallest relevant sizes at which a size without a textbook value 
 def against_members(
     base: BaseFit, tests: Disagreement, refits: Mapping[Names, Refit], seed: int
 ) -> tuple[Disagreement, list[Refit]]:
-    """The tests at the best member that leaves nothing and takes the place of the best textbook effect, or `tests`.
+    """The tests at the best member that leaves nothing and takes the place of the best textbook
+    effect, or `tests`.
 
-    With the fits of the members that are held against it: none where neither leaves nothing, since what no effect has
-    a member imitates best, nor where nothing is missing.
+    With the fits of the members that are held against it: none where neither leaves nothing, since
+    what no effect has a member imitates best, nor where nothing is missing.
     """
     if tests.suffices and not tests.fit.names:
         return tests, []
@@ -49,7 +52,7 @@ def against_members(
 
 def member_fits(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], families: Container[str]
-) -> list[Refit]:  # fmt: skip
+) -> list[Refit]:
     """Members of some families, the nearest of them searched to the end; the best first."""
     members = [m for m in context.catalogue.members if m.effect.family in families]
     if not members or not context.domain.calibrated:
@@ -60,25 +63,33 @@ def member_fits(
 
 
 def worth(member: Refit, textbook: Refit, p: float) -> bool:
-    """Whether a member explains more than the best textbook effect by more than its further parameters cost."""
+    """Whether a member explains more than the best textbook effect by more than its further
+    parameters cost.
+    """
     further = max(member.parameters - textbook.parameters, 1)
     gained = textbook.deviance - member.deviance
     return gained > 0 and float(chdtrc(further, gained)) < p
 
 
 def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -> list[Start]:
-    """Starts of a member: from the textbook's fit, with every setting that it leaves open and its size told whole or
-    shared, and where the member does not nest that, from the base model's with every setting, since the textbook's fit
-    may have gone astray."""
+    """Starts of a member: from the textbook's fit, with every setting that it leaves open and its
+    size told whole or shared, and where the member does not nest that, from the base model's with
+    every setting, since the textbook's fit may have gone astray.
+    """
     at, effect, bare = context.coordinates, member.effect, refits[()].unit
     textbook = refits.get((effect.family,)) if effect.as_textbook else None
     begun: list[tuple[np.ndarray, dict[str, float]]] = []
     if textbook is not None:
         ground = at.without(textbook.unit, [effect.family])
-        textbook_values = {own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()}
+        textbook_values = {
+            own: at.value(theirs, textbook.unit) for own, theirs in effect.as_textbook.items()
+        }
         begun += [
             (ground, textbook_values),
-            *((ground, textbook_values | shared) for shared in _share_textbook_size(member, textbook_values)),
+            *(
+                (ground, textbook_values | shared)
+                for shared in _share_textbook_size(member, textbook_values)
+            ),
         ]
     if textbook is None or not effect.nests_textbook:
         begun += [(unit, {}) for unit in (bare, *off_bounds(context, bare))]
@@ -93,15 +104,20 @@ def starts(context: Context, member: Candidate, refits: Mapping[Names, Refit]) -
     return wanted
 
 
-def _share_textbook_size(member: Candidate, textbook_values: Mapping[str, float]) -> list[dict[str, float]]:
-    """The textbook's size in equal parts, where a member has further sizes: a small second one beside the whole first
-    may end as a patch of it. None where it has no further one."""
+def _share_textbook_size(
+    member: Candidate, textbook_values: Mapping[str, float]
+) -> list[dict[str, float]]:
+    """The textbook's size in equal parts, where a member has further sizes: a small second one
+    beside the whole first may end as a patch of it. None where it has no further one.
+    """
     mine = [textbook_values[p.name] for p in member.sizes if p.name in textbook_values]
     part = sum(mine) / len(member.sizes)
     return [{p.name: part for p in member.sizes}] if 0 < len(mine) < len(member.sizes) else []
 
 
 def open_settings(member: Candidate, start: Sequence[str]) -> list[dict[str, float]]:
-    """Every combination of the scanned values of the parameters that the textbook's fit does not tell."""
+    """Every combination of the scanned values of the parameters that the textbook's fit does not
+    tell.
+    """
     grid = {name: values for name, values in member.effect.grid.items() if name not in start}
     return [dict(zip(grid, choice, strict=True)) for choice in itertools.product(*grid.values())]

@@ -1,4 +1,6 @@
-"""The form of each effect named: where it acts, what it does there, and by which law, with the curve found."""
+"""The form of each effect named: where it acts, what it does there, and by which law, with the
+curve found.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -17,7 +19,9 @@ SLOPE_STEP = 0.05  # of a standard error: the step by which a curve's slopes are
 
 @dataclass(frozen=True, eq=False)
 class FittedLaw:
-    """A law as it was found: `curve`, its 95 % band (2, n), and the `textbook` law that fits best, (n,)."""
+    """A law as it was found: `curve`, its 95 % band (2, n), and the `textbook` law that fits best,
+    (n,).
+    """
 
     curve: Curve
     band: np.ndarray
@@ -26,7 +30,9 @@ class FittedLaw:
 
 @dataclass(frozen=True, eq=False)
 class EffectForm:
-    """One effect named: `name` is the catalogue's, `effect` the member of its family that is in the model."""
+    """One effect named: `name` is the catalogue's, `effect` the member of its family that is in the
+    model.
+    """
 
     name: str
     effect: Effect
@@ -46,18 +52,26 @@ class EffectForm:
             "law": self.law,
             "differs": self.effect.differs,
             "effect": self.effect.name,
-            "curve": law and {
-                "x": law.curve.x.tolist(), "y": law.curve.y.tolist(), "lower": law.band[0].tolist(),
-                "upper": law.band[1].tolist(), "textbook": law.textbook.tolist(),
-                "x_label": law.curve.x_label, "y_label": law.curve.y_label,
+            "curve": law
+            and {
+                "x": law.curve.x.tolist(),
+                "y": law.curve.y.tolist(),
+                "lower": law.band[0].tolist(),
+                "upper": law.band[1].tolist(),
+                "textbook": law.textbook.tolist(),
+                "x_label": law.curve.x_label,
+                "y_label": law.curve.y_label,
             },
-        }  # fmt: skip
+        }
 
 
 def forms(findings: Findings) -> list[EffectForm]:
     """The form of each effect of the verdict."""
     at = findings.catalogue
-    return [EffectForm(at.family(name), at[name].effect, _curve(findings, at[name].effect)) for name in findings.names]
+    return [
+        EffectForm(at.family(name), at[name].effect, _curve(findings, at[name].effect))
+        for name in findings.names
+    ]
 
 
 def by_name(forms: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
@@ -69,7 +83,9 @@ def by_name(forms: Sequence[EffectForm]) -> dict[str, dict[str, Any]]:
 
 
 def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
-    """The law found with its band, by the slopes of the curve along the parameters; None of what is no curve."""
+    """The law found with its band, by the slopes of the curve along the parameters; None of what is
+    no curve.
+    """
     at, unit, tests = findings.context.coordinates, findings.extended.unit, findings.tests
     values = {p.name: at.value(p.name, unit) for p in effect.parameters}
     curve = effect.curve(**values)
@@ -77,9 +93,17 @@ def _curve(findings: Findings, effect: Effect) -> FittedLaw | None:
         return None
     names, spread = covariance(tests, list(values))
     free = [k for k in range(len(names)) if spread[k, k] > 0]
-    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in free]).reshape(-1, len(curve.y))
-    half = interval_factor(tests.freedom) * np.sqrt(np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J))
-    return FittedLaw(curve, np.stack([curve.y - half, curve.y + half]), _textbook(findings, effect, values, curve))
+    J = np.array([_slope(effect, values, names[k], spread[k, k] ** 0.5) for k in free]).reshape(
+        -1, len(curve.y)
+    )
+    half = interval_factor(tests.freedom) * np.sqrt(
+        np.einsum("kn,kl,ln->n", J, spread[np.ix_(free, free)], J)
+    )
+    return FittedLaw(
+        curve,
+        np.stack([curve.y - half, curve.y + half]),
+        _textbook(findings, effect, values, curve),
+    )
 
 
 def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float) -> np.ndarray:
@@ -91,10 +115,17 @@ def _slope(effect: Effect, values: Mapping[str, float], name: str, error: float)
     return (up.y - down.y) / (2 * h)
 
 
-def _textbook(findings: Findings, effect: Effect, values: Mapping[str, float], curve: Curve) -> np.ndarray:
-    """The textbook's law (n,) as it fitted these events, beside the curve found; the shapes at their defaults."""
+def _textbook(
+    findings: Findings, effect: Effect, values: Mapping[str, float], curve: Curve
+) -> np.ndarray:
+    """The textbook's law (n,) as it fitted these events, beside the curve found; the shapes at
+    their defaults.
+    """
     default = {p.name: p.default for p in effect.parameters}
-    at, fit = findings.context.coordinates, findings.explanations.refits.get((effect.family or effect.name,))
+    at, fit = (
+        findings.context.coordinates,
+        findings.explanations.refits.get((effect.family or effect.name,)),
+    )
     start = dict(values)
     if effect.as_textbook and fit is not None:
         start |= {own: at.value(theirs, fit.unit) for own, theirs in effect.as_textbook.items()}

@@ -1,4 +1,6 @@
-"""The gap between simulation and measurement, the model's error, before and after an effect is added."""
+"""The gap between simulation and measurement, the model's error, before and after an effect is
+added.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,16 +16,20 @@ from tractexp.inference.model_error import ModelError, model_error
 from tractexp.noise import Noise
 from tractexp.noise.span import compute_basis
 
-SPREAD = 2 * 1.645  # roots of what is expected: in 95 % of cases no more than so many are lacking of it
-LEAST_DISTINCT_PUSH = 0.03  # singular values below this share of the largest: pushes that differ from others in noise only
+# roots of what is expected: in 95 % of cases no more than so many are lacking of it
+SPREAD = 2 * 1.645
+# singular values below this share of the largest: pushes that differ from others in noise only
+LEAST_DISTINCT_PUSH = 0.03
 
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """What a model calculates of all events end to end, (C, N) [pu], and what is left against the measurement.
+    """What a model calculates of all events end to end, (C, N) [pu], and what is left against the
+    measurement.
 
-    Of waveforms P and Q are those that the record's estimator sees in calculated and in recorded currents, and
-    `epsilon_i` is what the currents miss; over several events it is the rms of theirs. `error` is the model's.
+    Of waveforms P and Q are those that the record's estimator sees in calculated and in recorded
+    currents, and `epsilon_i` is what the currents miss; over several events it is the rms of
+    theirs. `error` is the model's.
     """
 
     calculated: np.ndarray
@@ -39,11 +45,11 @@ class Curves:
 class GapTest:
     """The model's error before and after, and whether these events bear the extension out.
 
-    `gain` is the deviance gained, `expected` what a true explanation would gain, the squared distance of both curves
-    in standard deviations; a true one scatters about it by twice its root. `left` is what pushes into the balances
-    would still gain beyond chance: a measure sharper than the model's error where the gap is no larger than the noise.
-    `by_event` (E,) is what of that is expected of each event. `units` (2, D) are the coordinates of both models in
-    `context`.
+    `gain` is the deviance gained, `expected` what a true explanation would gain, the squared
+    distance of both curves in standard deviations; a true one scatters about it by twice its root.
+    `left` is what pushes into the balances would still gain beyond chance: a measure sharper than
+    the model's error where the gap is no larger than the noise. `by_event` (E,) is what of that is
+    expected of each event. `units` (2, D) are the coordinates of both models in `context`.
     """
 
     before: Curves
@@ -64,7 +70,9 @@ class GapTest:
 
     @property
     def explained(self) -> float:
-        """The share of what could be explained: of what was gained and what is left. 0 where that is nothing."""
+        """The share of what could be explained: of what was gained and what is left. 0 where that
+        is nothing.
+        """
         whole = self.gain + max(self.left, 0.0)
         return self.gain / whole if whole > 0 else 0.0
 
@@ -77,7 +85,8 @@ class GapTest:
     def is_denied(self) -> bool:
         """Whether they gain less than a true explanation does in 95 % of cases."""
         least = self.expected - SPREAD * self.expected**0.5
-        return not self.is_shown and not self.gain >= least  # of no steady state neither is a number
+        # of no steady state neither is a number
+        return not self.is_shown and not self.gain >= least
 
     @property
     def is_mild(self) -> bool:
@@ -96,9 +105,10 @@ def measure_closed_share(before: Curves, after: Curves) -> float:
 
 
 def share_closed(before: ModelError, after: ModelError) -> float:
-    """The share of the squared model error that is gone; above 1 where less is left than noise leaves in the mean,
-    below 0 where more is left than before. nan where that falls short of the noise by more than there was before, which
-    was within the error of the noise's level then."""
+    """The share of the squared model error that is gone; above 1 where less is left than noise
+    leaves in the mean, below 0 where more is left than before. nan where that falls short of the
+    noise by more than there was before, which was within the error of the noise's level then.
+    """
     square, rest = before.square, after.square
     return 1 - rest / square if 0 < square < np.inf and rest >= -square else np.nan
 
@@ -111,48 +121,85 @@ def curves(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str
     calculated = residual[0] + measured
     deviance = float(np.nan_to_num(white @ white, nan=np.inf))
     each = [
-        context.domain.comparison(event, calculated[:, context.drive.part(e)]) for e, event in enumerate(context.events)
+        context.domain.comparison(event, calculated[:, context.drive.part(e)])
+        for e, event in enumerate(context.events)
     ]
-    measured = np.concatenate([np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1)
+    measured = np.concatenate(
+        [np.stack([one.event.record.P, one.event.record.Q]) for one in each], axis=1
+    )
     power = np.concatenate([np.stack([one.P, one.Q]) for one in each], axis=1)
     P, Q = (relative_error(measured[c], power[c]) for c in (0, 1))
     currents = [one.epsilon_i**2 for one in each if one.epsilon_i is not None]
     i = float(np.sqrt(np.mean(currents))) if currents else None
-    return Curves(calculated, P, Q, deviance, deviance / max(context.samples, 1), model_error(each), i)
+    return Curves(
+        calculated, P, Q, deviance, deviance / max(context.samples, 1), model_error(each), i
+    )
 
 
 def gap(
-    context: Context, base: np.ndarray, extended: np.ndarray, names: Sequence[str], noise: Noise,
-    fitted: Sequence[int] | np.ndarray, without: Sequence[str] = (), changes: np.ndarray | None = None,
-) -> GapTest:  # fmt: skip
-    """Compare a fit of the base model, or of one with the effects `without`, and that with the named effects on the
-    events of `context`.
+    context: Context,
+    base: np.ndarray,
+    extended: np.ndarray,
+    names: Sequence[str],
+    noise: Noise,
+    fitted: Sequence[int] | np.ndarray,
+    without: Sequence[str] = (),
+    changes: np.ndarray | None = None,
+) -> GapTest:
+    """Compare a fit of the base model, or of one with the effects `without`, and that with the
+    named effects on the events of `context`.
 
-    Coordinates `fitted` were fitted to these events in the extended model. What is left is what `changes` (c, C N)
-    would still gain, by default pushes into the balances.
+    Coordinates `fitted` were fitted to these events in the extended model. What is left is what
+    `changes` (c, C N) would still gain, by default pushes into the balances.
     """
     before, after = curves(context, base, noise, without), curves(context, extended, noise, names)
     gained = before.deviance - after.deviance
-    changes = compute_pushed_changes(context, extended, names, noise) if changes is None else changes
+    changes = (
+        compute_pushed_changes(context, extended, names, noise) if changes is None else changes
+    )
     left = beyond_chance(context, extended, names, noise, fitted, changes)
     apart = (after.calculated - before.calculated)[None] * context.valid
-    rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(context.drive.channels, -1)
-    by_event = tuple(float(np.sum(rows[:, context.drive.part(e)] ** 2)) for e in range(len(context.events)))
+    rows = np.nan_to_num(context.whiten(noise, apart)[0], nan=np.inf).reshape(
+        context.drive.channels, -1
+    )
+    by_event = tuple(
+        float(np.sum(rows[:, context.drive.part(e)] ** 2)) for e in range(len(context.events))
+    )
     shown, units = context.criteria.shown, (base, extended)
-    return GapTest(before, after, float(gained), left, float(np.sum(rows**2)), shown, noise, context, units, by_event)
+    return GapTest(
+        before,
+        after,
+        float(gained),
+        left,
+        float(np.sum(rows**2)),
+        shown,
+        noise,
+        context,
+        units,
+        by_event,
+    )
 
 
-def compute_pushed_changes(context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise) -> np.ndarray:
-    """What pushes into all balances in all windows change at coordinates (D,), whitened (c, C N)."""
+def compute_pushed_changes(
+    context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise
+) -> np.ndarray:
+    """What pushes into all balances in all windows change at coordinates (D,),
+    whitened (c, C N).
+    """
     points, _ = perturbations(context, unit)
     return context.whiten(noise, context.changes(unit, points, names, [PUSHES] * len(points)))
 
 
 def beyond_chance(
-    context: Context, unit: np.ndarray, names: Sequence[str], noise: Noise, fitted: Sequence[int] | np.ndarray,
+    context: Context,
+    unit: np.ndarray,
+    names: Sequence[str],
+    noise: Noise,
+    fitted: Sequence[int] | np.ndarray,
     changes: np.ndarray,
-) -> float:  # fmt: skip
-    """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates (D,).
+) -> float:
+    """How much more than chance `changes` (c, C N) would still lower the deviance at coordinates
+    (D,).
 
     Unbiased: the energy in their space less its dimension, what is `fitted` projected out.
     """

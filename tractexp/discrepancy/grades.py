@@ -1,8 +1,8 @@
 """The base model and the extended one, graded as an identification grades them.
 
-The fits of an investigation rank effects. What a model is good for is told by `tractexp.identification.grade` alone: on
-the same events, in the same roles, with the bounds that the user set, and behind the recorder's window where the
-investigation takes one into account.
+The fits of an investigation rank effects. What a model is good for is told by
+`tractexp.identification.grade` alone: on the same events, in the same roles, with the bounds that
+the user set, and behind the recorder's window where the investigation takes one into account.
 """
 
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -19,7 +19,9 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class Grader:
-    """What an investigation was asked, as far as grades hang on it; models that were graded once are kept."""
+    """What an investigation was asked, as far as grades hang on it; models that were graded once
+    are kept.
+    """
 
     base: Model
     catalogue: Catalogue
@@ -30,7 +32,8 @@ class Grader:
     substeps: int | None = None
     priors: bool = False
     shown: Collection[str] = ()  # effects that the base model has because its records show them
-    search: Callable[[Problem], np.ndarray] | None = None  # where an identification's search ends, (d,) free values
+    # where an identification's search ends, (d,) free values
+    search: Callable[[Problem], np.ndarray] | None = None
     known: dict[str, GradedModel] = field(default_factory=dict)
 
     def grade_base(self) -> GradedModel:
@@ -46,15 +49,19 @@ class Grader:
         *,
         fit_all: bool = False,
     ) -> GradedModel:
-        """The base model with the named effects, behind a recorder's `window`, some parameters held at values.
+        """The base model with the named effects, behind a recorder's `window`, some parameters held
+        at values.
 
-        `found` are values where a fit of the investigation ended: a relay's times have hardly a slope, and a search
-        alone may end far from them. With `fit_all` the held-out events are fitted like the others.
+        `found` are values where a fit of the investigation ended: a relay's times have hardly a
+        slope, and a search alone may end far from them. With `fit_all` the held-out events are
+        fitted like the others.
         """
         fixed = {**self.fixed, **(held or {})}
         key = repr((sorted(names), window, sorted(fixed.items()), fit_all))
         if key not in self.known:
-            fitted, judged = ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
+            fitted, judged = (
+                ((*self.train, *self.validate), ()) if fit_all else (self.train, self.validate)
+            )
             model = self._extended(names, window)
             problem = Problem(model, fitted, self.bounds, fixed, self.substeps, priors=self.priors)
             start = self._choose_start(problem, found or {})
@@ -62,7 +69,9 @@ class Grader:
         return self.known[key]
 
     def _choose_start(self, problem: Problem, found: Mapping[str, float]) -> np.ndarray | None:
-        """Free values (d,): where a search ends, or those found where they fit better; None without either."""
+        """Free values (d,): where a search ends, or those found where they fit better; None without
+        either.
+        """
         starts = [] if self.search is None else [self.search(problem)]
         if all(name in found for name in problem.space.names):
             values = np.array([found[name] for name in problem.space.names])
@@ -74,4 +83,6 @@ class Grader:
     def _extended(self, names: Sequence[str], window: float | str | None) -> Model:
         base, own = self.base, {effect.name for effect in self.base.effects}
         added = [self.catalogue[name].effect for name in names if name not in own]
-        return compose(base.motor, base.static, [*base.effects, *added], base.integration, base.domain, window)
+        return compose(
+            base.motor, base.static, [*base.effects, *added], base.integration, base.domain, window
+        )

@@ -18,22 +18,30 @@ from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-MENDED = 0.05  # of what an effect explains: no formula is exact to this, and a fault of the measurement mends it
+# of what an effect explains: no formula is exact to this, and a fault of the measurement mends it
+MENDED = 0.05
 
 
-def judge_held_out(evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
-    """The table with the sets that leave nothing refitted without needless faults of the measurement, and judged on
-    held-out events, if any."""
+def judge_held_out(
+    evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int
+) -> Evidence:
+    """The table with the sets that leave nothing refitted without needless faults of the
+    measurement, and judged on held-out events, if any.
+    """
     context, noise, criteria = explained.base.context, explained.last.noise, explained.last.criteria
     at = context.coordinates
-    bare = refit(context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=())[0]
+    bare = refit(
+        context, noise, [((), at.without_faults(explained.steps[0].fit.unit, ()))], faults=()
+    )[0]
     faults = find_telling_faults(explained, bare)
     adequate = find_adequate(evidence, criteria)
     wanted = adequate or [row for row in evidence.rows if not criteria.rejects(row.behind)][:1]
     starts = [(row.fit.names, at.without_faults(row.fit.unit, faults)) for row in wanted]
     finals = {fit.names: fit for fit in refit(context, noise, starts, faults=faults)}
     rows = [
-        replace(row, final=finals.get(row.fit.names), names=tuple(sorted((*row.fit.names, *faults))))
+        replace(
+            row, final=finals.get(row.fit.names), names=tuple(sorted((*row.fit.names, *faults)))
+        )
         for row in evidence.rows
     ]
     base = replace(evidence.base, fit=bare)
@@ -42,22 +50,32 @@ def judge_held_out(evidence: Evidence, explained: Explanations, events: Sequence
         return evidence
     both = AllEvents(context, events, noise, faults, bare, explained.refits)
     if not any(row.fit.names or faults for row in adequate):
-        is_silent = context.domain.calibrated and explained.empty and base.p_left >= criteria.adequate_p
+        is_silent = (
+            context.domain.calibrated and explained.empty and base.p_left >= criteria.adequate_p
+        )
         if is_silent and exceeds_noise(both):
             base = replace(base, p_of_all=both.p_left(explained.base.local_minima, seed))
         return replace(evidence, base=base)
-    context.effort.say(f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events")
+    context.effort.say(
+        f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events"
+    )
     judged = {row.fit.names: row for row in assess(both, find_adequate(evidence, criteria), seed)}
     return replace(evidence, rows=tuple(judged.get(row.fit.names, row) for row in evidence.rows))
 
 
 def find_telling_faults(explained: Explanations, bare: Refit) -> Names:
-    """The faults of the measurement that stand out, but for those that only mend the formula of an effect.
+    """The faults of the measurement that stand out, but for those that only mend the formula of an
+    effect.
 
-    Beside an effect of the load they must explain more, together with those left out before, than the part of all that
-    is explained to which no formula is exact (`MENDED`).
+    Beside an effect of the load they must explain more, together with those left out before, than
+    the part of all that is explained to which no formula is exact (`MENDED`).
     """
-    context, noise, fit, faults = explained.base.context, explained.last.noise, explained.chosen, explained.faults
+    context, noise, fit, faults = (
+        explained.base.context,
+        explained.last.noise,
+        explained.chosen,
+        explained.faults,
+    )
     if not fit.names:
         return faults
 
@@ -75,13 +93,15 @@ def find_telling_faults(explained: Explanations, bare: Refit) -> Names:
 
 
 def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetEvidence]:
-    """Rows judged on held-out events, and all that are doubtful or have a rival by a fit to all events, too.
+    """Rows judged on held-out events, and all that are doubtful or have a rival by a fit to all
+    events, too.
 
-    Of several effects each is judged against the others alone as the whole is against the base model. A single textbook
-    effect that has no rival stands if it closes as much of the gap there as a true one does. Any other must leave
-    nothing in a fit to all events and not be rejected there by the best one. That fit may also bear out what does not
-    help as it was fitted, or leaves more than chance does, since the fitted events may leave a part of it open; such a
-    row is judged and told as fitted to all.
+    Of several effects each is judged against the others alone as the whole is against the base
+    model. A single textbook effect that has no rival stands if it closes as much of the gap there
+    as a true one does. Any other must leave nothing in a fit to all events and not be rejected
+    there by the best one. That fit may also bear out what does not help as it was fitted, or leaves
+    more than chance does, since the fitted events may leave a part of it open; such a row is judged
+    and told as fitted to all.
     """
     criteria, fits = both.fitted.criteria, [row.told for row in rows]
     without = {fit.names: both.without_each(fit) for fit in fits}
@@ -93,12 +113,16 @@ def assess(both: AllEvents, rows: Sequence[SetEvidence], seed: int) -> list[SetE
     assessed = {}
     for row in judged:
         own = joint[row.fit.names]
-        assessed[row.fit.names] = replace(row, p_of_all=own.p_left, behind_of_all=own.fit.cost - best)
+        assessed[row.fit.names] = replace(
+            row, p_of_all=own.p_left, behind_of_all=own.fit.cost - best
+        )
     again = [
-        one.fit for names, one in joint.items()
-        if one.is_confirmed(criteria) and not _suffices(assessed[names])
+        one.fit
+        for names, one in joint.items()
+        if one.is_confirmed(criteria)
+        and not _suffices(assessed[names])
         and not criteria.rejects(assessed[names].behind_of_all)
-    ]  # fmt: skip
+    ]
     if again:
         without_of_all = {fit.names: both.fit_to_all(without[fit.names]) for fit in again}
         chosen = [row for fit in again for row in rows if row.fit.names == fit.names]
@@ -114,7 +138,10 @@ def _suffices(row: SetEvidence) -> bool:
 
 
 def judge_fits(
-    both: AllEvents, rows: Sequence[SetEvidence], fits: Sequence[Refit], without: Mapping[Names, Mapping[str, Refit]]
+    both: AllEvents,
+    rows: Sequence[SetEvidence],
+    fits: Sequence[Refit],
+    without: Mapping[Names, Mapping[str, Refit]],
 ) -> list[SetEvidence]:
     """Rows with what held-out events say of their fits (one a row), and of each of several effects.
 
@@ -123,7 +150,10 @@ def judge_fits(
     gaps, judged = compare_on(both.fitted, both.events, both.bare, fits), []
     for row, fit in zip(rows, fits, strict=True):
         fewer = without[fit.names]
-        members = {name: compare_on(both.fitted, both.events, fewer[name], [fit])[fit.names] for name in fewer}
+        members = {
+            name: compare_on(both.fitted, both.events, fewer[name], [fit])[fit.names]
+            for name in fewer
+        }
         judged.append(replace(row, final=fit, gap=gaps[fit.names], without=members))
     return judged
 
@@ -136,16 +166,27 @@ def closes_enough(row: SetEvidence) -> bool:
 
 
 def exceeds_noise(both: AllEvents) -> bool:
-    """Whether perturbations of the base model would gain more on the held-out events than noise leaves there."""
+    """Whether perturbations of the base model would gain more on the held-out events than noise
+    leaves there.
+    """
     there, (unit,), noise = carry_fits(both.fitted, both.events, [both.bare])
-    left = beyond_chance(there, unit, (), noise, there.coordinates.before, compute_pushed_changes(there, unit, (), noise))
+    left = beyond_chance(
+        there,
+        unit,
+        (),
+        noise,
+        there.coordinates.before,
+        compute_pushed_changes(there, unit, (), noise),
+    )
     return left > both.fitted.criteria.shown
 
 
 def compare_on(
     context: Context, events: Sequence[Event], bare: Refit, extended: Sequence[Refit]
 ) -> dict[Names, GapTest]:
-    """Compare a model and extended ones, as they were fitted, on held-out events, by the noise of the last."""
+    """Compare a model and extended ones, as they were fitted, on held-out events, by the noise of
+    the last.
+    """
     other, units, noise = carry_fits(context, events, [bare, *extended])
     before = other.coordinates.before
     return {
@@ -157,10 +198,11 @@ def compare_on(
 def carry_fits(
     context: Context, events: Sequence[Event], fits: Sequence[Refit]
 ) -> tuple[Context, list[np.ndarray], Noise]:
-    """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each event.
+    """Carry fits over to held-out events: everything keeps its trained value but P0 and Q0 of each
+    event.
 
-    Returns the context of those events, the coordinates of each fit there, and the noise of the last one that has a
-    steady state there.
+    Returns the context of those events, the coordinates of each fit there, and the noise of the
+    last one that has a steady state there.
     """
     other = context.on(Records.of(events, context.records.window))
     at = other.coordinates.at_measured_power
@@ -170,4 +212,8 @@ def carry_fits(
         if np.isfinite(left := other.residuals(unit[None], fit.names)[0]).all():
             noise = QuietNoise.at(other, unit).of(unit, left)
             break
-    return other, [fit_initial_power(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)], noise
+    return (
+        other,
+        [fit_initial_power(other, u, noise, fit.names) for u, fit in zip(units, fits, strict=True)],
+        noise,
+    )

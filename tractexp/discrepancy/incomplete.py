@@ -1,8 +1,10 @@
-"""Explanations that leave more than noise, where none leaves less: named by what they predict of held-out events.
+"""Explanations that leave more than noise, where none leaves less: named by what they predict of
+held-out events.
 
-What is left has two measures. Where the disagreement is of the noise's size it is what pushes into the balances would
-still gain of the deviance, with the fits of the search by likelihood. Where it is far above the noise it is the squared
-error in S, with every set fitted by least squares (`least_squares`).
+What is left has two measures. Where the disagreement is of the noise's size it is what pushes into
+the balances would still gain of the deviance, with the fits of the search by likelihood. Where it
+is far above the noise it is the squared error in S, with every set fitted by least squares
+(`least_squares`).
 """
 
 from collections.abc import Sequence
@@ -20,12 +22,16 @@ from tractexp.inference.fitting import refit
 from tractexp.record import Event
 
 MOST_JUDGED_SETS = 10  # sets of the search by likelihood that are judged on the held-out events
-LEAST_LOUD_DEVIANCE = 2.0  # deviance of a sample from which what the base model leaves is more of it than the noise
+# deviance of a sample from which what the base model leaves is more of it than the noise
+LEAST_LOUD_DEVIANCE = 2.0
 
 
-def predict_held_out(evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
-    """The table with what each set predicts of the held-out events; as it is without any, since a larger set always
-    fits better what it was fitted to. Where what is left is loud, all sets are as least squares fit them.
+def predict_held_out(
+    evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int
+) -> Evidence:
+    """The table with what each set predicts of the held-out events; as it is without any, since a
+    larger set always fits better what it was fitted to. Where what is left is loud, all sets are as
+    least squares fit them.
     """
     if not events:
         return evidence
@@ -37,8 +43,11 @@ def predict_held_out(evidence: Evidence, explained: Explanations, events: Sequen
     return _predict_by_deviance(evidence, explained, events, seed)
 
 
-def _predict_by_deviance(evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
-    """The single effects of the search by likelihood, and the larger sets that the fitted events do not reject.
+def _predict_by_deviance(
+    evidence: Evidence, explained: Explanations, events: Sequence[Event], seed: int
+) -> Evidence:
+    """The single effects of the search by likelihood, and the larger sets that the fitted events do
+    not reject.
 
     None beside faults of the measurement, which what is missing looks like.
     """
@@ -47,17 +56,23 @@ def _predict_by_deviance(evidence: Evidence, explained: Explanations, events: Se
     known = {row.fit.names: row for row in evidence.rows}
     rejected = {names for names, row in known.items() if criteria.rejects(row.behind)}
     fits = {
-        names: fit for names, fit in explained.refits.items()
+        names: fit
+        for names, fit in explained.refits.items()
         if names and (len(names) == 1 or names in known.keys() - rejected)
-    }  # fmt: skip
+    }
     if evidence.faults or not fits:
         return evidence
     wanted = sorted(fits.values(), key=lambda fit: fit.cost)[:MOST_JUDGED_SETS]
-    fitted = refit(context, noise, [(fit.names, at.without_faults(fit.unit, ())) for fit in wanted], faults=())
+    fitted = refit(
+        context, noise, [(fit.names, at.without_faults(fit.unit, ())) for fit in wanted], faults=()
+    )
     gaps = compare_on(context, events, bare, fitted[::-1])  # the best last: there the noise is its
     whole = max((gaps[fit.names] for fit in fitted), key=lambda gap: gap.gain)
     left_by_base = whole.gain + max(whole.left, 0.0)
-    base = replace(evidence.base, prediction=PredictedDeviance(left_by_base, whole.before, True, criteria.shown))
+    base = replace(
+        evidence.base,
+        prediction=PredictedDeviance(left_by_base, whole.before, True, criteria.shown),
+    )
     rows = []
     for fit in fitted:
         gap, is_rejected = gaps[fit.names], fit.names in rejected
@@ -76,18 +91,25 @@ def _predict_by_deviance(evidence: Evidence, explained: Explanations, events: Se
     tested = [test(row) for row in kept]
     names = {row.fit.names for row in kept}
     compared = [row for row in evidence.rows if row.fit.names not in names]
-    others = [row for row in rows if row.fit.names not in names | {row.fit.names for row in compared}]
+    others = [
+        row for row in rows if row.fit.names not in names | {row.fit.names for row in compared}
+    ]
     predicted = {row.fit.names: row for row in rows}
     compared = [
-        replace(row, fit=predicted[row.fit.names].fit, prediction=predicted[row.fit.names].prediction)
-        if row.fit.names in predicted else row
+        replace(
+            row, fit=predicted[row.fit.names].fit, prediction=predicted[row.fit.names].prediction
+        )
+        if row.fit.names in predicted
+        else row
         for row in compared
-    ]  # fmt: skip
+    ]
     return replace(evidence, base=base, rows=(*tested, *compared), others=tuple(others))
 
 
 def _predict_by_error(explained: Explanations, events: Sequence[Event], seed: int) -> Evidence:
-    """All sets as least squares fit them: those kept first, or else the nearest, with their tests, then the others."""
+    """All sets as least squares fit them: those kept first, or else the nearest, with their tests,
+    then the others.
+    """
     table = predict_errors(explained, events)
     criteria, quiet, noise = explained.last.criteria, explained.base.quiet, table.noise
     assert noise is not None

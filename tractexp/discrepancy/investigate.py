@@ -1,4 +1,6 @@
-"""The whole investigation, from records to a verdict, in the eight steps of docs/missing-effects.md."""
+"""The whole investigation, from records to a verdict, in the eight steps of
+docs/missing-effects.md.
+"""
 
 import functools
 from collections.abc import Callable, Mapping, Sequence
@@ -55,9 +57,11 @@ class Findings:
     train: GapTest  # on the fitted events
     withheld: tuple[Event, ...]  # the held-out events
     grader: Grader
-    proposed: ProposalResult = field(default_factory=ProposalResult)  # of a term, where nothing explains
+    # of a term, where nothing explains
+    proposed: ProposalResult = field(default_factory=ProposalResult)
     tie_breaker: NextEvent | None = None  # that would tell tied sets apart
-    all_fitted: bool = False  # whether the held-out events were fitted like the others, since only all show something
+    # whether the held-out events were fitted like the others, since only all show something
+    all_fitted: bool = False
 
     @property
     def context(self) -> Context:
@@ -76,7 +80,11 @@ class Findings:
     def reason(self) -> str:
         """The sentence behind the verdict."""
         return explain(
-            self.verdict, self.evidence, self.nearest, self.explanations.base.context, all_fitted=self.all_fitted
+            self.verdict,
+            self.evidence,
+            self.nearest,
+            self.explanations.base.context,
+            all_fitted=self.all_fitted,
         )
 
     @property
@@ -120,7 +128,9 @@ class Findings:
 
     @property
     def next_event(self) -> NextEvent | None:
-        """What to record next, where explanations are tied or the proposed term has near-synonyms."""
+        """What to record next, where explanations are tied or the proposed term has
+        near-synonyms.
+        """
         proposal = self.proposed.proposal
         return self.tie_breaker or (proposal and proposal.next_event)
 
@@ -138,7 +148,9 @@ class Findings:
 
     @functools.cached_property
     def held(self) -> dict[str, float]:
-        """Parameters of the extended model that the events cannot tell (to half their size), at the values found."""
+        """Parameters of the extended model that the events cannot tell (to half their size), at the
+        values found.
+        """
         if not self.names:
             return {}
         return {
@@ -164,19 +176,30 @@ class Findings:
         return self.grade_of(self.names)
 
     def grade_of(self, names: Sequence[str]) -> GradedModel:
-        """The base model with some of the names added, graded with all that the extended model has beside them."""
+        """The base model with some of the names added, graded with all that the extended model has
+        beside them.
+        """
         if not self.names:  # a window is part of the model where nothing is missing behind it
             return self.grader.grade((), self.window) if self.verdict.complete else self.base_grade
         if not names:
             return self.base_grade
-        own = {p.name for p in self.catalogue.parameters([name for name in self.names if name not in names])}
+        own = {
+            p.name
+            for p in self.catalogue.parameters([name for name in self.names if name not in names])
+        }
         held = {name: value for name, value in self.held.items() if name not in own}
         at = self.context.coordinates
-        found = {name: at.value(name, self.extended.unit) for name in at.names} if names == self.names else {}
+        found = (
+            {name: at.value(name, self.extended.unit) for name in at.names}
+            if names == self.names
+            else {}
+        )
         return self.grader.grade(names, self.window, held, found, fit_all=self.fitted_to_both)
 
     def misfits(self, graded: GradedModel) -> tuple[Misfit, Misfit | None]:
-        """How far off a graded model is on the events that were to be fitted, and on those that were to be held out."""
+        """How far off a graded model is on the events that were to be fitted, and on those that
+        were to be held out.
+        """
         split = len(self.grader.train)
         fitted, held_out = graded.fits[:split], graded.fits[split:]
         return Misfit.of(fitted), Misfit.of(held_out) if held_out else None
@@ -207,33 +230,42 @@ class Findings:
 
     @functools.cached_property
     def remainder(self) -> list[Remainder]:
-        """What is left where it is more than noise, the loudest first: shapes in what the best model leaves.
+        """What is left where it is more than noise, the loudest first: shapes in what the best
+        model leaves.
 
-        On the held-out events only where the fitted ones show none: what explains those may not hold beyond them.
+        On the held-out events only where the fitted ones show none: what explains those may not
+        hold beyond them.
         """
         return [] if self.verdict.complete else self._left(self.overlays)
 
     @functools.cached_property
     def remainder_of_base(self) -> list[Remainder]:
-        """The same of what the base model alone leaves: the nearest candidates may have patched something up.
+        """The same of what the base model alone leaves: the nearest candidates may have patched
+        something up.
 
-        As least squares fit it or as the likelihood does, by whichever shapes tell more: least squares spread over a
-        record what happens at one moment.
+        As least squares fit it or as the likelihood does, by whichever shapes tell more: least
+        squares spread over a record what happens at one moment.
         """
         if self.names:
             return []
         alone = [self._left([replace(overlay, nearest=None) for overlay in self.overlays])]
         if self.by_likelihood is not self.evidence:
-            alone.append(self._left(of_fit(self.context, self.by_likelihood.base.fit, self.last.noise)))
+            alone.append(
+                self._left(of_fit(self.context, self.by_likelihood.base.fit, self.last.noise))
+            )
         return max(alone, key=_share_of)
 
     @property
     def headline(self) -> str:
-        """What is left in one sentence: the loudest shape of the model whose remainder shapes describe best."""
+        """What is left in one sentence: the loudest shape of the model whose remainder shapes
+        describe best.
+        """
         if self.names and self.remainder:
             return f"beside {join_words(self.names)} this is left: {self.remainder[0]}"
         remainders_left = [
-            (shapes, base) for shapes, base in ((self.remainder, False), (self.remainder_of_base, True)) if shapes
+            (shapes, base)
+            for shapes, base in ((self.remainder, False), (self.remainder_of_base, True))
+            if shapes
         ]
         if not remainders_left:
             return ""
@@ -246,11 +278,15 @@ class Findings:
     def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.context.criteria.false_alarms
         fitted, beyond = ([o for o in overlays if o.held_out == there] for there in (False, True))
-        return find_remainder(fitted, noise, level) or find_remainder(beyond, replace(noise, input_modes=None), level)
+        return find_remainder(fitted, noise, level) or find_remainder(
+            beyond, replace(noise, input_modes=None), level
+        )
 
     @property
     def base_values(self) -> np.ndarray:
-        """The free parameters of the base model (n, d), alone and as the model that the investigation ends with."""
+        """The free parameters of the base model (n, d), alone and as the model that the
+        investigation ends with.
+        """
         fits = np.stack([self.bare.unit, self.extended.unit])
         return self.context.kernels.bare.space.from_unit(fits[:, self.context.coordinates.base])
 
@@ -261,7 +297,9 @@ class Findings:
 
     @property
     def closes_share(self) -> bool:
-        """Whether one set alone is kept and closes a share of the model's error on the fitted events."""
+        """Whether one set alone is kept and closes a share of the model's error on the fitted
+        events.
+        """
         if len(self.verdict.kept) != 1:
             return False
         before, after = (self.judged(one).error for one in (self.base_grade, self.final_grade))
@@ -284,13 +322,16 @@ def investigate(
     seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
 ) -> Findings:
-    """Find where model and records disagree, name what is missing, add it, and measure how the gap shrinks.
+    """Find where model and records disagree, name what is missing, add it, and measure how the gap
+    shrinks.
 
-    `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters, `only` names the
-    effects that are tested (none: all), `substeps` the Runge-Kutta steps per sample (None: as many as needed).
+    `bounds` {name: (lower, upper)} and `fixed` {name: value} are of the base model's parameters,
+    `only` names the effects that are tested (none: all), `substeps` the Runge-Kutta steps per
+    sample (None: as many as needed).
 
-    Of grades are `priors`, `shown`, effects that the base model has because its records show them, and `search`, which
-    gives the free values (d,) that an identification's search ends at. Raises `UserError` for wrong events or names.
+    Of grades are `priors`, `shown`, effects that the base model has because its records show them,
+    and `search`, which gives the free values (d,) that an identification's search ends at. Raises
+    `UserError` for wrong events or names.
     """
     criteria = criteria or Criteria()
     train, validate = (domain_of(model).events(events) for events in (train, validate))
@@ -304,7 +345,16 @@ def investigate(
         given = model, missing, Records.of(train), bounds or {}, fixed or {}, criteria, effort
         context = Context.of(*given, substeps)
         grader = Grader(
-            model, missing, tuple(train), tuple(validate), bounds or {}, fixed or {}, substeps, priors, shown, search
+            model,
+            missing,
+            tuple(train),
+            tuple(validate),
+            bounds or {},
+            fixed or {},
+            substeps,
+            priors,
+            shown,
+            search,
         )
         findings = _findings(base_fit(context), validate, seed, grader)
         if context.kernels.too_coarse(findings.base_values):
@@ -318,7 +368,11 @@ def investigate(
         if findings.verdict.word == UNEXPLAINED and shows_more(findings.evidence, criteria):
             effort.say("only all events together show something: again, fitted to all of them")
             of_all = findings_of([*train, *validate], ())
-            findings = replace(of_all, grader=findings.grader, all_fitted=True) if of_all.closes_share else findings
+            findings = (
+                replace(of_all, grader=findings.grader, all_fitted=True)
+                if of_all.closes_share
+                else findings
+            )
         return replace(findings, proposed=_proposal(findings, seed))
 
 
@@ -367,7 +421,9 @@ def _proposal(findings: Findings, seed: int) -> ProposalResult:
         return ProposalResult()
     if is_too_mild(evidence):
         return ProposalResult(why="the held-out events are too mild to show a term")
-    return propose(base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld, seed)
+    return propose(
+        base, explained.steps[0], evidence.base.fit, explained.last.noise, findings.withheld, seed
+    )
 
 
 def _share_of(shapes: Sequence[Remainder]) -> float:

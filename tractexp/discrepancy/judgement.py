@@ -1,4 +1,6 @@
-"""What the data say of every effect of the catalogue: relevant, irrelevant, ruled out, or not testable, and why."""
+"""What the data say of every effect of the catalogue: relevant, irrelevant, ruled out, or not
+testable, and why.
+"""
 
 from dataclasses import dataclass
 
@@ -11,7 +13,8 @@ from tractexp.inference.score_test import Score
 from tractexp.wording import in_words
 
 ONE_SIDED = 1.6449  # standard deviations: 5 %
-TESTABLE = 0.8  # power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)
+# power at the smallest relevant size, as of a planned test (Saris, Satorra and van der Veld 2009)
+TESTABLE = 0.8
 
 
 @dataclass(frozen=True)
@@ -25,19 +28,28 @@ class Judgement:
 
 
 def judgements(investigation: Findings) -> list[Judgement]:
-    """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the chosen model."""
+    """Every effect of the catalogue classified (Saris, Satorra and van der Veld 2009), at the
+    chosen model.
+    """
     criteria = investigation.context.criteria
     critical = investigation.first.chance.critical_p(criteria.naming)
     scores = {s.name: s for s in investigation.last.scores}
-    judged_effects = [Judgement(name, "not testable", why) for name, why in investigation.catalogue.untestable.items()]
+    judged_effects = [
+        Judgement(name, "not testable", why)
+        for name, why in investigation.catalogue.untestable.items()
+    ]
     for candidate in investigation.catalogue.candidates:
         name, score = candidate.name, scores.get(candidate.name)
         if name in investigation.names:
             judged_effects.append(Judgement(name, "relevant", "added"))
         elif name in investigation.last.fit.names:
-            judged_effects.append(Judgement(name, "relevant", "in the best explanation, which was not accepted"))
+            judged_effects.append(
+                Judgement(name, "relevant", "in the best explanation, which was not accepted")
+            )
         elif score is None:
-            judged_effects.append(Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise"))
+            judged_effects.append(
+                Judgement(name, "irrelevant", "in the fit as a nuisance, not above its noise")
+            )
         else:
             judged_effects.append(Judgement(name, *assessment(candidate, score, critical), score))
     return sorted(judged_effects, key=lambda j: j.name)
@@ -47,13 +59,23 @@ def assessment(candidate: Candidate, score: Score, critical: float) -> tuple[str
     """Status and reason of an effect outside the chosen model."""
     main = candidate.sizes[0]
     unit = "" if main.unit == "1" else f" {main.unit}"
-    size, deviation, relevant = score.size[main.name], score.deviation[main.name], candidate.relevant(main)
+    size, deviation, relevant = (
+        score.size[main.name],
+        score.deviation[main.name],
+        candidate.relevant(main),
+    )
     if score.p < critical:
-        return "relevant", f"its score stands out: chance gives as much with a probability of {in_words(score.p)}"
+        return (
+            "relevant",
+            f"its score stands out: chance gives as much with a probability of {in_words(score.p)}",
+        )
     if not np.isfinite(deviation):
         return "not testable", "these events cannot show it"
     limit = abs(size) + ONE_SIDED * deviation
     below = f"{main.name} within {limit:.2g}{unit} of its null"
     if ndtr(relevant / max(deviation, 1e-300) + ndtri(critical)) < TESTABLE:
-        return "not testable", f"a size of {relevant:g}{unit} would stay in the noise on these events ({below})"
+        return (
+            "not testable",
+            f"a size of {relevant:g}{unit} would stay in the noise on these events ({below})",
+        )
     return ("ruled out" if limit < relevant else "irrelevant"), below

@@ -1,8 +1,9 @@
 """Fits and tests where what is left is no noise: least squares, every channel alike.
 
-Under a wrong model the likelihood of the noise before the dip is no likelihood: a few samples at the edges, many times
-louder than that noise, bend every parameter. Least squares asks for no noise, and the covariance of its estimates holds
-where residuals are correlated within blocks, and where they are noise.
+Under a wrong model the likelihood of the noise before the dip is no likelihood: a few samples at
+the edges, many times louder than that noise, bend every parameter. Least squares asks for no noise,
+and the covariance of its estimates holds where residuals are correlated within blocks, and where
+they are noise.
 
 Source: White 1982; Bell and McCaffrey 2002 (CR3), as in `tractexp.inference.sandwich`.
 """
@@ -24,16 +25,19 @@ from tractexp.noise import Noise
 
 
 def residual_noise(context: Context, fit: Refit) -> Noise:
-    """White noise of the size of what a fit leaves, the same in each channel: under it the deviance is the sum of
-    squares that names are judged by."""
+    """White noise of the size of what a fit leaves, the same in each channel: under it the deviance
+    is the sum of squares that names are judged by.
+    """
     residual = context.residuals(fit.unit[None], fit.names)[0]
     level = float(np.sqrt(np.mean(residual[context.valid] ** 2)))
     return Noise(Noise.white(*[level] * len(residual)).pairs, np.eye(len(residual)))
 
 
 def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) -> Disagreement:
-    """All tests at a fit by least squares, under the noise that it shows where little happens, and a covariance of its
-    parameters that holds where what it leaves is no noise. It was fitted under `noise`, that of `residual_noise`."""
+    """All tests at a fit by least squares, under the noise that it shows where little happens, and
+    a covariance of its parameters that holds where what it leaves is no noise. It was fitted under
+    `noise`, that of `residual_noise`.
+    """
     quiet = replace(quiet, context=quiet.context.with_measured_power)
     t = tangent(quiet.context, fit, noise)
     root = _robust(quiet.context, t.whitened(noise))
@@ -44,10 +48,15 @@ def least_squares_tests(quiet: QuietNoise, fit: Refit, noise: Noise, seed: int) 
 
 
 def _robust(context: Context, projection: ScoreTest) -> np.ndarray:
-    """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left out in turn."""
+    """Rows (k, d) whose inverse products are the covariance of all that is free, from blocks left
+    out in turn.
+    """
     J = projection.Q @ projection.R  # with the rows of the prior
     r = projection.r[0] + projection.Q @ projection.along[0]
     measured = context.drive.measured
-    columns, rows = J[: measured.size].reshape(*measured.shape, -1), r[: measured.size].reshape(measured.shape)
+    columns, rows = (
+        J[: measured.size].reshape(*measured.shape, -1),
+        r[: measured.size].reshape(measured.shape),
+    )
     blocks = blocks_of(context.events, context.drive, J.shape[1])
     return robust_root(J, moves_without_blocks(columns, rows, blocks, J.T @ J))[0]

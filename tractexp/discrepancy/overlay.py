@@ -19,10 +19,12 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class Overlay:
-    """One event as recorded, and what the models draw in it (C, n) [pu]: P and Q, or the currents of a `WaveEvent`.
+    """One event as recorded, and what the models draw in it (C, n) [pu]: P and Q, or the currents
+    of a `WaveEvent`.
 
-    `after` is the extended model's where there is one, `nearest` that of the candidates which come nearest where
-    nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (C, n) that of the noise.
+    `after` is the extended model's where there is one, `nearest` that of the candidates which come
+    nearest where nothing explains. `driving` (n,) is the voltage that the load saw, `deviation` (C,
+    n) that of the noise.
     """
 
     event: Event
@@ -41,8 +43,13 @@ class Overlay:
 
 
 def on_fitted(
-    context: Context, gap: GapTest, nearest: Nearest | None, places: Sequence[DisagreementInterval], *, extended: bool
-) -> list[Overlay]:  # fmt: skip
+    context: Context,
+    gap: GapTest,
+    nearest: Nearest | None,
+    places: Sequence[DisagreementInterval],
+    *,
+    extended: bool,
+) -> list[Overlay]:
     """The fitted events; `extended` tells whether there is an extended model."""
     after = gap.after.calculated if extended else None
     near = None if nearest is None else nearest.curves[1].calculated
@@ -50,18 +57,31 @@ def on_fitted(
 
 
 def on_held_out(
-    context: Context, withheld: Sequence[Event], gap: GapTest | None, bare: Refit, nearest: Nearest | None
-) -> list[Overlay]:  # fmt: skip
-    """The held-out events: by the `gap` of the names on them or, without any, the base model carried over."""
+    context: Context,
+    withheld: Sequence[Event],
+    gap: GapTest | None,
+    bare: Refit,
+    nearest: Nearest | None,
+) -> list[Overlay]:
+    """The held-out events: by the `gap` of the names on them or, without any, the base model
+    carried over.
+    """
     if not withheld:
         return []
     if gap is not None:
         assert gap.context is not None
-        return _each(gap.context, gap.noise, (gap.before.calculated, gap.after.calculated, None), (), held_out=True)
+        return _each(
+            gap.context,
+            gap.noise,
+            (gap.before.calculated, gap.after.calculated, None),
+            (),
+            held_out=True,
+        )
     fits = [bare, *([nearest.row.fit] if nearest else [])]
     other, units, noise = carry_fits(context, withheld, fits)
     before, *near = [
-        other.residuals(unit[None], fit.names)[0] + other.drive.measured for unit, fit in zip(units, fits, strict=True)
+        other.residuals(unit[None], fit.names)[0] + other.drive.measured
+        for unit, fit in zip(units, fits, strict=True)
     ]
     return _each(other, noise, (before, None, near[0] if near else None), (), held_out=True)
 
@@ -72,12 +92,16 @@ def of_fit(context: Context, fit: Refit, noise: Noise) -> list[Overlay]:
     return _each(context, noise, (calculated, None, None), (), held_out=False)
 
 
-def find_remainder(overlays: Sequence[Overlay], noise: Noise, false_alarms: float) -> list[Remainder]:
+def find_remainder(
+    overlays: Sequence[Overlay], noise: Noise, false_alarms: float
+) -> list[Remainder]:
     """What the model that comes nearest leaves of these events, the loudest shape first."""
     if not overlays:
         return []
     curves = [next(m for m in (o.nearest, o.after, o.before) if m is not None) for o in overlays]
-    rest = np.concatenate([np.nan_to_num(o.measured - m) for o, m in zip(overlays, curves, strict=True)], axis=1)
+    rest = np.concatenate(
+        [np.nan_to_num(o.measured - m) for o, m in zip(overlays, curves, strict=True)], axis=1
+    )
     return remainders(rest, [o.event for o in overlays], noise, false_alarms)
 
 
@@ -97,5 +121,7 @@ def _each(
         assert before is not None
         driving = context.events[e].record.U
         here = tuple(p for p in places if p.event == event.record.name)
-        overlays.append(Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here))
+        overlays.append(
+            Overlay(event, held_out, driving, before, after, nearest, deviation[:, part], here)
+        )
     return overlays

@@ -1,11 +1,19 @@
-"""Where the disagreement is: intervals of time and channel with more residual energy than chance leaves there."""
+"""Where the disagreement is: intervals of time and channel with more residual energy than chance
+leaves there.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from tractexp.discrepancy.disagreement import Disagreement
-from tractexp.inference.goodness_of_fit import LOUDEST, ResidualWindow, energies, extremes, residual_windows
+from tractexp.inference.goodness_of_fit import (
+    LOUDEST,
+    ResidualWindow,
+    energies,
+    extremes,
+    residual_windows,
+)
 
 
 @dataclass(frozen=True)
@@ -20,7 +28,9 @@ class DisagreementInterval:
 
 
 def places(at: Disagreement) -> list[DisagreementInterval]:
-    """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined, the largest first."""
+    """Intervals that stand out at the family-wise error of `false_alarms`, adjacent ones joined,
+    the largest first.
+    """
     context = at.context
     windows = residual_windows(context.problem)
     (mean, spread), highest = extremes(at.chance.left[LOUDEST])
@@ -29,11 +39,14 @@ def places(at: Disagreement) -> list[DisagreementInterval]:
     total = np.maximum(excess, 0.0).sum()
     standing_out = [
         DisagreementInterval(
-            context.events[group[0].event].record.name, group[0].channel, group[0].start, group[-1].end,
+            context.events[group[0].event].record.name,
+            group[0].channel,
+            group[0].start,
+            group[-1].end,
             float(sum(excess[windows.index(c)] for c in group) / total),
         )
         for group in _join_windows([c for c, yes in zip(windows, loud, strict=True) if yes])
-    ]  # fmt: skip
+    ]
     return sorted(standing_out, key=lambda p: -p.share)
 
 
@@ -42,7 +55,11 @@ def _join_windows(windows: list[ResidualWindow]) -> list[list[ResidualWindow]]:
     groups: list[list[ResidualWindow]] = []
     for window in sorted(windows, key=lambda c: (c.event, c.channel, c.part.start)):
         last = groups[-1][-1] if groups else None
-        if last and (last.event, last.channel, last.part.stop) == (window.event, window.channel, window.part.start):
+        if last and (last.event, last.channel, last.part.stop) == (
+            window.event,
+            window.channel,
+            window.part.start,
+        ):
             groups[-1].append(window)
         else:
             groups.append([window])

@@ -1,4 +1,6 @@
-"""How well each parameter is known at a fit: its standard error, its 95 % interval, and the verdict in words."""
+"""How well each parameter is known at a fit: its standard error, its 95 % interval, and the verdict
+in words.
+"""
 
 from collections.abc import Sequence
 
@@ -21,13 +23,19 @@ def standard_errors(tests: Disagreement) -> dict[str, float]:
     labels = {k: name for name, k in at.column.items() if k not in tests.tangent.held}
     columns = at.nuisances(tests.fit.names)
     spread = free_standard_errors(tests.root)
-    return {labels[k]: float(s * at.width(labels[k])) for k, s in zip(columns, spread, strict=True) if k in labels}
+    return {
+        labels[k]: float(s * at.width(labels[k]))
+        for k, s in zip(columns, spread, strict=True)
+        if k in labels
+    }
 
 
 def effect_sizes(
     context: Context, fit: Refit, names: Sequence[str], tests: Disagreement | None
 ) -> list[ParameterEstimate]:
-    """How large the named effects are in a fit; with standard errors where its `tests` were made."""
+    """How large the named effects are in a fit; with standard errors where its
+    `tests` were made.
+    """
     at, own = context.coordinates, context.catalogue.sizes(names)
     values = [at.value(p.name, fit.unit) for p in own]
     if tests is None:
@@ -50,8 +58,11 @@ def covariance(tests: Disagreement, names: Sequence[str]) -> tuple[list[str], np
     return identified, (rows @ rows.T) * np.outer(width, width)
 
 
-def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> list[ParameterEstimate]:
-    """The base model's parameters and those of the named effects at coordinates (D,), as the tests of a fit know them.
+def estimates(
+    tests: Disagreement, unit: np.ndarray, effects: Sequence[str]
+) -> list[ParameterEstimate]:
+    """The base model's parameters and those of the named effects at coordinates (D,), as the tests
+    of a fit know them.
 
     The words are those of an identification.
     """
@@ -66,7 +77,9 @@ def estimates(tests: Disagreement, unit: np.ndarray, effects: Sequence[str]) -> 
     held = {n for n in names if at.column[n] in tests.tangent.held}
     words |= {n: f"{BOUND}: better values lie beyond it" for n in held}
     return [
-        ParameterEstimate(declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged"), tests.freedom)
+        ParameterEstimate(
+            declared[n], values[n], errors.get(n, np.nan), words.get(n, "not judged"), tests.freedom
+        )
         for n in names
     ]
 
@@ -79,7 +92,9 @@ def _words(
     columns = at.nuisances(tests.fit.names)
     own = [columns.index(at.column[n]) for n in names]
     others = [i for i in range(len(columns)) if i not in own]
-    lower, upper = (np.array([bound[at.column[n]] for n in names]) for bound in (at.box.lower, at.box.upper))
+    lower, upper = (
+        np.array([bound[at.column[n]] for n in names]) for bound in (at.box.lower, at.box.upper)
+    )
     information = Information.of(names, np.array(values), upper - lower, R[:, own], R[:, others])
     factors = np.full(len(errors), interval_factor(tests.freedom))
     assessment = judge(information, lower, upper, factors * np.array(errors), factors)

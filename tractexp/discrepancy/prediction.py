@@ -1,7 +1,8 @@
 """What each set of effects predicts of held-out events, every set fitted by least squares.
 
-A formula is not the physics. What the right one leaves is often no noise, and then a test of significance rejects it
-as it rejects a wrong one. What can be asked still is how much each set predicts in events that it was not fitted to.
+A formula is not the physics. What the right one leaves is often no noise, and then a test of
+significance rejects it as it rejects a wrong one. What can be asked still is how much each set
+predicts in events that it was not fitted to.
 """
 
 import functools
@@ -12,7 +13,13 @@ import numpy as np
 
 from tractexp.discrepancy.decide import find_predicting, rank_sets
 from tractexp.discrepancy.evidence import Evidence, PredictedError, SetEvidence
-from tractexp.discrepancy.explanations import WIDELY, Explanations, Names, search_effect_sets, wide_starts
+from tractexp.discrepancy.explanations import (
+    WIDELY,
+    Explanations,
+    Names,
+    search_effect_sets,
+    wide_starts,
+)
 from tractexp.discrepancy.families import member_fits
 from tractexp.discrepancy.least_squares import residual_noise
 from tractexp.discrepancy.proposal.best_term import best_terms
@@ -28,12 +35,15 @@ from tractexp.record import Event
 
 MOST_TRIED_FAMILIES = 2  # single effects whose families are tried, and to which a second is added
 CARRIED = 12  # sets of the search by likelihood that are fitted again
-SHARING = 10.0  # blocks that share the response: where two or three hold all of it, nothing is clear of chance
+# blocks that share the response: where two or three hold all of it, nothing is clear of chance
+SHARING = 10.0
 
 
 def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence:
-    """The table of single effects, of sets of two, and of what the search by likelihood ended with, by the model's
-    error on the held-out events. The powers before events are those measured, as in an identification."""
+    """The table of single effects, of sets of two, and of what the search by likelihood ended with,
+    by the model's error on the held-out events. The powers before events are those measured, as in
+    an identification.
+    """
     context = explained.base.context.with_measured_power
     criteria, family = context.criteria, context.catalogue.textbook
     noise = residual_noise(explained.base.context, explained.chosen)
@@ -46,20 +56,30 @@ def predict_errors(explained: Explanations, events: Sequence[Event]) -> Evidence
             for fit, one in zip(fits, predicted, strict=True)
         ]
 
-    base, *rows = sorted(fill(_fit_all_sets(context, explained, noise)), key=lambda row: bool(row.fit.names))
+    base, *rows = sorted(
+        fill(_fit_all_sets(context, explained, noise)), key=lambda row: bool(row.fit.names)
+    )
     table = Evidence(base, tuple(rows), noise=noise, there=there)
     if missing := _find_missing_subsets(table, rank_sets(table, criteria)[:1]):
         rows += fill(refit(context, noise, missing, faults=()))
         table = Evidence(base, tuple(rows), noise=noise, there=there)
     if not find_predicting(table, criteria):
         return table
-    return Evidence(base, tuple(rows), term=_find_best_term(context, table), noise=noise, there=there)
+    return Evidence(
+        base, tuple(rows), term=_find_best_term(context, table), noise=noise, there=there
+    )
 
 
-def _find_missing_subsets(table: Evidence, best: Sequence[SetEvidence]) -> list[tuple[Names, np.ndarray]]:
+def _find_missing_subsets(
+    table: Evidence, best: Sequence[SetEvidence]
+) -> list[tuple[Names, np.ndarray]]:
     """Subsets of the best set that were not fitted, each with where to start."""
-    subsets = [(s, row.fit.unit) for row in best for k in range(1, len(row.fit.names))
-               for s in itertools.combinations(row.fit.names, k)]  # fmt: skip
+    subsets = [
+        (s, row.fit.unit)
+        for row in best
+        for k in range(1, len(row.fit.names))
+        for s in itertools.combinations(row.fit.names, k)
+    ]
     return [(names, unit) for names, unit in subsets if table.row_of(names) is None]
 
 
@@ -85,7 +105,9 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
 
     squares = Likelihood.of_squares(context.kernels.bare, noise.levels[0])
     by_likelihood = map(at.at_measured_power, (explained.steps[0].fit.unit, *base.local_minima))
-    bare = refit(context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))])[0]
+    bare = refit(
+        context, noise, [((), unit) for unit in (*by_likelihood, *minima_of(context, squares))]
+    )[0]
     ground = explained.steps[0].at(context, bare, noise)
     refits: dict[Names, Refit] = {(): bare}
 
@@ -94,16 +116,24 @@ def _fit_all_sets(context: Context, explained: Explanations, noise: Noise) -> li
 
     add(search_effect_sets([ground], refits, 1, say))
     add(wide_refits(context, noise, wide_starts(context, bare.unit, refits), WIDELY))
-    carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[:CARRIED]
+    carried = sorted((f for f in explained.refits.values() if f.names), key=lambda f: f.cost)[
+        :CARRIED
+    ]
     if carried:
         add(refit(context, noise, [(f.names, at.at_measured_power(f.unit)) for f in carried]))
     singles = [f for f in best_of(refits.values()) if len(f.names) == 1]
     of_family = {context.catalogue.textbook(f.names)[0] for f in singles[:MOST_TRIED_FAMILIES]}
     add(member_fits(context, noise, refits, of_family))
-    of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]  # members of families have no columns
+    # members of families have no columns
+    of_load = [f for f in singles if f.names[0] in context.catalogue.of_load]
     for single in of_load[:MOST_TRIED_FAMILIES]:
         add(search_effect_sets([ground, ground.at(context, single, noise)], refits, 2, say))
-    return refit(context, noise, [(f.names, at.without_faults(f.unit, ())) for f in refits.values()], faults=())
+    return refit(
+        context,
+        noise,
+        [(f.names, at.without_faults(f.unit, ())) for f in refits.values()],
+        faults=(),
+    )
 
 
 def predict(there: Context, fit: Refit) -> PredictedError:
@@ -111,7 +141,8 @@ def predict(there: Context, fit: Refit) -> PredictedError:
     unit = there.coordinates.at_measured_power(fit.unit)
     calculated = there.residuals(unit[None], fit.names)[0] + there.drive.measured
     played = [
-        there.domain.comparison(event, calculated[:, there.drive.part(e)]) for e, event in enumerate(there.events)
+        there.domain.comparison(event, calculated[:, there.drive.part(e)])
+        for e, event in enumerate(there.events)
     ]
     left, noise, response = [], [], []
     for one, sums in zip(played, block_sums(played, SHARING), strict=True):
@@ -119,4 +150,6 @@ def predict(there: Context, fit: Refit) -> PredictedError:
         left.append(sums[:, 0] + own)
         noise.append(np.full(len(sums), own))
         response.append(sums[:, 1])
-    return PredictedError(np.concatenate(left), np.concatenate(noise), np.concatenate(response), unit)
+    return PredictedError(
+        np.concatenate(left), np.concatenate(noise), np.concatenate(response), unit
+    )

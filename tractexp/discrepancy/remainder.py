@@ -1,9 +1,11 @@
-"""What is left of the records where nothing explains it, in words: a ringing, a decay, a step or a pulse, and where.
+"""What is left of the records where nothing explains it, in words: a ringing, a decay, a step or a
+pulse, and where.
 
-The whitened residual of each event is searched for c exp(-(t - t0)/tau) cos(2 pi f (t - t0) + phi), t > t0, over all
-t0, tau and f at once: with z = exp(-1/tau + 2 pi i f) per sample, the sums of w[k + m] z^m from every k to the end are
-one recursive filter run backwards (a matched filter of every start). The loudest shape is fitted as the noise lets it
-be seen, taken away, and the next one looked for. f = 0 is a decay, and a step where tau is infinite too.
+The whitened residual of each event is searched for c exp(-(t - t0)/tau) cos(2 pi f (t - t0) + phi),
+t > t0, over all t0, tau and f at once: with z = exp(-1/tau + 2 pi i f) per sample, the sums of w[k
++ m] z^m from every k to the end are one recursive filter run backwards (a matched filter of every
+start). The loudest shape is fitted as the noise lets it be seen, taken away, and the next one
+looked for. f = 0 is a decay, and a step where tau is infinite too.
 """
 
 import itertools
@@ -22,23 +24,27 @@ from tractexp.noise.quiet import estimate
 from tractexp.record import Event
 
 MOST_SHAPES = 4  # shapes that are told
-TRIED_TIME_CONSTANTS = 6  # time constants tried, from two samples to the length of the record after the dip
+# time constants tried, from two samples to the length of the record after the dip
+TRIED_TIME_CONSTANTS = 6
 FREQUENCIES = 512  # tried at most with each of them
 HIGHEST_RELATIVE_FREQUENCY = 0.45  # of the sampling rate
 SHORTEST_SHAPE = 8  # samples of a shape
 POLISH_ROUNDS = 2  # of polishing the frequency and the decay, then the start
 STAYS = 3.0  # lengths of the rest of the record: what takes so long to die away does not
 PULSE = 3.0  # samples: what is over sooner is a pulse
-LEAST_UNPOLISHED_GAIN = 0.6  # of what a shape must gain: one that gains less before it is polished never does
+# of what a shape must gain: one that gains less before it is polished never does
+LEAST_UNPOLISHED_GAIN = 0.6
 SPARING = 2.0  # of log(samples): what the two more numbers of a ringing must gain over a decay
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """One shape that is left: `size` is its amplitude at first [pu], with its sign where it does not ring.
+    """One shape that is left: `size` is its amplitude at first [pu], with its sign where it does
+    not ring.
 
-    `noise` is the size in standard deviations of the channel's noise before the dip, `share` the part of what exceeds
-    the noise that it accounts for, `after` the time since the dip began, or since it ended where it has `ended`.
+    `noise` is the size in standard deviations of the channel's noise before the dip, `share` the
+    part of what exceeds the noise that it accounts for, `after` the time since the dip began, or
+    since it ended where it has `ended`.
     """
 
     event: str
@@ -56,14 +62,20 @@ class Remainder:
 
     def __str__(self) -> str:
         size = f"{abs(self.size):.2g} pu ({self.times} the noise)"
-        what, when = f"{self.channel} of {self.event}", f"from t = {self.start:.3f} s on, {self.when}"
+        what, when = (
+            f"{self.channel} of {self.event}",
+            f"from t = {self.start:.3f} s on, {self.when}",
+        )
         way = "up" if self.size > 0 else "down"
         if self.kind == "ringing":
             return f"{what} rings at {self.frequency:.3g} Hz {when}, at first by {size}{self._ends}"
         if self.kind == "pulse":
             assert self.time_constant is not None
             length = f"some {1000 * self.time_constant:.2g} ms"
-            return f"{what} has a pulse {way} of {size} at t = {self.start:.3f} s, {self.when}, of {length}"
+            return (
+                f"{what} has a pulse {way} of {size} at t = {self.start:.3f} s, {self.when}, of"
+                f" {length}"
+            )
         return f"{what} is {way} by {size} {when}{self._ends}"
 
     @property
@@ -89,14 +101,18 @@ class Remainder:
 
 
 class _Shape(NamedTuple):
-    """Where a shape begins [sample], its time constant [samples, inf] and its frequency [cycles per sample]."""
+    """Where a shape begins [sample], its time constant [samples, inf] and its frequency [cycles per
+    sample].
+    """
 
     start: int
     decay: float
     frequency: float
 
     def rings(self, samples: int) -> bool:
-        """Whether there is a cycle of it in so many samples and half of one before it dies away, and samples enough."""
+        """Whether there is a cycle of it in so many samples and half of one before it dies away,
+        and samples enough.
+        """
         lasts = min(2 * self.decay, samples - self.start)
         return lasts >= SHORTEST_SHAPE and self.frequency * lasts >= 1
 
@@ -120,16 +136,24 @@ class _Stretch:
     drive: Drive
 
     @classmethod
-    def of(cls, event: Event, residual: np.ndarray, noise: Noise, input_modes: np.ndarray | None) -> "_Stretch":
-        """The color of the noise is that before the dip, where that tells it: what is left would color its own.
+    def of(
+        cls, event: Event, residual: np.ndarray, noise: Noise, input_modes: np.ndarray | None
+    ) -> "_Stretch":
+        """The color of the noise is that before the dip, where that tells it: what is left would
+        color its own.
 
         Of waveforms it stays what it is, for what is left cannot color that.
         """
         drive, domain = Drive.of([domain_of(event).excitation(event)]), domain_of(event)
         valid, before = drive.weights > 0, slice(0, event.start)
-        if not domain.noise_from_model and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST_NOISE_SAMPLES:
+        if (
+            not domain.noise_from_model
+            and np.count_nonzero(np.all(valid, axis=0)[before]) >= FEWEST_NOISE_SAMPLES
+        ):
             noise = estimate(_level(residual[:, before]), valid[:, before], [before])
-        return cls(event, residual, replace(noise, random_walk=None, input_modes=input_modes), drive)
+        return cls(
+            event, residual, replace(noise, random_walk=None, input_modes=input_modes), drive
+        )
 
     @property
     def size(self) -> int:
@@ -140,7 +164,9 @@ class _Stretch:
         return self.noise.whiten(rows, self.drive, self.drive.weights > 0).reshape(rows.shape)
 
     def fitted(self, shape: _Shape, channel: int) -> tuple[float, np.ndarray, np.ndarray]:
-        """By how much a shape in one channel lowers the deviance, its sizes (1 or 2,) [pu], and itself (C, n)."""
+        """By how much a shape in one channel lowers the deviance, its sizes (1 or 2,) [pu], and
+        itself (C, n).
+        """
         templates = shape.templates(self.residual.shape[1])
         raw = np.zeros((len(templates), *self.residual.shape))
         raw[:, channel] = templates
@@ -159,36 +185,46 @@ def _level(rows: np.ndarray) -> np.ndarray:
 
 def remainders(
     residual: np.ndarray, events: Sequence[Event], noise: Noise, false_alarms: float = 0.05
-) -> list[Remainder]:  # fmt: skip
-    """The shapes that stand out of residuals (C, N) [pu], measured less calculated, of events end to end.
+) -> list[Remainder]:
+    """The shapes that stand out of residuals (C, N) [pu], measured less calculated, of events end
+    to end.
 
-    The loudest first, at most `MOST`; none where white noise would show as much with a probability of `false_alarms`.
-    Gaps are 0. `noise` is what a fit left in quiet stretches.
+    The loudest first, at most `MOST`; none where white noise would show as much with a probability
+    of `false_alarms`. Gaps are 0. `noise` is what a fit left in quiet stretches.
     """
     ends = np.cumsum([0, *(event.record.samples for event in events)])
     parts = [slice(a, b) for a, b in itertools.pairwise(ends.tolist())]
     stretches = [
         _Stretch.of(
-            event, residual[:, part], noise.of(e), None if noise.input_modes is None else noise.input_modes[:, :, part]
+            event,
+            residual[:, part],
+            noise.of(e),
+            None if noise.input_modes is None else noise.input_modes[:, :, part],
         )
         for e, (event, part) in enumerate(zip(events, parts, strict=True))
     ]
     excess = sum(float(np.sum(s.white(s.residual[None]) ** 2)) - s.size for s in stretches)
     loudest = [_loudest(s, false_alarms / len(stretches)) for s in stretches]
     shapes: list[Remainder] = []
-    while len(shapes) < MOST_SHAPES and (candidates := [(one, e) for e, one in enumerate(loudest) if one]):
+    while len(shapes) < MOST_SHAPES and (
+        candidates := [(one, e) for e, one in enumerate(loudest) if one]
+    ):
         (gain, shape, channel), e = max(candidates, key=lambda f: f[0][0])
         _, sizes, curve = stretches[e].fitted(shape, channel)
-        shapes.append(_describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain)))
+        shapes.append(
+            _describe_shape(stretches[e], shape, channel, sizes, gain / max(excess, gain))
+        )
         stretches[e] = replace(stretches[e], residual=stretches[e].residual - curve)
         loudest[e] = _loudest(stretches[e], false_alarms / len(stretches))
     return shapes
 
 
 def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int] | None:
-    """The shape that lowers the deviance of an event most, by how much, and its channel; None where chance does so.
+    """The shape that lowers the deviance of an event most, by how much, and its channel; None where
+    chance does so.
 
-    The bound on chance is that of as many independent tries as there are starts, decays and frequencies.
+    The bound on chance is that of as many independent tries as there are starts, decays and
+    frequencies.
     """
     white = stretch.white(stretch.residual[None])[0]
     tried, candidates = _search_shapes(white, max(stretch.event.start - 2, 0))
@@ -197,18 +233,24 @@ def _loudest(stretch: _Stretch, false_alarms: float) -> tuple[float, _Shape, int
     limit = 2 * np.log(tried / false_alarms)
     if best[0] < LEAST_UNPOLISHED_GAIN * limit:
         return None
-    polished = max((_refine_shape(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0])
+    polished = max(
+        (_refine_shape(stretch, best[1], c) for c in range(len(white))), key=lambda f: f[0]
+    )
     return polished if polished[0] > limit else None
 
 
 def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float, _Shape]]]:
-    """How many shapes were tried in white rows (C, n) from sample `first` on, and the best of each kind."""
+    """How many shapes were tried in white rows (C, n) from sample `first` on, and the best of each
+    kind.
+    """
     length = white.shape[1] - first
     decays = np.geomspace(2.0, max(length, 4), TRIED_TIME_CONSTANTS)
     shapes = [(float(d), 0.0) for d in (*decays, np.inf)]
     for d in decays[decays >= SHORTEST_SHAPE / 2]:
         spacing = max(1 / (2 * length), 1 / (8 * d))
-        frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST_RELATIVE_FREQUENCY, spacing)[:FREQUENCIES]
+        frequencies = np.arange(max(0.5 / d, 1 / length), HIGHEST_RELATIVE_FREQUENCY, spacing)[
+            :FREQUENCIES
+        ]
         shapes += [(float(d), float(f)) for f in frequencies]
     best: dict[bool, tuple[float, _Shape]] = {}
     for decay, frequency in shapes:
@@ -220,11 +262,15 @@ def _search_shapes(white: np.ndarray, first: int) -> tuple[int, list[tuple[float
 
 
 def _gains(white: np.ndarray, decay: float, frequency: float) -> np.ndarray:
-    """Drop of the sum of squares (n - SHORTEST,) by a shape from each sample on, in the channel that shows it most."""
+    """Drop of the sum of squares (n - SHORTEST,) by a shape from each sample on, in the channel
+    that shows it most.
+    """
     from scipy.signal import lfilter
 
     z = np.exp(-1 / decay + 2j * np.pi * frequency)
-    sums = np.asarray(lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1), dtype=np.complex128)[:, ::-1]
+    sums = np.asarray(
+        lfilter([1.0], [1.0, -z], white[:, ::-1].astype(complex), axis=1), dtype=np.complex128
+    )[:, ::-1]
     left = np.arange(white.shape[1], 0, -1)  # samples from each on
 
     def series(q: complex) -> NDArray[np.complex128]:
@@ -256,12 +302,20 @@ def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float
             start, ringing = shape.start, bool(shape.frequency)
 
             def at(x: np.ndarray, start: int = start, ringing: bool = ringing) -> _Shape:
-                return _Shape(start, float(np.exp(np.clip(x[0], 0.0, np.log(20 * n)))), abs(x[1]) if ringing else 0.0)
+                return _Shape(
+                    start,
+                    float(np.exp(np.clip(x[0], 0.0, np.log(20 * n)))),
+                    abs(x[1]) if ringing else 0.0,
+                )
 
             begin = np.array([np.log(shape.decay), shape.frequency][: 1 + ringing])
-            simplex = np.stack([begin, *(begin + np.diag([0.3, 0.1 / (2 * np.pi * shape.decay)][: 1 + ringing]))])
+            simplex = np.stack(
+                [begin, *(begin + np.diag([0.3, 0.1 / (2 * np.pi * shape.decay)][: 1 + ringing]))]
+            )
             options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 1e-3, "maxfev": 80}
-            done = minimize(lambda x, at=at: -gain(at(x)), begin, method="Nelder-Mead", options=options)
+            done = minimize(
+                lambda x, at=at: -gain(at(x)), begin, method="Nelder-Mead", options=options
+            )
             shape = max(shape, at(done.x), key=gain)
         period = 1 / shape.frequency if shape.frequency else 4.0
         reach = int(np.clip(period / 2, 3, 25))
@@ -270,13 +324,23 @@ def _refine_shape(stretch: _Stretch, shape: _Shape, channel: int) -> tuple[float
     return gain(shape), shape, channel
 
 
-def _describe_shape(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float) -> Remainder:
+def _describe_shape(
+    stretch: _Stretch, shape: _Shape, channel: int, sizes: np.ndarray, share: float
+) -> Remainder:
     """A shape as a person reads it."""
     event, step = stretch.event, stretch.event.record.step
     ringing = bool(shape.frequency)
     rest = stretch.residual.shape[1] - shape.start
     tau = shape.decay * step if shape.decay < STAYS * rest else None
-    kind = "ringing" if ringing else "step" if tau is None else "pulse" if shape.decay < PULSE else "decay"
+    kind = (
+        "ringing"
+        if ringing
+        else "step"
+        if tau is None
+        else "pulse"
+        if shape.decay < PULSE
+        else "decay"
+    )
     size = float(np.hypot(*sizes)) if ringing else float(sizes[0])
     level = max(event.levels[channel], SMALLEST_DEVIATION)
     start = float(event.record.t[shape.start])
@@ -284,8 +348,16 @@ def _describe_shape(stretch: _Stretch, shape: _Shape, channel: int, sizes: np.nd
     frequency = shape.frequency / step if ringing else None
     pace = None if tau is None or frequency is None else np.hypot(2 * np.pi * frequency * tau, 1.0)
     return Remainder(
-        event=event.record.name, channel=stretch.drive.spoken[channel], kind=kind, start=start,
-        after=start - (event.t_end if ended else event.t_start), ended=ended, frequency=frequency,
-        time_constant=tau, damping=None if pace is None else float(1 / pace), size=size, noise=abs(size) / level,
+        event=event.record.name,
+        channel=stretch.drive.spoken[channel],
+        kind=kind,
+        start=start,
+        after=start - (event.t_end if ended else event.t_start),
+        ended=ended,
+        frequency=frequency,
+        time_constant=tau,
+        damping=None if pace is None else float(1 / pace),
+        size=size,
+        noise=abs(size) / level,
         share=float(share),
-    )  # fmt: skip
+    )

@@ -1,10 +1,11 @@
 """Whether what a model leaves is the work of the recorder: phasors averaged over whole cycles.
 
-It is looked for before any effect is, among whole cycles where the records do not say what it is. A window that the
-recorder does not have makes the voltage bend where the power does not: that costs much, with effects in the load or
-without. So one is believed that explains half as much as the best effect; one that the records say, where it helps at
-all. A model that lacks something large may gain nothing by the right window. So where an explanation has faults of the
-measurement beside it, it is fitted behind each window, too: one that leaves no such fault takes their place.
+It is looked for before any effect is, among whole cycles where the records do not say what it is. A
+window that the recorder does not have makes the voltage bend where the power does not: that costs
+much, with effects in the load or without. So one is believed that explains half as much as the best
+effect; one that the records say, where it helps at all. A model that lacks something large may gain
+nothing by the right window. So where an explanation has faults of the measurement beside it, it is
+fitted behind each window, too: one that leaves no such fault takes their place.
 """
 
 from collections.abc import Sequence
@@ -20,12 +21,15 @@ from tractexp.inference.recorder_window import windows_of
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
 
-WINDOW_SHARE = 0.5  # of what the best effect explains, that a window must: what lacks much takes a wrong one for a part
+# of what the best effect explains, that a window must: what lacks much takes a wrong one for a part
+WINDOW_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class WindowFit:
-    """A window: the context behind it, the base model's fit there, and by how much it lowers the deviance."""
+    """A window: the context behind it, the base model's fit there, and by how much it lowers the
+    deviance.
+    """
 
     behind: Context
     fit: Refit
@@ -33,11 +37,14 @@ class WindowFit:
 
 
 def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[BaseFit, Disagreement]:
-    """The base model's fit and tests behind the recorder's window, where there is one; else those given."""
+    """The base model's fit and tests behind the recorder's window, where there is one; else those
+    given.
+    """
     context, noise = base.context, first.noise
     if not context.domain.windowed:
         return base, first
-    if context.drive.windows:  # the model is of a kind that is always looked at through what the records say
+    # the model is of a kind that is always looked at through what the records say
+    if context.drive.windows:
         return base, first
     if noise.loudest_input_mode > BLURRED:  # noise of the voltage would pass for a window
         return base, first
@@ -54,7 +61,9 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
     if believed is None:
         return base, first
     assert believed.behind.records.window is not None
-    context.effort.say(f"{believed.behind.records.window.describe()}: taken into account from here on")
+    context.effort.say(
+        f"{believed.behind.records.window.describe()}: taken into account from here on"
+    )
     base = fitted_from(believed.behind, [believed.fit.unit], base.local_minima)
     return base, disagreement(base, seed)
 
@@ -62,8 +71,9 @@ def behind_recorder(base: BaseFit, first: Disagreement, seed: int) -> tuple[Base
 def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit | None:
     """The window that helps most, where it helps enough.
 
-    None where an effect explains far more than any window does: what lacks something large takes a wrong window for a
-    part of it. Without stator transients one of two cycles fits better than the right one.
+    None where an effect explains far more than any window does: what lacks something large takes a
+    wrong window for a part of it. Without stator transients one of two cycles fits better than the
+    right one.
     """
     best = max(tried, key=lambda one: one.gained)
     most, criteria = max((s.drop for s in first.scores), default=0.0), first.criteria
@@ -73,10 +83,14 @@ def _choose_window(tried: Sequence[WindowFit], first: Disagreement) -> WindowFit
     return best if best.gained > max(criteria.shown, WINDOW_SHARE * most) else None
 
 
-def behind_window(base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int) -> BaseFit | None:
-    """The base model's fit behind the recorder's window that does away with the faults of the measurement which the
-    best explanation has beside it; None where there is none. Windows are tried as long as they leave less than a
-    shorter one. `bare` is the base model's fit without a window."""
+def behind_window(
+    base: BaseFit, bare: Refit, best: Refit, noise: Noise, seed: int
+) -> BaseFit | None:
+    """The base model's fit behind the recorder's window that does away with the faults of the
+    measurement which the best explanation has beside it; None where there is none. Windows are
+    tried as long as they leave less than a shorter one. `bare` is the base model's fit without a
+    window.
+    """
     context = base.context
     if not context.domain.windowed or context.drive.windows:
         return None

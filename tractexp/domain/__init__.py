@@ -1,7 +1,7 @@
 """The two domains: what a model is compared with, and everything that follows from that.
 
-`PHASORS` compares P and Q, `WAVES` sampled currents. Models and events say which they belong to; whatever depends on it
-is asked of the domain.
+`PHASORS` compares P and Q, `WAVES` sampled currents. Models and events say which they belong to;
+whatever depends on it is asked of the domain.
 """
 
 from tractexp.domain.domain import Domain as Domain

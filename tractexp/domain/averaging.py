@@ -1,4 +1,6 @@
-"""The window over which a recorder averages phasors, as a model's setting says it (`model.window`)."""
+"""The window over which a recorder averages phasors, as a model's setting says it
+(`model.window`).
+"""
 
 from numbers import Real
 from typing import NamedTuple
@@ -16,22 +18,35 @@ RECORDED = "recorded"  # the window that each record says
 
 
 class Averaging(NamedTuple):
-    """A window on the samples of an event: weights (odd,) around the middle one, and its length [s]."""
+    """A window on the samples of an event: weights (odd,) around the middle one, and its length
+    [s].
+    """
 
     weights: np.ndarray
     length: float
 
 
 def check_window(window: object, domain: str) -> None:
-    """Raise `UserError` for a setting that is no window: None, seconds, an estimator's name or `recorded`."""
+    """Raise `UserError` for a setting that is no window: None, seconds, an estimator's name or
+    `recorded`.
+    """
     if window is not None and domain == WAVES:
-        raise UserError(f"{MODEL.window}={window} has no meaning on waveforms, which are samples; leave it out")
+        raise UserError(
+            f"{MODEL.window}={window} has no meaning on waveforms, which are samples; leave it out"
+        )
     names = (RECORDED, *sorted(discover()[Estimator.group]))
     if window is None or window in names:
         return
     if isinstance(window, str):
-        raise UserError(f"{MODEL.window}={window}: there is no such window{among(window, names)}; or give seconds")
-    if isinstance(window, bool) or not isinstance(window, Real) or not 0 < float(window) <= LONGEST_WINDOW:
+        raise UserError(
+            f"{MODEL.window}={window}: there is no such window{among(window, names)}; or give"
+            " seconds"
+        )
+    if (
+        isinstance(window, bool)
+        or not isinstance(window, Real)
+        or not 0 < float(window) <= LONGEST_WINDOW
+    ):
         raise UserError(
             f"{MODEL.window}={window} is no window: give its length, at most {LONGEST_WINDOW:g} s,"
             f" or one of {', '.join(names)}"
@@ -39,9 +54,11 @@ def check_window(window: object, domain: str) -> None:
 
 
 def find_averaging(event: Event, model: Model | None) -> Averaging | None:
-    """The window through which a model is looked at in an event: the one it is set to, else that of the record.
+    """The window through which a model is looked at in an event: the one it is set to, else that of
+    the record.
 
-    That of the record counts where the model follows what happens within a cycle. None: no window, or none known.
+    That of the record counts where the model follows what happens within a cycle. None: no window,
+    or none known.
     """
     if model is None:
         return None

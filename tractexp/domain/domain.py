@@ -24,7 +24,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class DipGrid:
-    """Dips that might be recorded next: durations [s] that are tried, edges [s], time before and from the start on."""
+    """Dips that might be recorded next: durations [s] that are tried, edges [s], time before and
+    from the start on.
+    """
 
     durations: tuple[float, ...]
     edge: float
@@ -33,7 +35,9 @@ class DipGrid:
 
 
 class Domain(ABC):
-    """What a model is compared with: the power of phasors, or sampled currents. See `tractexp.domain`."""
+    """What a model is compared with: the power of phasors, or sampled currents. See
+    `tractexp.domain`.
+    """
 
     name: ClassVar[str]  # as a setting says it
     setting: ClassVar[str]  # what a command needs to choose it, with a space behind it
@@ -42,20 +46,26 @@ class Domain(ABC):
     # integration
     finest: ClassVar[float]  # pu, largest error of the automatic Runge-Kutta step
     probed: ClassVar[float]  # share of the candidates across the box on which that is judged
-    aftermath: ClassVar[float]  # s after a dip until when: a stalled motor runs away ever faster, for ever finer steps
+    # s after a dip until when: a stalled motor runs away ever faster, for ever finer steps
+    aftermath: ClassVar[float]
     stiff: ClassVar[bool]  # whether some candidates of the box diverge at any step, and are refused
     # noise
     quiet_order: ClassVar[int]  # of an autoregression of the few samples before a dip
-    noise_from_model: ClassVar[bool]  # whether its color follows from the model, and only its size from the records
+    # whether its color follows from the model, and only its size from the records
+    noise_from_model: ClassVar[bool]
     # records
-    windowed: ClassVar[bool]  # whether samples are averages over a recorder's window, which may have to be searched
+    # whether samples are averages over a recorder's window, which may have to be searched
+    windowed: ClassVar[bool]
     # investigation
     calibrated: ClassVar[bool]  # whether criteria were calibrated with members of families
-    recordable: ClassVar[bool]  # whether a dip that nobody recorded can be made a record and fitted beside others
+    # whether a dip that nobody recorded can be made a record and fitted beside others
+    recordable: ClassVar[bool]
     # planning
     edge: ClassVar[float]  # s, fall and rise of a planned dip
-    further: ClassVar[Mapping[str, str]]  # channels that a jump of the phase and an unbalance have to be recorded with
-    shaped_by: ClassVar[tuple[str, ...]]  # what a planned dip has beside depth, duration, rate and noise
+    # channels that a jump of the phase and an unbalance have to be recorded with
+    further: ClassVar[Mapping[str, str]]
+    # what a planned dip has beside depth, duration, rate and noise
+    shaped_by: ClassVar[tuple[str, ...]]
     planned_noise: ClassVar[str]  # what the noise of a plan is
     dips: ClassVar[DipGrid]  # that might be recorded next
 
@@ -66,7 +76,9 @@ class Domain(ABC):
 
     @abstractmethod
     def event(self, event: Event) -> Event:
-        """An event as a model is compared with it. Raises `UserError` where it needs samples that there are not."""
+        """An event as a model is compared with it. Raises `UserError` where it needs samples that
+        there are not.
+        """
 
     def events(self, events: Sequence[Event]) -> tuple[Event, ...]:
         """The same of several."""
@@ -76,7 +88,9 @@ class Domain(ABC):
     def excitation(
         self, event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
     ) -> Excitation | WaveformDrive:
-        """What drives a model through an event of this domain; `weights` are those of an objective, of P and Q."""
+        """What drives a model through an event of this domain; `weights` are those of an objective,
+        of P and Q.
+        """
 
     @abstractmethod
     def smoothed(self, event: Event) -> SmoothedEvent:
@@ -84,11 +98,15 @@ class Domain(ABC):
 
     @abstractmethod
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
-        """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not compared."""
+        """The samples of the drive whose means are P0 and Q0 of each event; [] where those are not
+        compared.
+        """
 
     @abstractmethod
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
-        """Runge-Kutta step [s] that is fine enough for dips like these events, which took so many per sample."""
+        """Runge-Kutta step [s] that is fine enough for dips like these events, which took so many
+        per sample.
+        """
 
     @abstractmethod
     def values(self, drive: Drive) -> int:
@@ -96,18 +114,26 @@ class Domain(ABC):
 
     @abstractmethod
     def noise(
-        self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
-    ) -> Noise:  # fmt: skip
+        self,
+        residual: np.ndarray,
+        valid: np.ndarray,
+        quiet: Sequence[slice],
+        problem: "Problem",
+        values: np.ndarray,
+        walk: Callable[[np.ndarray], RandomWalk | None],
+        shapes: np.ndarray | None,
+    ) -> Noise:
         """The noise of residuals (C, N) in quiet stretches, at free values (d,) of the problem.
 
-        `walk` tells how the load wanders in channels mixed by a matrix (C, C), `shapes` (k, C, N) are what errors of
-        the record do. Raises `UserError` where too few samples are quiet.
+        `walk` tells how the load wanders in channels mixed by a matrix (C, C), `shapes` (k, C, N)
+        are what errors of the record do. Raises `UserError` where too few samples are quiet.
         """
 
     @abstractmethod
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray | None:
-        """What errors of the record beside the voltage's noise do at free values (d,), (k, C, N) [pu], or None."""
+        """What errors of the record beside the voltage's noise do at free values (d,), (k, C, N)
+        [pu], or None.
+        """
 
     @abstractmethod
     def comparison(self, event: Event, outputs: np.ndarray) -> Playback:
@@ -119,7 +145,9 @@ class Domain(ABC):
 
     @abstractmethod
     def outputs(self, event: Event, responses: Sequence[Complex]) -> np.ndarray:
-        """What is compared (C, N), where deviations of the ports' currents are `responses`, (N,) complex each [pu]."""
+        """What is compared (C, N), where deviations of the ports' currents are `responses`, (N,)
+        complex each [pu].
+        """
 
     @abstractmethod
     def better(self, event: Event) -> str:
@@ -148,33 +176,53 @@ class Domain(ABC):
 
     @abstractmethod
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
-        """Where noise is estimated, and how faults of the measurement are free in every fit, in sentences.
+        """Where noise is estimated, and how faults of the measurement are free in every fit, in
+        sentences.
 
         `judged` says whether noise would not pass for these faults.
         """
 
     @abstractmethod
-    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
-        """A dip as if it had been recorded at times t (N,) [s], `course` (N,) of it there: 0 to 1."""
+    def planned(
+        self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
+    ) -> Event:
+        """A dip as if it had been recorded at times t (N,) [s], `course` (N,) of it
+        there: 0 to 1.
+        """
 
     @abstractmethod
     def dip(
-        self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
+        self,
+        like: Event,
+        step: float,
+        course: np.ndarray,
+        depth: float,
+        jump: float,
+        unbalance: float,
     ) -> Excitation | WaveformDrive:
-        """The voltage of a dip at the power before a recorded event, `course` (N,) of it there: 0 to 1.
+        """The voltage of a dip at the power before a recorded event, `course` (N,) of it there: 0
+        to 1.
 
         The phase turns by `jump` [degrees]; the negative sequence is `unbalance` times the depth.
         """
 
     @abstractmethod
     def play(
-        self, model: Model, values: np.ndarray, t: np.ndarray, U: np.ndarray, before: Mapping[str, float],
-        omega_s: np.ndarray | None = None, omega_s0: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """P and Q (N,) [pu] that a load draws from a voltage U (N,) [pu] at uniform times t (N,) [s].
+        self,
+        model: Model,
+        values: np.ndarray,
+        t: np.ndarray,
+        U: np.ndarray,
+        before: Mapping[str, float],
+        omega_s: np.ndarray | None = None,
+        omega_s0: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """P and Q (N,) [pu] that a load draws from a voltage U (N,) [pu] at uniform times t (N,)
+        [s].
 
-        `before` has U0, P0, Q0 [pu] and the nominal `frequency` [Hz]; omega_s (N,) [rad/s] is the synchronous speed
-        relative to it, `omega_s0` that before. Raises `UserError` where there is no steady state.
+        `before` has U0, P0, Q0 [pu] and the nominal `frequency` [Hz]; omega_s (N,) [rad/s] is the
+        synchronous speed relative to it, `omega_s0` that before. Raises `UserError` where there is
+        no steady state.
         """
 
 

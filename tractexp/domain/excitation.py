@@ -8,14 +8,17 @@ from tractexp.model.model import Model
 from tractexp.record import Event, WaveEvent
 from tractexp.record.window import sharpen_voltage
 
-WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}  # by phases, so that the objective is the mean over them
+# by phases, so that the objective is the mean over them
+WEIGHTS = {3: (0.5, 0.5, 1.0), 1: (1.0, 0.0, 0.0)}
 
 
-def phasors(event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)) -> Excitation:
+def phasors(
+    event: Event, model: Model | None = None, weights: tuple[float, float] = (1.0, 1.0)
+) -> Excitation:
     """The voltage and the power of an event; squared errors of P and of Q count by `weights`.
 
-    A recorded frequency sets the synchronous speed. A model that is looked at through the recorder's window is driven
-    by the voltage that the load saw, computed back through it.
+    A recorded frequency sets the synchronous speed. A model that is looked at through the
+    recorder's window is driven by the voltage that the load saw, computed back through it.
     """
     averaging = find_averaging(event, model)
     if averaging is not None:
@@ -44,8 +47,18 @@ def waveforms(event: WaveEvent) -> WaveformDrive:
     """The voltage's space vector of an event, and its currents."""
     assert event.record.U2 is not None
     return WaveformDrive(
-        step=event.record.step, v=event.v, v_zero=event.v_zero, turn=event.turn, currents=event.currents,
-        U=event.record.U, U2=event.record.U2, U0=event.U0, P0=event.P0, Q0=event.Q0,
-        U20=float(event.record.U2[event.steady].mean()), omega_s0=event.omega_s0,
-        omega_n=2 * np.pi * event.record.base.frequency, weights=WEIGHTS[event.phases],
-    )  # fmt: skip
+        step=event.record.step,
+        v=event.v,
+        v_zero=event.v_zero,
+        turn=event.turn,
+        currents=event.currents,
+        U=event.record.U,
+        U2=event.record.U2,
+        U0=event.U0,
+        P0=event.P0,
+        Q0=event.Q0,
+        U20=float(event.record.U2[event.steady].mean()),
+        omega_s0=event.omega_s0,
+        omega_n=2 * np.pi * event.record.base.frequency,
+        weights=WEIGHTS[event.phases],
+    )

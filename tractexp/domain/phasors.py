@@ -36,7 +36,8 @@ class PhasorDomain(Domain):
     edge = 0.02
     further = {"jump": "the frequency f", "unbalance": "U2"}
     shaped_by, planned_noise = (), "noise, of P before the dip"
-    dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)  # the longest is a tap or a bank that is back after 1 s
+    # the longest is a tap or a bank that is back after 1 s
+    dips = DipGrid((0.1, 0.2, 0.4, 0.8), 0.04, 0.3, 2.5)
 
     def event(self, event: Event) -> Event:
         return event
@@ -51,7 +52,9 @@ class PhasorDomain(Domain):
 
     def steady(self, events: Sequence[Event], drive: Drive) -> list[slice]:
         first = [int(drive.first[e]) for e in range(drive.events)]
-        return [slice(a + e.steady.start, a + e.steady.stop) for a, e in zip(first, events, strict=True)]
+        return [
+            slice(a + e.steady.start, a + e.steady.stop) for a, e in zip(first, events, strict=True)
+        ]
 
     def longest_step(self, events: Sequence[Event], substeps: np.ndarray) -> float:
         return FINEST_STEP
@@ -60,9 +63,15 @@ class PhasorDomain(Domain):
         return drive.measured.size
 
     def noise(
-        self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
-    ) -> Noise:  # fmt: skip
+        self,
+        residual: np.ndarray,
+        valid: np.ndarray,
+        quiet: Sequence[slice],
+        problem: "Problem",
+        values: np.ndarray,
+        walk: Callable[[np.ndarray], RandomWalk | None],
+        shapes: np.ndarray | None,
+    ) -> Noise:
         return estimate(residual, valid, quiet, walk, shapes)
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> None:
@@ -83,7 +92,9 @@ class PhasorDomain(Domain):
         waves, record = event.record.waves, event.record
         if waves is None or waves.rate < COARSEST * record.base.frequency:
             return ""
-        U2 = 0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
+        U2 = (
+            0.0 if record.U2 is None else float(record.U2[event.start : event.end].max() / event.U0)
+        )
         why = describe_smearing(event.duration, U2, record.base.frequency)
         return why and f"fit the sampled waveforms, by domain=waves: the dip of {record.name} {why}"
 
@@ -98,41 +109,87 @@ class PhasorDomain(Domain):
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
         return (
-            "It is estimated where nothing happens, from what the fit leaves there, and so contains what smoothing"
-            " leaves of the voltage's noise. Time skew, measurement window and load drift are free in every fit, each"
+            "It is estimated where nothing happens, from what the fit leaves there, and so contains"
+            " what smoothing"
+            " leaves of the voltage's noise. Time skew, measurement window and load drift are free"
+            " in every fit, each"
             " held by what is physically likely."
         )
 
-    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+    def planned(
+        self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
+    ) -> Event:
         """P and Q hold the steady state, for no forecast looks at them."""
         record = Record(
-            name, t, 1 - shape.depth * course, np.full(len(t), shape.P0), np.full(len(t), shape.Q0),
+            name,
+            t,
+            1 - shape.depth * course,
+            np.full(len(t), shape.P0),
+            np.full(len(t), shape.Q0),
             base=Base(frequency=shape.frequency),
-        )  # fmt: skip
+        )
         return Event(
-            record=record, start=start, end=min(end, len(t) - 1), depth=shape.depth, U0=1.0, P0=shape.P0, Q0=shape.Q0,
-            f0=shape.frequency, noise_U=0.0, noise_P=shape.noise_P, noise_Q=shape.noise_Q, steady=slice(0, start),
+            record=record,
+            start=start,
+            end=min(end, len(t) - 1),
+            depth=shape.depth,
+            U0=1.0,
+            P0=shape.P0,
+            Q0=shape.Q0,
+            f0=shape.frequency,
+            noise_U=0.0,
+            noise_P=shape.noise_P,
+            noise_Q=shape.noise_Q,
+            steady=slice(0, start),
             dips=1,
-        )  # fmt: skip
+        )
 
     def dip(
-        self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
+        self,
+        like: Event,
+        step: float,
+        course: np.ndarray,
+        depth: float,
+        jump: float,
+        unbalance: float,
     ) -> Excitation:
         still = np.zeros(len(course))
         return Excitation(
-            step, like.U0 * (1 - depth * course), still, still, like.U0, like.P0, like.Q0,
-            omega_s=np.radians(jump) * np.gradient(course, step), omega_n=2 * np.pi * like.record.base.frequency,
-            U2=unbalance * depth * like.U0 * course, U20=0.0,
-        )  # fmt: skip
+            step,
+            like.U0 * (1 - depth * course),
+            still,
+            still,
+            like.U0,
+            like.P0,
+            like.Q0,
+            omega_s=np.radians(jump) * np.gradient(course, step),
+            omega_n=2 * np.pi * like.record.base.frequency,
+            U2=unbalance * depth * like.U0 * course,
+            U20=0.0,
+        )
 
     def play(
-        self, model: Model, values: np.ndarray, t: np.ndarray, U: np.ndarray, before: Mapping[str, float],
-        omega_s: np.ndarray | None = None, omega_s0: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+        self,
+        model: Model,
+        values: np.ndarray,
+        t: np.ndarray,
+        U: np.ndarray,
+        before: Mapping[str, float],
+        omega_s: np.ndarray | None = None,
+        omega_s0: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:
         unknown = np.full(len(U), np.nan)
         event = Excitation(
-            step=float((t[-1] - t[0]) / (len(t) - 1)), U=U, P=unknown, Q=unknown, U0=before["U0"], P0=before["P0"],
-            Q0=before["Q0"], omega_s=omega_s, omega_s0=omega_s0, omega_n=2 * np.pi * before["frequency"],
-        )  # fmt: skip
+            step=float((t[-1] - t[0]) / (len(t) - 1)),
+            U=U,
+            P=unknown,
+            Q=unknown,
+            U0=before["U0"],
+            P0=before["P0"],
+            Q0=before["Q0"],
+            omega_s=omega_s,
+            omega_s0=omega_s0,
+            omega_n=2 * np.pi * before["frequency"],
+        )
         outputs = simulate_compared(model, values, Drive.of([event]))
         return outputs[0], outputs[1]

@@ -1,6 +1,8 @@
-"""What a model calculates of one event beside what was recorded: P and Q, and of waveforms the currents.
+"""What a model calculates of one event beside what was recorded: P and Q, and of waveforms the
+currents.
 
-The record's estimator measures calculated waveforms as it does recorded ones, so that they compare in P and Q, too.
+The record's estimator measures calculated waveforms as it does recorded ones, so that they compare
+in P and Q, too.
 """
 
 from dataclasses import dataclass, replace
@@ -16,11 +18,13 @@ AFTER = 0.15  # s after a dip's start in which the currents' error counts
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Playback:
-    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20), as fractions.
+    """Measured and calculated power of one event, (N,) each, and the relative errors of Eq. (20),
+    as fractions.
 
-    Of waveforms the power is that which the record's estimator sees in calculated and in recorded currents, and
-    `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the samples of the event in `waves`;
-    `unsettled` is by how much they still change from one cycle to the next before the record, a share of them.
+    Of waveforms the power is that which the record's estimator sees in calculated and in recorded
+    currents, and `currents` (3, N), alpha, beta and zero, are the calculated ones [pu] on the
+    samples of the event in `waves`; `unsettled` is by how much they still change from one cycle to
+    the next before the record, a share of them.
     """
 
     event: Event
@@ -37,29 +41,44 @@ class Playback:
     def of_power(cls, event: Event, P: np.ndarray, Q: np.ndarray) -> "Playback":
         """Calculated P and Q (N,) [pu] beside the recorded ones."""
         record = event.record
-        return cls(event=event, P=P, Q=Q, epsilon_p=relative_error(record.P, P), epsilon_q=relative_error(record.Q, Q))
+        return cls(
+            event=event,
+            P=P,
+            Q=Q,
+            epsilon_p=relative_error(record.P, P),
+            epsilon_q=relative_error(record.Q, Q),
+        )
 
     @classmethod
     def of_currents(cls, event: WaveEvent, currents: np.ndarray) -> "Playback":
-        """Calculated currents (3, N) [pu] beside the recorded ones, and the phasors of both by one estimator."""
+        """Calculated currents (3, N) [pu] beside the recorded ones, and the phasors of both by one
+        estimator.
+        """
         return replace(
-            cls.of_power(*as_phasors(event, currents)), epsilon_i=current_error(event, currents), waves=event,
-            currents=currents, unsettled=measure_unsteadiness(event, currents),
-        )  # fmt: skip
+            cls.of_power(*as_phasors(event, currents)),
+            epsilon_i=current_error(event, currents),
+            waves=event,
+            currents=currents,
+            unsettled=measure_unsteadiness(event, currents),
+        )
 
 
 def relative_error(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps left out.
+    """epsilon of Eq. (20) as a fraction: RMS of the difference over RMS of the measurement, gaps
+    left out.
 
     nan where nothing was measured but zero.
     """
     valid = np.isfinite(measured)
     size = float(np.linalg.norm(measured[valid]))
-    return float(np.linalg.norm((calculated - measured)[valid])) / size if size > 0 else float("nan")
+    return (
+        float(np.linalg.norm((calculated - measured)[valid])) / size if size > 0 else float("nan")
+    )
 
 
 def current_error(event: WaveEvent, currents: np.ndarray) -> float:
-    """epsilon_i: rms of what calculated currents (3, N) miss from the dip's start to 0.15 s after it, all phases.
+    """epsilon_i: rms of what calculated currents (3, N) miss from the dip's start to 0.15 s after
+    it, all phases.
 
     Over the rms of the recorded currents before the dip.
     """
@@ -72,10 +91,12 @@ def current_error(event: WaveEvent, currents: np.ndarray) -> float:
 
 
 def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
-    """By how much calculated currents (3, N) still change from cycle to cycle before the record, a share of them.
+    """By how much calculated currents (3, N) still change from cycle to cycle before the record, a
+    share of them.
 
-    The rms of the last cycle of the lead less the one before it, over the rms of the last one; nan where the lead is
-    shorter than two cycles. A cycle is no whole number of samples: the earlier one is read off a cubic spline.
+    The rms of the last cycle of the lead less the one before it, over the rms of the last one; nan
+    where the lead is shorter than two cycles. A cycle is no whole number of samples: the earlier
+    one is read off a cubic spline.
     """
     from scipy.interpolate import CubicSpline
 
@@ -84,30 +105,53 @@ def measure_unsteadiness(event: WaveEvent, currents: np.ndarray) -> float:
     if event.lead < 2 * cycle + 2:
         return float("nan")
     first = int(last[0] - cycle) - 2
-    before = CubicSpline(np.arange(first, event.lead), currents[:, first : event.lead], axis=1)(last - cycle)
+    before = CubicSpline(np.arange(first, event.lead), currents[:, first : event.lead], axis=1)(
+        last - cycle
+    )
     late = event.of_phases(currents[:, last])
-    return float(np.sqrt(np.mean((late - event.of_phases(before)) ** 2) / max(np.mean(late**2), 1e-30)))
+    return float(
+        np.sqrt(np.mean((late - event.of_phases(before)) ** 2) / max(np.mean(late**2), 1e-30))
+    )
 
 
 def as_phasors(event: WaveEvent, currents: np.ndarray) -> tuple[Event, np.ndarray, np.ndarray]:
-    """The event in phasors of its recorded waveforms, and P and Q (M,) [pu] of calculated currents (3, N).
+    """The event in phasors of its recorded waveforms, and P and Q (M,) [pu] of calculated currents
+    (3, N).
 
-    Both are measured by one estimator from the same samples, so that its window cancels when they are compared.
+    Both are measured by one estimator from the same samples, so that its window cancels when they
+    are compared.
     """
     measured, calculated = (_phasors(event, i) for i in (np.nan_to_num(event.currents), currents))
     was, own = event.phasors, event.phasors.record
     record = Record(
-        own.name, measured.t, measured.U, measured.S.real, measured.S.imag, base=own.base, source=own.source,
-        notes=own.notes, original_base=own.original_base, identity=own.identity, digest=own.digest,
-    )  # fmt: skip
+        own.name,
+        measured.t,
+        measured.U,
+        measured.S.real,
+        measured.S.imag,
+        base=own.base,
+        source=own.source,
+        notes=own.notes,
+        original_base=own.original_base,
+        identity=own.identity,
+        digest=own.digest,
+    )
     start, end = np.searchsorted(measured.t, [was.t_start, was.t_end]).tolist()
     last = len(measured.t) - 1
-    phasors = replace(was, record=record, start=min(start, last), end=min(end, last), steady=slice(0, max(start, 1)))
+    phasors = replace(
+        was,
+        record=record,
+        start=min(start, last),
+        end=min(end, last),
+        steady=slice(0, max(start, 1)),
+    )
     return phasors, calculated.S.real, calculated.S.imag
 
 
 def _phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:
-    """Phasors of the recorded voltage and of currents (3, N) [pu], whose U and S are per unit, too."""
+    """Phasors of the recorded voltage and of currents (3, N) [pu], whose U and S are
+    per unit, too.
+    """
     part = slice(event.lead, None)
     v = event.v * event.turn
     voltage = event.of_phases(np.stack([v.real, v.imag, event.v_zero]))
@@ -116,4 +160,6 @@ def _phasors(event: WaveEvent, currents: np.ndarray) -> Phasors:
     recorded, base = event.phasors.record.waves, event.phasors.record.base
     assert recorded is not None
     window = estimator_of(recorded.estimator).averager
-    return measure(waves, event.rate, base.frequency, float(event.record.t[event.lead]), window=window)
+    return measure(
+        waves, event.rate, base.frequency, float(event.record.t[event.lead]), window=window
+    )

@@ -1,9 +1,11 @@
-"""Voltage and current of an event as a linear network sees them: how they deviate from the steady state before the dip.
+"""Voltage and current of an event as a linear network sees them: how they deviate from the steady
+state before the dip.
 
-In waveforms both are space vectors in the frame that turns with the voltage before the dip, and what is periodic there,
-harmonics and unbalance, goes on. In phasors the voltage is its magnitude and the current P - jQ. A network of waveforms
-draws of the fundamental what the load draws before the dip: so its response to a constant voltage is known. In phasors
-it is not, for P and Q may follow any power of the voltage.
+In waveforms both are space vectors in the frame that turns with the voltage before the dip, and
+what is periodic there, harmonics and unbalance, goes on. In phasors the voltage is its magnitude
+and the current P - jQ. A network of waveforms draws of the fundamental what the load draws before
+the dip: so its response to a constant voltage is known. In phasors it is not, for P and Q may
+follow any power of the voltage.
 """
 
 from dataclasses import dataclass
@@ -20,10 +22,12 @@ Complex = NDArray[np.complexfloating[Any, Any]]
 
 @dataclass(frozen=True, eq=False)
 class Port:
-    """Deviations of the voltage u (N,) and of the current i (N,) [pu], complex, from the sample `start` of a dip on.
+    """Deviations of the voltage u (N,) and of the current i (N,) [pu], complex, from the sample
+    `start` of a dip on.
 
-    The current is nan where it is not compared. `steady` [pu] is the response to a constant voltage, None where that is
-    not known. `turns` is at how many Hz the frame turns, 0 of phasors. `series`: resistance and inductance in series.
+    The current is nan where it is not compared. `steady` [pu] is the response to a constant
+    voltage, None where that is not known. `turns` is at how many Hz the frame turns, 0 of phasors.
+    `series`: resistance and inductance in series.
     """
 
     u: Complex
@@ -48,22 +52,28 @@ def power_port(event: Event) -> Port:
 
 
 def current_ports(event: WaveEvent) -> tuple[Port, ...]:
-    """The space vectors, and the zero sequence where it is compared, less their periodic courses before the dip.
+    """The space vectors, and the zero sequence where it is compared, less their periodic courses
+    before the dip.
 
-    Of a single phase the imaginary part is what it was a quarter of a cycle ago, of the current as of the voltage.
+    Of a single phase the imaginary part is what it was a quarter of a cycle ago, of the current as
+    of the voltage.
     """
     step, v = event.record.step, event.v * event.turn
     u = np.stack([v.real, v.imag, event.v_zero])
     u, i = u - periodic_course(event, u), event.currents - periodic_course(event, event.currents)
     vector = stationary(i[:1], event.rate, event.f0)[0] if event.phases == 1 else i[0] + 1j * i[1]
     Y = (event.P0 - 1j * event.Q0) / event.U0**2
-    vectors = Port((u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0)
+    vectors = Port(
+        (u[0] + 1j * u[1]) / event.turn, vector / event.turn, step, event.start, Y, event.f0
+    )
     zero = Port(u[2] + 0j, i[2] + 0j, step, event.start, None, series=True)
     return (vectors, zero) if event.compared[2] else (vectors,)
 
 
 def periodic_course(event: WaveEvent, channels: np.ndarray) -> np.ndarray:
-    """Channels (C, N) as they went before the dip, harmonics included, all along; 0 where one is not compared."""
+    """Channels (C, N) as they went before the dip, harmonics included, all along; 0 where one is
+    not compared.
+    """
     t, part = event.record.t, event.steady
     there = np.isfinite(channels[:, part]).all(axis=1)
     course = np.zeros(channels.shape)

@@ -35,13 +35,15 @@ class WaveDomain(Domain):
     setting = "domain=waves "
     compared = "the currents"
     epsilons = ("epsilon_p", "epsilon_q", "epsilon_i")
-    finest, probed, aftermath, stiff = 5e-5, 0.75, float("inf"), True  # noise of sampled currents starts near 1e-3
+    # noise of sampled currents starts near 1e-3
+    finest, probed, aftermath, stiff = 5e-5, 0.75, float("inf"), True
     quiet_order, noise_from_model = 0, True  # harmonics are no colored noise
     windowed = calibrated = recordable = False
     edge = 0.001
     further = {}
     shaped_by, planned_noise = ("jump", "unbalance"), "noise of the currents, of P before the dip"
-    dips = DipGrid((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)  # as long as recorders of waveforms go on
+    # as long as recorders of waveforms go on
+    dips = DipGrid((0.04, 0.08, 0.16, 0.32), 0.002, 0.1, 0.62)
 
     def event(self, event: Event) -> WaveEvent:
         return in_waves(event)
@@ -66,12 +68,20 @@ class WaveDomain(Domain):
         return int(np.count_nonzero(drive.weights))
 
     def noise(
-        self, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice], problem: "Problem", values: np.ndarray,
-        walk: Callable[[np.ndarray], RandomWalk | None], shapes: np.ndarray | None,
-    ) -> Noise:  # fmt: skip
+        self,
+        residual: np.ndarray,
+        valid: np.ndarray,
+        quiet: Sequence[slice],
+        problem: "Problem",
+        values: np.ndarray,
+        walk: Callable[[np.ndarray], RandomWalk | None],
+        shapes: np.ndarray | None,
+    ) -> Noise:
         """A load does not wander within so short a record."""
         responses = wave_errors.impulse_responses(problem, values)
-        return of_waves(residual, valid, quiet, responses, cast(WaveEvent, problem.events[0]).phases, shapes)
+        return of_waves(
+            residual, valid, quiet, responses, cast(WaveEvent, problem.events[0]).phases, shapes
+        )
 
     def input_errors(self, problem: "Problem", values: np.ndarray) -> np.ndarray:
         return wave_errors.input_errors(problem, values)
@@ -106,10 +116,16 @@ class WaveDomain(Domain):
         around = slice(middle - cycle, middle + cycle)
         v, turn = event.v[around], event.turn[around]
         negative = abs(np.mean(np.conj(v * turn) / turn)) / max(event.U0 * event.depth, 1e-9)
-        return {"jump": float(np.degrees(np.angle(v.mean()))), "unbalance": float(min(negative, 1.0))}
+        return {
+            "jump": float(np.degrees(np.angle(v.mean()))),
+            "unbalance": float(min(negative, 1.0)),
+        }
 
     def describe_shape(self, shape: "DipShape") -> str:
-        return f", the phase jumping by {shape.jump:.0f} degrees, negative sequence {shape.unbalance:.0%} of the depth"
+        return (
+            f", the phase jumping by {shape.jump:.0f} degrees, negative sequence"
+            f" {shape.unbalance:.0%} of the depth"
+        )
 
     @property
     def edges(self) -> str:
@@ -117,22 +133,41 @@ class WaveDomain(Domain):
 
     def about_noise(self, faults: Sequence[str], judged: bool) -> str:
         origin = (
-            "It is estimated before the dip and at the end of the record, from what the fit leaves there: harmonics"
-            " that no equation explains count as noise; noise of the voltage is passed on as the model does. Beside it"
-            " each channel may keep a small offset, and how steep the voltage is at the samples of an edge is known no"
+            "It is estimated before the dip and at the end of the record, from what the fit leaves"
+            " there: harmonics"
+            " that no equation explains count as noise; noise of the voltage is passed on as the"
+            " model does. Beside it"
+            " each channel may keep a small offset, and how steep the voltage is at the samples of"
+            " an edge is known no"
             " better than two curves through them agree."
         )
-        how = "each held by what is likely" if judged else "and not judged: these offsets and edges would pass for them"
-        return origin + f" Faults of the measurement ({join_words(faults)}) are free in every fit, {how}." * bool(faults)
+        how = (
+            "each held by what is likely"
+            if judged
+            else "and not judged: these offsets and edges would pass for them"
+        )
+        return (
+            origin
+            + f" Faults of the measurement ({join_words(faults)}) are free in every fit, {how}."
+            * bool(faults)
+        )
 
-    def planned(self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int) -> Event:
+    def planned(
+        self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int
+    ) -> Event:
         """Of a fault between two phases, types C and D of Bollen 2000, where the unbalance is 1."""
         v = (1 - shape.depth * course) * np.exp(1j * np.radians(shape.jump) * course)
         v = v + shape.unbalance * shape.depth * course * np.exp(-4j * np.pi * shape.frequency * t)
         return synthetic_event(name, t, v, (1.0, shape.P0, shape.Q0), shape.frequency, start, end)
 
     def dip(
-        self, like: Event, step: float, course: np.ndarray, depth: float, jump: float, unbalance: float
+        self,
+        like: Event,
+        step: float,
+        course: np.ndarray,
+        depth: float,
+        jump: float,
+        unbalance: float,
     ) -> WaveformDrive:
         """Without zero sequence, sampled as an event is."""
         like, n = cast(WaveEvent, like), len(course)
@@ -142,15 +177,33 @@ class WaveDomain(Domain):
         v = U * np.exp(1j * np.radians(jump) * course) + U2 * np.conj(turn) ** 2
         compared = np.where(np.array(like.compared)[:, None], 0.0, np.nan) * np.ones(n)
         return WaveformDrive(
-            step, v, np.zeros(n), turn, compared, U, U2, like.U0, like.P0, like.Q0, omega_s0=like.omega_s0,
-            omega_n=omega_n, weights=excitation.WEIGHTS[like.phases],
-        )  # fmt: skip
+            step,
+            v,
+            np.zeros(n),
+            turn,
+            compared,
+            U,
+            U2,
+            like.U0,
+            like.P0,
+            like.Q0,
+            omega_s0=like.omega_s0,
+            omega_n=omega_n,
+            weights=excitation.WEIGHTS[like.phases],
+        )
 
     def play(
-        self, model: Model, values: np.ndarray, t: np.ndarray, U: np.ndarray, before: Mapping[str, float],
-        omega_s: np.ndarray | None = None, omega_s0: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Of three phases, with the oscillation of decaying offsets; the phase turns as omega_s says.
+        self,
+        model: Model,
+        values: np.ndarray,
+        t: np.ndarray,
+        U: np.ndarray,
+        before: Mapping[str, float],
+        omega_s: np.ndarray | None = None,
+        omega_s0: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Of three phases, with the oscillation of decaying offsets; the phase turns as omega_s
+        says.
 
         Between its samples the voltage is a straight line.
         """
@@ -160,9 +213,14 @@ class WaveDomain(Domain):
         v = np.interp(fine, t, U).astype(complex)
         if omega_s is not None:
             speed = np.interp(fine, t, omega_s) - omega_s0
-            v *= np.exp(1j * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)])))
+            v *= np.exp(
+                1j
+                * np.cumsum(np.concatenate([[0.0], (speed[1:] + speed[:-1]) / 2 * np.diff(fine)]))
+            )
         means = before["U0"], before["P0"], before["Q0"]
-        event = synthetic_event("played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1)
+        event = synthetic_event(
+            "played", fine, v, means, nominal + omega_s0 / (2 * np.pi), 1, len(fine) - 1
+        )
         i = simulate_compared(model, values, Drive.of([self.excitation(event)]))
         power = (v * np.conj((i[0] + 1j * i[1]) / event.turn))[::every]
         return power.real, power.imag

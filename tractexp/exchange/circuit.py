@@ -1,9 +1,10 @@
 """The T-circuit of a motor from what an identification finds, and back.
 
-Records determine X, X', T0' (and X'', T0'' of a second cage), one number fewer than the circuit has elements. The
-convention that closes the gap, with R_s = 0 unless identified: stator and rotor leakage are equal, X_s = X_1, so that
-X_m = X sqrt(C) and X_s = X (1 - sqrt(C)). Where a second cage leaves no room for that, X'' <= X_s, the stator takes
-half of X''. Any other split gives the same P and Q.
+Records determine X, X', T0' (and X'', T0'' of a second cage), one number fewer than the circuit has
+elements. The convention that closes the gap, with R_s = 0 unless identified: stator and rotor
+leakage are equal, X_s = X_1, so that X_m = X sqrt(C) and X_s = X (1 - sqrt(C)). Where a second cage
+leaves no room for that, X'' <= X_s, the stator takes half of X''. Any other split gives the same P
+and Q.
 
 Source: Wu, Fan, Zou 2022, below Eq. (2) for X, X', T0'; Milano 2010, ch. 15 for X'', T0''.
 """
@@ -17,7 +18,9 @@ Number = TypeVar("Number", float, complex)
 
 @dataclass(frozen=True)
 class TCircuit:
-    """Elements [pu of the record's base] at the nominal speed omega_n [rad/s]; `R_2`, `X_2` are None in one cage."""
+    """Elements [pu of the record's base] at the nominal speed omega_n [rad/s]; `R_2`, `X_2` are
+    None in one cage.
+    """
 
     omega_n: float
     R_s: float
@@ -29,7 +32,9 @@ class TCircuit:
     X_2: float | None = None
 
     @classmethod
-    def single(cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0) -> "TCircuit":
+    def single(
+        cls, T_prime: float, X_prime: float, C: float, omega_n: float, R_s: float = 0.0
+    ) -> "TCircuit":
         """One cage, from T' [s], X' and C = (X - X')/X."""
         X = X_prime / (1 - C)
         X_s = X * (1 - sqrt(C))
@@ -37,9 +42,15 @@ class TCircuit:
 
     @classmethod
     def double(
-        cls, T_prime: float, X_prime: float, C: float, T_second: float, X_second: float, omega_n: float,
+        cls,
+        T_prime: float,
+        X_prime: float,
+        C: float,
+        T_second: float,
+        X_second: float,
+        omega_n: float,
         R_s: float = 0.0,
-    ) -> "TCircuit":  # fmt: skip
+    ) -> "TCircuit":
         """Two cages in parallel, from those and T'' [s], X'' < X'."""
         X = X_prime / (1 - C)
         equal = X * (1 - sqrt(C))
@@ -64,7 +75,11 @@ class TCircuit:
     @property
     def X_second(self) -> float:
         """Subtransient reactance of two cages; of one, the transient reactance."""
-        return self.X_prime if self.X_2 is None else self.X_s + _parallel(_parallel(self.X_m, self.X_1), self.X_2)
+        return (
+            self.X_prime
+            if self.X_2 is None
+            else self.X_s + _parallel(_parallel(self.X_m, self.X_1), self.X_2)
+        )
 
     @property
     def T0_prime(self) -> float:
@@ -81,7 +96,11 @@ class TCircuit:
     def parameters(self) -> dict[str, float]:
         """What an identification finds of such a motor: the inverse of `single` and `double`."""
         X, X_prime, X_second = self.X, self.X_prime, self.X_second
-        values = {"T_prime": self.T0_prime * X_prime / X, "X_prime": X_prime, "C": (X - X_prime) / X}
+        values = {
+            "T_prime": self.T0_prime * X_prime / X,
+            "X_prime": X_prime,
+            "C": (X - X_prime) / X,
+        }
         if self.X_2 is not None:
             values |= {"T_second": self.T0_second * X_second / X_prime, "X_second": X_second}
         return values

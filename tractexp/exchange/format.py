@@ -34,7 +34,9 @@ class Identified:
 
     @cached_property
     def model(self) -> Model:
-        """In phasors, which every format is written for: there what carries the network alone is static load."""
+        """In phasors, which every format is written for: there what carries the network alone is
+        static load.
+        """
         motor, static, effects, integration, *_ = parts(self.result.model)
         own = [e for e in effects if not (e.waves_only or e.name in self.result.shown_effects)]
         return compose(motor, static, own, integration)
@@ -44,7 +46,10 @@ class Identified:
         """The parameters on the base of the export."""
         exponents = {p.name: p.power_exponent for p in self.model.parameters}
         parameters = self.result.parameters
-        return {name: scale_parameter(value, exponents.get(name, 0), self.ratio) for name, value in parameters.items()}
+        return {
+            name: scale_parameter(value, exponents.get(name, 0), self.ratio)
+            for name, value in parameters.items()
+        }
 
     @property
     def name(self) -> str:
@@ -63,11 +68,16 @@ class Identified:
 
     @cached_property
     def before(self) -> dict[str, float]:
-        """States and named quantities before the event. Raises `UserError` where there is no steady state."""
+        """States and named quantities before the event. Raises `UserError` where there is no steady
+        state.
+        """
         stored, flat = self.result.before, np.full(2, self.result.before["U0"])
         P0, Q0 = self.ratio * stored["P0"], self.ratio * stored["Q0"]
         event = Excitation(1e-3, flat, flat, flat, stored["U0"], P0, Q0, omega_n=self.omega_n)
-        drive, values = Drive.of([event]), np.array([self.values[name] for name in self.model.names])
+        drive, values = (
+            Drive.of([event]),
+            np.array([self.values[name] for name in self.model.names]),
+        )
         if refusal := self.model.refusal(values, drive):
             raise UserError(f"these parameters cannot be exported: {refusal}")
         return self.model.at_rest(values, drive)
@@ -85,8 +95,8 @@ class Identified:
 class Restored:
     """A load as the numbers of a file describe it, on the base of the export.
 
-    `model` are its parts as a model's configuration names them; `static` is what the static part draws before the
-    event, P and Q.
+    `model` are its parts as a model's configuration names them; `static` is what the static part
+    draws before the event, P and Q.
     """
 
     model: Mapping[str, Any]
@@ -96,7 +106,8 @@ class Restored:
 
 @dataclass(frozen=True, eq=False)
 class Simulated:
-    """What another simulator, named by `by`, had a load draw: U, P and Q (N,) [pu of the export], every `step` [s].
+    """What another simulator, named by `by`, had a load draw: U, P and Q (N,) [pu of the export],
+    every `step` [s].
 
     `speed` (N,) is that of the voltage's angle, relative to nominal [rad/s].
     """
@@ -118,11 +129,14 @@ class Format(Plugin):
     motors: ClassVar[Collection[str] | None] = None  # names it can represent; None: any
     statics: ClassVar[Collection[str] | None] = None
     effects: ClassVar[Collection[str] | None] = None
-    lacks: ClassVar[Mapping[str, str]] = {}  # {name of a part it cannot represent: why, where that is not plain}
+    # {name of a part it cannot represent: why, where that is not plain}
+    lacks: ClassVar[Mapping[str, str]] = {}
 
     @abstractmethod
     def text(self, load: Identified) -> str:
-        """The file's content. `check_parts` has passed; raises `UserError` for values it cannot represent."""
+        """The file's content. `check_parts` has passed; raises `UserError` for values it cannot
+        represent.
+        """
 
     def notes(self, load: Identified) -> list[str]:
         """What a user must know to use the file, one sentence each."""
@@ -139,14 +153,17 @@ class Format(Plugin):
         return None
 
     def simulated(self, text: str, load: Identified) -> Simulated | None:
-        """A dip that the simulator of this format has played through the file; None where that is not at hand.
+        """A dip that the simulator of this format has played through the file; None where that is
+        not at hand.
 
         Raises `UserError` where it is, and fails.
         """
         return None
 
     def check_parts(self, load: Identified) -> None:
-        """Raise `UserError` for a part of the model that this format cannot represent, with those that can."""
+        """Raise `UserError` for a part of the model that this format cannot represent, with those
+        that can.
+        """
         model = load.result.model
         chosen = {
             "motor": [model["motor"]["name"]],
@@ -161,7 +178,9 @@ class Format(Plugin):
 
     @classmethod
     def represents(cls, kind: str, name: str) -> bool:
-        """Whether this format can represent a part of the model: a "motor", a "static load" or an "effect"."""
+        """Whether this format can represent a part of the model: a "motor", a "static load" or an
+        "effect".
+        """
         names = cls._represented(kind)
         return names is None or name in names
 
@@ -170,10 +189,16 @@ class Format(Plugin):
         return {"motor": cls.motors, "static load": cls.statics, "effect": cls.effects}[kind]
 
     def _instead(self, kind: str, name: str) -> str:
-        """The end of a refusal: why a part cannot be represented, where that is said, what can be, and by which format
-        the part itself can be."""
+        """The end of a refusal: why a part cannot be represented, where that is said, what can be,
+        and by which format the part itself can be.
+        """
         why = f": {self.lacks[name]}" if name in self.lacks else ""
-        formats: Mapping[str, Any] = discover()[self.group] if kind != "effect" else {}  # which refuse some yet
-        others = join_words([other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or")
+        # which refuse some yet
+        formats: Mapping[str, Any] = discover()[self.group] if kind != "effect" else {}
+        others = join_words(
+            [other for other, cls in sorted(formats.items()) if cls.represents(kind, name)], "or"
+        )
         by = f"; {TASK.format}={others} can represent '{name}'" if others else ""
-        return f"{why}; it can represent {', '.join(sorted(self._represented(kind) or ['none']))}{by}"
+        return (
+            f"{why}; it can represent {', '.join(sorted(self._represented(kind) or ['none']))}{by}"
+        )

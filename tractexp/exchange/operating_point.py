@@ -1,7 +1,8 @@
-"""The identified load before its dip: how its power divides, what the motor is as a machine, and whether it could be.
+"""The identified load before its dip: how its power divides, what the motor is as a machine, and
+whether it could be.
 
-A fit may describe a record by a motor that draws more than the whole load beside a static part that generates: the sum
-is right, the machine is none.
+A fit may describe a record by a motor that draws more than the whole load beside a static part that
+generates: the sum is right, the machine is none.
 """
 
 from dataclasses import dataclass
@@ -13,16 +14,20 @@ from tractexp.exchange.format import Identified
 from tractexp.identification.result import Result
 from tractexp.identification.verdict import BOUND
 
-LARGEST_MOTOR_SHARE = 1.2  # of the load's active power: what a motor may draw before its model is doubted
-MOTOR_POWER_FACTOR = 0.8  # power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent power
+# of the load's active power: what a motor may draw before its model is doubted
+LARGEST_MOTOR_SHARE = 1.2
+# power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent
+# power
+MOTOR_POWER_FACTOR = 0.8
 
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """Powers [MW, Mvar, or pu of the file] before the first event that was fitted, and the motor there.
+    """Powers [MW, Mvar, or pu of the file] before the first event that was fitted, and the motor
+    there.
 
-    `slip` is per unit of the nominal speed, `H` [s] on the motor's own apparent power, `starting` the current at
-    standstill over that before the dip; None where this motor has no such figure.
+    `slip` is per unit of the nominal speed, `H` [s] on the motor's own apparent power, `starting`
+    the current at standstill over that before the dip; None where this motor has no such figure.
     """
 
     P: float
@@ -66,13 +71,17 @@ class OperatingPoint:
         p, q = self.units
         machine = [f"slip {100 * self.slip:.2g} %"]
         if self.H is not None:
-            machine.append(f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}")
+            machine.append(
+                f"H {self.H:.2g} s on its own {'MVA' if p == 'MW' else 'apparent power'}"
+            )
         if self.starting is not None:
             machine.append(f"starting current {self.starting:.2g} times that before the dip")
         share = f", {self.share:.0%} of P" if self.P > 0 else ""
         return (
-            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}{share}; static load "
-            f"{self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q}; {', '.join(machine)}"
+            f"before the dip: motor {self.P_motor:.4g} {p} and {self.Q_motor:.4g} {q}{share};"
+            " static load "
+            f"{self.P - self.P_motor:.4g} {p} and {self.Q - self.Q_motor:.4g} {q};"
+            f" {', '.join(machine)}"
         )
 
     @property
@@ -95,7 +104,9 @@ class OperatingPoint:
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
     """What speaks against an identified load as a physical one, a clause each."""
     resting = [
-        name for name, verdict in result.verdicts.items() if verdict.startswith(BOUND) and name not in result.nuisances
+        name
+        for name, verdict in result.verdicts.items()
+        if verdict.startswith(BOUND) and name not in result.nuisances
     ]
     held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
     return [*([point.doubt] if point and point.doubt else []), *[held] * bool(resting)]

@@ -1,8 +1,9 @@
-"""An exported load is played back: what its file says is simulated, and compared with the fit along a dip.
+"""An exported load is played back: what its file says is simulated, and compared with the fit along
+a dip.
 
-The simulator of the format does it where that is installed; elsewhere ours, from the numbers read back from the file.
-Both are driven by the same voltage, so that what differs is the export's: rounding, bases, conventions, what the
-format lacks.
+The simulator of the format does it where that is installed; elsewhere ours, from the numbers read
+back from the file. Both are driven by the same voltage, so that what differs is the export's:
+rounding, bases, conventions, what the format lacks.
 """
 
 from dataclasses import dataclass, replace
@@ -15,13 +16,16 @@ from tractexp.model.drive import Drive, Excitation
 
 STEP, LENGTH = 1e-3, 1.2  # s
 DEPTH = 0.4  # of the voltage before
-FALL, RISE, EDGE = 0.2, 0.4, 0.05  # s: where the voltage falls and comes back, and how long either takes
+# s: where the voltage falls and comes back, and how long either takes
+FALL, RISE, EDGE = 0.2, 0.4, 0.05
 STEPS_A_SAMPLE = 8  # Runge-Kutta steps a sample of another simulator's
 
 
 @dataclass(frozen=True)
 class Agreement:
-    """How far an exported load is off the fit at most, and how far the power moves in all: pairs of P and Q [pu]."""
+    """How far an exported load is off the fit at most, and how far the power moves in all: pairs of
+    P and Q [pu].
+    """
 
     by: str
     off: tuple[float, float]
@@ -30,26 +34,38 @@ class Agreement:
     @property
     def share(self) -> float:
         """The larger difference over what its power moves."""
-        return max(off / moved if moved else 0.0 for off, moved in zip(self.off, self.moved, strict=True))
+        return max(
+            off / moved if moved else 0.0 for off, moved in zip(self.off, self.moved, strict=True)
+        )
 
     def said(self, scale: float, units: tuple[str, str]) -> str:
         """In a sentence, with powers times `scale` in `units`."""
         parts = [
-            f"{power} differs by at most {scale * off:.2g} {unit} where it moves by {scale * moved:.3g}"
+            f"{power} differs by at most {scale * off:.2g} {unit} where it moves by"
+            f" {scale * moved:.3g}"
             for power, off, moved, unit in zip("PQ", self.off, self.moved, units, strict=True)
         ]
-        return f"played back by {self.by} along a dip to {1 - DEPTH:.0%} of the voltage: {', '.join(parts)}"
+        return (
+            f"played back by {self.by} along a dip to {1 - DEPTH:.0%} of the voltage:"
+            f" {', '.join(parts)}"
+        )
 
 
 def dip(step: float = STEP) -> np.ndarray:
     """The voltage (N,) of the dip that exports are played along, over that before it."""
     t = np.arange(round(LENGTH / step) + 1) * step
-    fallen, back = (0.5 - 0.5 * np.cos(np.pi * np.clip((t - at) / EDGE, 0, 1)) for at in (FALL, RISE))
+    fallen, back = (
+        0.5 - 0.5 * np.cos(np.pi * np.clip((t - at) / EDGE, 0, 1)) for at in (FALL, RISE)
+    )
     return 1 - DEPTH * (fallen - back)
 
 
-def play_back_export(form: Format, text: str, load: Identified) -> tuple[Agreement | None, list[str]]:
-    """How well an export's text agrees with the fit, None where it cannot be played; and why, or why not elsewhere."""
+def play_back_export(
+    form: Format, text: str, load: Identified
+) -> tuple[Agreement | None, list[str]]:
+    """How well an export's text agrees with the fit, None where it cannot be played; and why, or
+    why not elsewhere.
+    """
     notes = []
     for play in (_elsewhere, _here):
         try:
@@ -63,7 +79,9 @@ def play_back_export(form: Format, text: str, load: Identified) -> tuple[Agreeme
 def _elsewhere(form: Format, text: str, load: Identified) -> Agreement | None:
     """In the simulator of the format; None where that is not at hand."""
     there = form.simulated(text, load)
-    return there and _measure_agreement(there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q))
+    return there and _measure_agreement(
+        there.by, response(load, there, there.P[0], there.Q[0]), (there.P, there.Q)
+    )
 
 
 def _here(form: Format, text: str, load: Identified) -> Agreement:
@@ -72,15 +90,30 @@ def _here(form: Format, text: str, load: Identified) -> Agreement:
     if restored is None:
         raise UserError(f"not played back: the format '{form.name}' reads nothing back")
     U, before = load.result.before["U0"] * dip(), load.result.before
-    along = Simulated("our own simulator, from the file's numbers,", STEP, U, np.zeros_like(U), U, U)
+    along = Simulated(
+        "our own simulator, from the file's numbers,", STEP, U, np.zeros_like(U), U, U
+    )
     fit = response(load, along, load.ratio * before["P0"], load.ratio * before["Q0"])
     return _measure_agreement(along.by, fit, _simulate_restored_load(restored, load, along))
 
 
-def response(load: Identified, along: Simulated, P0: float, Q0: float) -> tuple[np.ndarray, np.ndarray]:
+def response(
+    load: Identified, along: Simulated, P0: float, Q0: float
+) -> tuple[np.ndarray, np.ndarray]:
     """P and Q (N,) [pu] of a load along a voltage, drawing P0 and Q0 before it."""
     U, flat = along.U, np.full(len(along.U), np.nan)
-    one = Excitation(along.step, U, flat, flat, float(U[0]), P0, Q0, along.speed, float(along.speed[0]), load.omega_n)
+    one = Excitation(
+        along.step,
+        U,
+        flat,
+        flat,
+        float(U[0]),
+        P0,
+        Q0,
+        along.speed,
+        float(along.speed[0]),
+        load.omega_n,
+    )
     drive, values = Drive.of([one]), np.array([load.values[name] for name in load.model.names])
     if refusal := load.model.refusal(values, drive):
         raise UserError(f"not played back: {refusal}")
@@ -88,18 +121,29 @@ def response(load: Identified, along: Simulated, P0: float, Q0: float) -> tuple[
     return answer.P[0], answer.Q[0]
 
 
-def _simulate_restored_load(restored: Restored, load: Identified, along: Simulated) -> tuple[np.ndarray, np.ndarray]:
-    """P and Q (N,) of what a file describes: its motor draws what it does, its static part what the file says."""
+def _simulate_restored_load(
+    restored: Restored, load: Identified, along: Simulated
+) -> tuple[np.ndarray, np.ndarray]:
+    """P and Q (N,) of what a file describes: its motor draws what it does, its static part what the
+    file says.
+    """
     result = replace(load.result, model=dict(restored.model), parameters=dict(restored.parameters))
     of_file = Identified(replace(result, own_base={}), load.bus, load.power, load.voltage)
     U0, flat = float(along.U[0]), np.full(2, float(along.U[0]))
     probe = Drive.of([Excitation(along.step, flat, flat, flat, U0, 1.0, 0.0, omega_n=load.omega_n)])
-    at_rest = of_file.model.at_rest(np.array([of_file.values[name] for name in of_file.model.names]), probe)
-    P0, Q0 = (at_rest.get(f"{x}_motor", 0.0) + static for x, static in zip("PQ", restored.static, strict=True))
+    at_rest = of_file.model.at_rest(
+        np.array([of_file.values[name] for name in of_file.model.names]), probe
+    )
+    P0, Q0 = (
+        at_rest.get(f"{x}_motor", 0.0) + static
+        for x, static in zip("PQ", restored.static, strict=True)
+    )
     return response(of_file, along, P0, Q0)
 
 
-def _measure_agreement(by: str, fit: tuple[np.ndarray, np.ndarray], there: tuple[np.ndarray, np.ndarray]) -> Agreement:
+def _measure_agreement(
+    by: str, fit: tuple[np.ndarray, np.ndarray], there: tuple[np.ndarray, np.ndarray]
+) -> Agreement:
     off = [float(np.abs(a - b).max()) for a, b in zip(fit, there, strict=True)]
     moved = [float(np.ptp(a)) for a in fit]
     return Agreement(by, (off[0], off[1]), (moved[0], moved[1]))

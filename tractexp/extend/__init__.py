@@ -3,8 +3,8 @@
     from tractexp.extend import Effect, Parameter, plugin, sites
 
 `tractexp.extend.search` has parts for optimizers, `tractexp.extend.files` for readers and writers,
-`tractexp.extend.formats` the base of exports, `tractexp.extend.symbols` the types of what `declare`, `law` and `edit`
-take and return.
+`tractexp.extend.formats` the base of exports, `tractexp.extend.symbols` the types of what
+`declare`, `law` and `edit` take and return.
 """
 
 from tractexp.errors import DATA, TASK, Unfit, UserError, check_choice, check_distinct, check_range
@@ -23,8 +23,43 @@ from tractexp.recording.connection import SINGLE
 from tractexp.recording.reader import WaveformReader
 
 __all__ = [
-    "DATA", "EVENT", "INPUTS", "REFUSED", "SINGLE", "TASK", "Averager", "Base", "Box", "Channel", "Connection", "Curve",
-    "Effect", "Estimator", "Evaluate", "Events", "Iterative", "Loss", "Measurement", "Motor", "Optimizer", "Parameter",
-    "Reader", "Record", "Recording", "Segment", "Static", "Stencil", "Unfit", "UserError", "WaveformReader", "Writer",
-    "build", "check_choice", "check_distinct", "check_range", "one_cycle", "plugin", "sites",
-]  # fmt: skip
+    "DATA",
+    "EVENT",
+    "INPUTS",
+    "REFUSED",
+    "SINGLE",
+    "TASK",
+    "Averager",
+    "Base",
+    "Box",
+    "Channel",
+    "Connection",
+    "Curve",
+    "Effect",
+    "Estimator",
+    "Evaluate",
+    "Events",
+    "Iterative",
+    "Loss",
+    "Measurement",
+    "Motor",
+    "Optimizer",
+    "Parameter",
+    "Reader",
+    "Record",
+    "Recording",
+    "Segment",
+    "Static",
+    "Stencil",
+    "Unfit",
+    "UserError",
+    "WaveformReader",
+    "Writer",
+    "build",
+    "check_choice",
+    "check_distinct",
+    "check_range",
+    "one_cycle",
+    "plugin",
+    "sites",
+]

@@ -1,4 +1,6 @@
-"""Parts of readers and writers: the parsers of the package, tables and their sidecars, dips within a record."""
+"""Parts of readers and writers: the parsers of the package, tables and their sidecars, dips within
+a record.
+"""
 
 from tractexp.files import PACKAGE, locate_file
 from tractexp.filetypes import cev, comtrade, pqdif, tidy
@@ -46,4 +48,4 @@ __all__ = [
     "signs",
     "survey_of",
     "tidy",
-]  # fmt: skip
+]

@@ -1,4 +1,6 @@
-"""The base of export formats, what their files are read back into, and how each language quotes a text."""
+"""The base of export formats, what their files are read back into, and how each language quotes a
+text.
+"""
 
 from tractexp import quoting
 from tractexp.exchange.circuit import TCircuit

@@ -1,4 +1,6 @@
-"""What `declare`, `law` and `edit` take and return, for annotations and for formats. SymPy is imported with it."""
+"""What `declare`, `law` and `edit` take and return, for annotations and for formats. SymPy is
+imported with it.
+"""
 
 from sympy import Expr, Symbol
 

@@ -1,1 +1,3 @@
-"""What files hold, by type: COMTRADE, SEL event reports, tables; read into recordings and columns, and written back."""
+"""What files hold, by type: COMTRADE, SEL event reports, tables; read into recordings and columns,
+and written back.
+"""

@@ -10,10 +10,36 @@ from typing import Any
 import numpy as np
 
 # What programs write where there is no value
-GAPS = frozenset((
-    "", "-", "--", "---", "nan", "na", "n/a", "#n/a", "#na", "#nv", "#value!", "#num!", "#div/0!", "#ref!", "null",
-    "none", "nil", "missing", "no data", "nodata", "bad", "*", "?", "1.#qnan", "-1.#ind", "1.#ind",
-))  # fmt: skip
+GAPS = frozenset(
+    (
+        "",
+        "-",
+        "--",
+        "---",
+        "nan",
+        "na",
+        "n/a",
+        "#n/a",
+        "#na",
+        "#nv",
+        "#value!",
+        "#num!",
+        "#div/0!",
+        "#ref!",
+        "null",
+        "none",
+        "nil",
+        "missing",
+        "no data",
+        "nodata",
+        "bad",
+        "*",
+        "?",
+        "1.#qnan",
+        "-1.#ind",
+        "1.#ind",
+    )
+)
 # Numbers whose digits stand in groups of three, by decimal mark
 GROUPED = {
     ".": re.compile(r"[+-]?\d{1,3}(?:([,'’ \u00a0\u2009\u202f])\d{3})(?:\1\d{3})*(?:\.\d*)?"),
@@ -22,7 +48,9 @@ GROUPED = {
 
 
 class BadCell(Exception):
-    """Cell `row` of a column is no number or no time; `why` ends the sentence that the place begins."""
+    """Cell `row` of a column is no number or no time; `why` ends the sentence that the place
+    begins.
+    """
 
     def __init__(self, row: int, why: str) -> None:
         super().__init__(row, why)
@@ -44,7 +72,9 @@ def is_number(cell: Any, decimal: str = ".") -> bool:
 
 
 def group_mark(cell: Any, decimal: str) -> str:
-    """The mark between groups of three digits of a number, where it can be no decimal mark; "" where there is none."""
+    """The mark between groups of three digits of a number, where it can be no decimal mark; ""
+    where there is none.
+    """
     match = GROUPED[decimal].fullmatch(cell.strip()) if isinstance(cell, str) else None
     if match is None:
         return ""
@@ -60,19 +90,25 @@ def is_grouped(cell: Any) -> bool:
 def find_group_mark(rows: Sequence[Sequence[Any]], decimal: str) -> str:
     """The mark between groups of digits in the cells of a table; "" where there is none.
 
-    A comma that could be a decimal mark is one of groups where points are, and every comma stands before three digits.
+    A comma that could be a decimal mark is one of groups where points are, and every comma stands
+    before three digits.
     """
     cells = [cell for row in rows for cell in row if isinstance(cell, str)]
     marks = {mark for cell in cells if (mark := group_mark(cell, decimal))}
     other = {".": ",", ",": "."}[decimal]
     open_marks = [cell for cell in cells if is_number(cell, other) and other in cell]
     if decimal == "." and open_marks and any(is_number(cell) and "." in cell for cell in cells):
-        marks |= {","} if all(GROUPED["."].fullmatch(cell.strip()) for cell in open_marks) else set()
+        marks |= (
+            {","} if all(GROUPED["."].fullmatch(cell.strip()) for cell in open_marks) else set()
+        )
     return marks.pop() if len(marks) == 1 else ""
 
 
-def numbers(cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group: str = "") -> np.ndarray:
-    """The numbers (N,) of cells, nan for a gap where `gaps` are allowed; raises `BadCell` for what is neither.
+def numbers(
+    cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group: str = ""
+) -> np.ndarray:
+    """The numbers (N,) of cells, nan for a gap where `gaps` are allowed; raises `BadCell` for what
+    is neither.
 
     `group` is the mark between groups of three digits, "" for none.
     """
@@ -84,9 +120,15 @@ def numbers(cells: Sequence[Any], decimal: str = ".", gaps: bool = False, group:
             values[row] = _number(cell, decimal)
         except ValueError:
             if not is_gap(cell):
-                raise BadCell(row, f"{quote_cell(cell)} is not a number{_comma(str(cell), decimal)}") from None
+                raise BadCell(
+                    row, f"{quote_cell(cell)} is not a number{_comma(str(cell), decimal)}"
+                ) from None
             if not gaps:
-                what = f"{quote_cell(cell)} stands for no value" if cell and str(cell).strip() else "the cell is empty"
+                what = (
+                    f"{quote_cell(cell)} stands for no value"
+                    if cell and str(cell).strip()
+                    else "the cell is empty"
+                )
                 raise BadCell(row, f"{what}; only P and Q may have gaps") from None
             values[row] = np.nan
     return values
@@ -115,4 +157,6 @@ def _number(cell: Any, decimal: str) -> float:
 def _comma(cell: str, decimal: str) -> str:
     """A remark on a decimal mark that is not the one of the file."""
     other = {".": ",", ",": "."}[decimal]
-    return f" (decimals are written with '{decimal}' in this file)" if is_number(cell, other) else ""
+    return (
+        f" (decimals are written with '{decimal}' in this file)" if is_number(cell, other) else ""
+    )

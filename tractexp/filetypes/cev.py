@@ -1,9 +1,9 @@
 """SEL compressed event reports (.cev, Compressed ASCII) read into a recording.
 
-Source: the instruction manuals of SEL-351A, -311L, -411L, -421, -751 and -787 (appendix Compressed ASCII, section
-event reports): quoted rows with a checksum each, names above values; the columns are instantaneous primary amperes and
-kilovolts over the root of two; `>` marks the row of the trigger, `*` that of the greatest current; the states of the
-relay word are hexadecimal.
+Source: the instruction manuals of SEL-351A, -311L, -411L, -421, -751 and -787 (appendix Compressed
+ASCII, section event reports): quoted rows with a checksum each, names above values; the columns are
+instantaneous primary amperes and kilovolts over the root of two; `>` marks the row of the trigger,
+`*` that of the greatest current; the states of the relay word are hexadecimal.
 """
 
 import csv
@@ -31,8 +31,11 @@ LARGEST_SUMMARY_DIFFERENCE = 0.1  # of a current: so well the summary's agrees w
 FEWEST_WAVE_RATE = 10  # samples a cycle: fewer are a filtered report, which holds phasors
 BEGINNING = 1 << 16  # bytes in which a report names the samples in a cycle
 LEAST, MOST = 10.0, 100.0  # Hz
-# what the settings say of the load and of its transformers: full-load and locked-rotor current, service factor, ratios
-RATING = re.compile(r"\b((?:CTRG?|PTR|FLA|LRA|LRTHOT|SF|VNOM|MVA)[A-Z]?\d?)\b\s*:?=\s*(\d+\.?\d*)", re.ASCII)
+# what the settings say of the load and of its transformers: full-load and locked-rotor current,
+# service factor, ratios
+RATING = re.compile(
+    r"\b((?:CTRG?|PTR|FLA|LRA|LRTHOT|SF|VNOM|MVA)[A-Z]?\d?)\b\s*:?=\s*(\d+\.?\d*)", re.ASCII
+)
 _COLUMN = re.compile(r"\s*([^(]*?)\s*(?:\(\s*([^)]*?)\s*\))?\s*")
 _WAVE = re.compile(r"[IV](?:([ABCNGQ]|AB|BC|CA)(\w?)|1MEM|S\d?|P)", re.ASCII)
 
@@ -48,7 +51,9 @@ class EventReport:
 
 
 def recognizes(path: Path | str) -> bool:
-    """Whether a file is there whose beginning names the samples in a cycle, as such a report does."""
+    """Whether a file is there whose beginning names the samples in a cycle, as such a
+    report does.
+    """
     return files.there(path) and b'"SAM/CYC_A"' in files.read(path, BEGINNING)
 
 
@@ -64,7 +69,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     report, remarks, t = opened.report, opened.remarks, opened.t
     if opened.per_cycle < FEWEST_WAVE_RATE:
         remarks.add(
-            f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay with the command "
+            f"{opened.per_cycle:g} samples a cycle: a filtered report; get the raw one of the relay"
+            " with the command "
             "CEV R, or its COMTRADE file; its phasors are read by data=csv"
         )
     runs = timeline.from_stamps(t, 1e-9, str(path))
@@ -72,55 +78,88 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     return Recording(
         source=str(path),
         channels=[
-            _channel(report, k, timeline.resample_evenly(opened.values[:, k], runs, None), opened.gain, remarks)
-            for k in range(opened.values.shape[1]) if _is_named(report, k)
+            _channel(
+                report,
+                k,
+                timeline.resample_evenly(opened.values[:, k], runs, None),
+                opened.gain,
+                remarks,
+            )
+            for k in range(opened.values.shape[1])
+            if _is_named(report, k)
         ],
         segments=timeline.laid_out(runs),
         frequency=opened.nominal,
         device=report.about.get("FID", "").removeprefix("FID=").strip(),
         start=_start(report, moment, remarks),
         trigger=None if opened.marked is None else moment,
-        status=[replace(each, raw=timeline.nearest(each.raw, runs)) for each in _states(report, opened.words)],
+        status=[
+            replace(each, raw=timeline.nearest(each.raw, runs))
+            for each in _states(report, opened.words)
+        ],
         notes=remarks.notes(),
         extra={
-            "format": "SEL CEV", "encoding": opened.encoding, "about": report.about, "settings": report.settings
+            "format": "SEL CEV",
+            "encoding": opened.encoding,
+            "about": report.about,
+            "settings": report.settings,
         },
-    )  # fmt: skip
+    )
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
-    """The phasors of a filtered report, RMS and angles in a frame that turns at the nominal frequency.
+    """The phasors of a filtered report, RMS and angles in a frame that turns at the nominal
+    frequency.
 
-    Two samples a quarter of a cycle apart are real and imaginary part: x_k + j x_(k-1), at four samples a cycle. The
-    relay samples by the frequency that it tracks, so that this holds off the nominal one. Raises `UserError` as `load`,
-    and for a raw report.
+    Two samples a quarter of a cycle apart are real and imaginary part: x_k + j x_(k-1), at four
+    samples a cycle. The relay samples by the frequency that it tracks, so that this holds off the
+    nominal one. Raises `UserError` as `load`, and for a raw report.
     """
     opened = _open_report(path, encoding)
     report, remarks, quarter = opened.report, opened.remarks, round(opened.per_cycle / 4)
-    if opened.per_cycle >= FEWEST_WAVE_RATE or 4 * quarter != opened.per_cycle or len(opened.t) <= quarter:
+    if (
+        opened.per_cycle >= FEWEST_WAVE_RATE
+        or 4 * quarter != opened.per_cycle
+        or len(opened.t) <= quarter
+    ):
         raise UserError(
-            f"{path}: {len(opened.t)} samples, {opened.per_cycle:g} a cycle: phasors are read from filtered reports of "
+            f"{path}: {len(opened.t)} samples, {opened.per_cycle:g} a cycle: phasors are read from"
+            " filtered reports of "
             f"4 or 8; waveforms by data=sel data.path={path}"
         )
     remarks.add(
-        f"a filtered report, {opened.per_cycle:g} samples a cycle: phasors from samples a quarter of a cycle apart; "
+        f"a filtered report, {opened.per_cycle:g} samples a cycle: phasors from samples a quarter"
+        " of a cycle apart; "
         "what changes within a cycle, the window of the relay's filter, does not show"
     )
     t = opened.t[quarter:]
     back = np.exp(-2j * np.pi * opened.nominal * t)
     columns = [("t", "s", t), ("f", "Hz", opened.frequency[quarter:])]
     for k in range(opened.values.shape[1]):
-        channel = _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks) if _is_named(report, k) else None
-        if channel is not None and channel.form == "waveform" and channel.phase in ("A", "B", "C", "AB", "BC", "CA"):
+        channel = (
+            _channel(report, k, opened.values[:, k], opened.gain / ROOT, remarks)
+            if _is_named(report, k)
+            else None
+        )
+        if (
+            channel is not None
+            and channel.form == "waveform"
+            and channel.phase in ("A", "B", "C", "AB", "BC", "CA")
+        ):
             x = channel.ratio * channel.recorded()
             X = (x[quarter:] + 1j * x[:-quarter]) * back
-            columns += [(channel.name, channel.unit, np.abs(X)), (f"{channel.name} angle", "rad", np.angle(X))]
+            columns += [
+                (channel.name, channel.unit, np.abs(X)),
+                (f"{channel.name} angle", "rad", np.angle(X)),
+            ]
     return Rows.of(path, columns, 1 + quarter, remarks.notes())
 
 
 @dataclass(frozen=True, eq=False)
 class _Opened:
-    """A report with its samples: values (N, columns), times (N,) [s] and the frequency (N,) [Hz] sampled by."""
+    """A report with its samples: values (N, columns), times (N,) [s] and the frequency (N,) [Hz]
+    sampled by.
+    """
 
     report: EventReport
     values: np.ndarray
@@ -139,7 +178,9 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
     files.check_there(path)
     if path.stat().st_size > LARGEST:
-        raise UserError(f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}")
+        raise UserError(
+            f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}"
+        )
     text, encoding = decode(files.read(path), str(path), encoding)
     remarks = Remarks(str(path))
     report = _report(path, text, remarks)
@@ -147,17 +188,29 @@ def _open_report(path: Path, encoding: str | None) -> _Opened:
     per_cycle, frequency = _rate(path, report)
     marked = next((i for sign in (">", "*") for i, mark in enumerate(marks) if sign in mark), None)
     if marked is None:
-        remarks.add("no row is marked as the trigger's ('>'); the report's time is taken as that of the first sample")
+        remarks.add(
+            "no row is marked as the trigger's ('>'); the report's time is taken as that of the"
+            " first sample"
+        )
     if rated := ", ".join(f"{name} = {value}" for name, value in RATING.findall(report.settings)):
         remarks.add(f"the relay's settings: {rated}")
-    gain, tracked = _gain(report, values, marks, per_cycle, remarks), _read_tracked_frequency(report, values, frequency, remarks)
+    gain, tracked = (
+        _gain(report, values, marks, per_cycle, remarks),
+        _read_tracked_frequency(report, values, frequency, remarks),
+    )
     t = np.concatenate([[0.0], np.cumsum(2 / (tracked[1:] + tracked[:-1]))]) / per_cycle
     nominal = 50.0 if abs(frequency - 50) < abs(frequency - 60) else 60.0
-    return _Opened(report, values, words, t, tracked, per_cycle, nominal, marked, gain, remarks, encoding)
+    return _Opened(
+        report, values, words, t, tracked, per_cycle, nominal, marked, gain, remarks, encoding
+    )
 
 
-def _read_tracked_frequency(report: EventReport, values: np.ndarray, frequency: float, remarks: Remarks) -> np.ndarray:
-    """The frequency (N,) [Hz] that the relay sampled by: its column's, where that is one, else the summary's."""
+def _read_tracked_frequency(
+    report: EventReport, values: np.ndarray, frequency: float, remarks: Remarks
+) -> np.ndarray:
+    """The frequency (N,) [Hz] that the relay sampled by: its column's, where that is one, else the
+    summary's.
+    """
     names = [column.upper() for column in report.columns[: values.shape[1]]]
     k = next((names.index(name) for name in ("FREQ", "FREQ(HZ)") if name in names), None)
     if k is None:
@@ -167,10 +220,17 @@ def _read_tracked_frequency(report: EventReport, values: np.ndarray, frequency: 
     if not len(good):
         return np.full(len(values), frequency)
     if len(good) < len(values):
-        remarks.add("FREQ has gaps or is no frequency in some rows: that of the rows beside them holds")
-    last = np.maximum.accumulate(np.where(np.isin(np.arange(len(values)), good), np.arange(len(values)), good[0]))
+        remarks.add(
+            "FREQ has gaps or is no frequency in some rows: that of the rows beside them holds"
+        )
+    last = np.maximum.accumulate(
+        np.where(np.isin(np.arange(len(values)), good), np.arange(len(values)), good[0])
+    )
     if np.ptp(column[good]) > 0:
-        remarks.add(f"times follow the frequency in FREQ, {column[good].min():g} to {column[good].max():g} Hz")
+        remarks.add(
+            f"times follow the frequency in FREQ, {column[good].min():g} to {column[good].max():g}"
+            " Hz"
+        )
     return column[last]
 
 
@@ -193,7 +253,9 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
             cells = [row]
         if len(cells) > 1 and re.fullmatch(r"[0-9A-Fa-f]{4}", cells[-1].strip()):
             if checksum(row[: row.rindex(",") + 1]) != cells[-1].strip().upper():
-                remarks.add("the checksum does not fit: the line was altered, or damaged on its way", line)
+                remarks.add(
+                    "the checksum does not fit: the line was altered, or damaged on its way", line
+                )
             cells, checked = cells[:-1], True
         else:
             checked = False
@@ -216,14 +278,17 @@ def _report(path: Path, text: str, remarks: Remarks) -> EventReport:
         remarks.add("the file ends within a line, which is not used", report.rows.pop()[0])
     if not report.columns or not report.rows:
         raise UserError(
-            f"{path}: no compressed event report: there is no row of column names with TRIG and samples below it; get "
+            f"{path}: no compressed event report: there is no row of column names with TRIG and"
+            " samples below it; get "
             "it from the relay with the command CEV, or its COMTRADE file"
         )
     return report
 
 
 def _join_quoted_rows(body: str) -> list[tuple[int, str]]:
-    """Rows with the number of their first line; one with an open quotation goes on in the next line."""
+    """Rows with the number of their first line; one with an open quotation goes on in the next
+    line.
+    """
     rows: list[tuple[int, str]] = []
     held, start = "", 0
     for line, text in enumerate(re.split(r"\r\n|\n|\r", body), 1):
@@ -236,7 +301,9 @@ def _join_quoted_rows(body: str) -> list[tuple[int, str]]:
     return rows if not held.strip() else [*rows, (start, held.strip())]
 
 
-def _samples(path: Path, report: EventReport, remarks: Remarks) -> tuple[np.ndarray, list[str], list[str]]:
+def _samples(
+    path: Path, report: EventReport, remarks: Remarks
+) -> tuple[np.ndarray, list[str], list[str]]:
     """Values (N, columns), marks and hexadecimal words of the samples."""
     at = report.columns.index("TRIG")
     wanted = len(report.columns)
@@ -247,10 +314,16 @@ def _samples(path: Path, report: EventReport, remarks: Remarks) -> tuple[np.ndar
                 remarks.add("the file ends within a line, which is not used", line)
                 break
             raise UserError(
-                f"{path}: line {line}: {len(cells)} cells, but {wanted} columns are named; correct the line, or get "
+                f"{path}: line {line}: {len(cells)} cells, but {wanted} columns are named; correct"
+                " the line, or get "
                 "the file from the relay again"
             )
-        values.append([_value(path, line, name, cell) for name, cell in zip(report.columns[:at], cells, strict=False)])
+        values.append(
+            [
+                _value(path, line, name, cell)
+                for name, cell in zip(report.columns[:at], cells, strict=False)
+            ]
+        )
         marks.append(cells[at])
         words.append(cells[at + 1].strip() if len(cells) > at + 1 else "")
     return np.array(values, float).reshape(len(values), at), marks, words
@@ -262,7 +335,8 @@ def _value(path: Path, line: int, name: str, cell: str) -> float:
         return float("nan")  # so the relay writes a missing value
     if value is None or abs(value) > HUGE:
         raise UserError(
-            f"{path}: line {line}: {name or 'column'} {quote_field(cell)} is not a number, up to 1e38; correct it"
+            f"{path}: line {line}: {name or 'column'} {quote_field(cell)} is not a number, up to"
+            " 1e38; correct it"
         )
     return value
 
@@ -273,12 +347,14 @@ def _rate(path: Path, report: EventReport) -> tuple[float, float]:
     per_cycle, frequency = numbers["SAM/CYC_A"], numbers["FREQ"]
     if per_cycle is None or not 1 <= per_cycle <= 10_000:
         raise UserError(
-            f"{path}: SAM/CYC_A, the samples in a cycle, is {quote_field(report.about.get('SAM/CYC_A', ''))}, not a number "
+            f"{path}: SAM/CYC_A, the samples in a cycle, is"
+            f" {quote_field(report.about.get('SAM/CYC_A', ''))}, not a number "
             "from 1 to 10000; correct it in the summary row"
         )
     if frequency is None or not LEAST <= frequency <= MOST:
         raise UserError(
-            f"{path}: FREQ, the frequency of the summary row, is {quote_field(report.about.get('FREQ', ''))}, not a number "
+            f"{path}: FREQ, the frequency of the summary row, is"
+            f" {quote_field(report.about.get('FREQ', ''))}, not a number "
             "from 10 to 100 Hz; correct it there"
         )
     return per_cycle, frequency
@@ -288,7 +364,9 @@ def _is_named(report: EventReport, k: int) -> bool:
     return report.columns[k] not in ("", "*")
 
 
-def _channel(report: EventReport, k: int, values: np.ndarray, gain: float, remarks: Remarks) -> Channel:
+def _channel(
+    report: EventReport, k: int, values: np.ndarray, gain: float, remarks: Remarks
+) -> Channel:
     match = _COLUMN.fullmatch(report.columns[k])
     name, unit = (match[1], match[2] or "") if match else (report.columns[k], "")
     wave = _WAVE.fullmatch(name.upper())
@@ -301,9 +379,17 @@ def _channel(report: EventReport, k: int, values: np.ndarray, gain: float, remar
     quantity = "frequency" if name == "FREQ" else unit_of(unit)[0]
     ratio = _ratio(report, name, remarks) if wave else 1.0
     return Channel(
-        name, values, unit, quantity, (wave[1] or "") if wave else "", (wave[2] or "") if wave else "",
-        gain if wave else 1.0, 0.0, ratio, form="waveform" if wave else "value",
-    )  # fmt: skip
+        name,
+        values,
+        unit,
+        quantity,
+        (wave[1] or "") if wave else "",
+        (wave[2] or "") if wave else "",
+        gain if wave else 1.0,
+        0.0,
+        ratio,
+        form="waveform" if wave else "value",
+    )
 
 
 def _ratio(report: EventReport, name: str, remarks: Remarks) -> float:
@@ -314,14 +400,23 @@ def _ratio(report: EventReport, name: str, remarks: Remarks) -> float:
     keys = (column, column[:-1] + "A", column[:3])
     ratio = next((r for key in keys if (r := number(report.about.get(key, "")))), None)
     if ratio is None or ratio <= 0:
-        remarks.add(f"secondary values (PRIM_VAL is NO), but no ratio {column} for {name}: they stay secondary")
+        remarks.add(
+            f"secondary values (PRIM_VAL is NO), but no ratio {column} for {name}: they stay"
+            " secondary"
+        )
         return 1.0
     return ratio
 
 
-def _gain(report: EventReport, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks) -> float:
-    """The root of two, unless the summary's currents, RMS, show that the columns hold instantaneous values."""
-    remarks.add("columns are taken as instantaneous values over the root of two, as SEL's manuals say")
+def _gain(
+    report: EventReport, values: np.ndarray, marks: list[str], per_cycle: float, remarks: Remarks
+) -> float:
+    """The root of two, unless the summary's currents, RMS, show that the columns hold instantaneous
+    values.
+    """
+    remarks.add(
+        "columns are taken as instantaneous values over the root of two, as SEL's manuals say"
+    )
     quarter = round(per_cycle / 4)
     row = next((i for sign in ("*", ">") for i, mark in enumerate(marks) if sign in mark), None)
     if row is None or row < quarter or 4 * quarter != per_cycle:
@@ -336,10 +431,16 @@ def _gain(report: EventReport, values: np.ndarray, marks: list[str], per_cycle: 
         return ROOT
     ratio = max(ratios)[1]  # of the greatest current
     if abs(ratio / ROOT - 1) < LARGEST_SUMMARY_DIFFERENCE:
-        remarks.add("but their greatest current, by the summary, says that they are not divided; taken as they are")
+        remarks.add(
+            "but their greatest current, by the summary, says that they are not divided; taken as"
+            " they are"
+        )
         return 1.0
     if abs(ratio - 1) > LARGEST_SUMMARY_DIFFERENCE:
-        remarks.add(f"the summary's greatest current is {1 / ratio:.2f} times that of the columns: check the scale")
+        remarks.add(
+            f"the summary's greatest current is {1 / ratio:.2f} times that of the columns: check"
+            " the scale"
+        )
     return ROOT
 
 
@@ -348,8 +449,12 @@ def _start(report: EventReport, before: float, remarks: Remarks) -> datetime | N
     keys = ("YEAR", "MONTH", "DAY", "HOUR", "MIN", "SEC", "MSEC")
     parts = [number(report.about.get(key, "")) for key in keys]
     try:
-        year, month, day, hour, minute, second, milli = (int(part) for part in parts if part is not None)
-        moment = datetime(year + (2000 if year < 100 else 0), month, day, hour, minute, second, 1000 * milli)
+        year, month, day, hour, minute, second, milli = (
+            int(part) for part in parts if part is not None
+        )
+        moment = datetime(
+            year + (2000 if year < 100 else 0), month, day, hour, minute, second, 1000 * milli
+        )
         return moment - timedelta(seconds=before)
     except (ValueError, OverflowError):
         said = ", ".join(f"{key} {report.about.get(key, '')}" for key in keys)
@@ -368,7 +473,11 @@ def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     if not names:
         return []
     width = -(-len(names) // 8)
-    packed = np.frombuffer(b"".join(row[:width].ljust(width, b"\0") for row in rows), np.uint8).reshape(-1, width)
+    packed = np.frombuffer(
+        b"".join(row[:width].ljust(width, b"\0") for row in rows), np.uint8
+    ).reshape(-1, width)
     return [
-        StatusChannel(name, packed[:, k // 8], bit=7 - k % 8) for k, name in enumerate(names) if name != "*"
-    ]  # fmt: skip
+        StatusChannel(name, packed[:, k // 8], bit=7 - k % 8)
+        for k, name in enumerate(names)
+        if name != "*"
+    ]

@@ -1,9 +1,10 @@
 """Cells of a table as times by a clock, whatever way they are written.
 
-2024-03-31T01:59:59.900+01:00   31.03.2024 14:00:07,250   03/01/2024 10:15:30.25 PM   23:59:60.5   14:00:07.25
+2024-03-31T01:59:59.900+01:00 31.03.2024 14:00:07,250 03/01/2024 10:15:30.25 PM 23:59:60.5
+14:00:07.25
 
-Clocks are set back and forth, in autumn and spring and otherwise, and have leap seconds; dates are written day before
-month, and month before day. What one cell leaves open, the column decides.
+Clocks are set back and forth, in autumn and spring and otherwise, and have leap seconds; dates are
+written day before month, and month before day. What one cell leaves open, the column decides.
 """
 
 import datetime as dt
@@ -19,22 +20,39 @@ import numpy as np
 from tractexp.filetypes.cells import BadCell, quote_cell
 
 DAYS = (
-    "%Y-%m-%d", "%Y/%m/%d", "%Y.%m.%d", "%Y%m%d", "%d.%m.%Y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%m-%d-%Y",
-    "%d.%m.%y", "%d/%m/%y", "%m/%d/%y", "%d-%b-%Y", "%d %b %Y", "%b %d, %Y", "%d-%b-%y", "%Y年%m月%d日",
-)  # fmt: skip
+    "%Y-%m-%d",
+    "%Y/%m/%d",
+    "%Y.%m.%d",
+    "%Y%m%d",
+    "%d.%m.%Y",
+    "%d/%m/%Y",
+    "%m/%d/%Y",
+    "%d-%m-%Y",
+    "%m-%d-%Y",
+    "%d.%m.%y",
+    "%d/%m/%y",
+    "%m/%d/%y",
+    "%d-%b-%Y",
+    "%d %b %Y",
+    "%b %d, %Y",
+    "%d-%b-%y",
+    "%Y年%m月%d日",
+)
 CLOCK = re.compile(
     r"\s*(?:(?P<day>\S.*?)[T\s]+)?(?:(?P<h>\d{1,2}):)?(?P<m>\d{1,2}):(?P<s>\d{1,2}(?:[.,]\d*)?)"
     r"(?:\s*(?P<half>[AaPp])\.?[Mm]\.?)?\s*(?P<zone>Z|UTC|GMT|[+-]\d{2}:?\d{2}|[+-]\d{2})?\s*"
 )
 DAY, HOUR = 86400.0, 3600.0  # s
 SWAPPED = 3.0  # steps: rows that go back by no more may have been exchanged
-SET_BACK = 2 * HOUR  # s: by more no clock is set back; rows that go farther back are of another record
+# s: by more no clock is set back; rows that go farther back are of another record
+SET_BACK = 2 * HOUR
 LATEST_SUMMER = 4.0  # hour of the day after which no clock is set forth for the summer
 
 
 @dataclass(frozen=True)
 class ClockTimes:
-    """Times (N,) [s] since the first cell, `start`, its date and time where cells have dates, and what was mended.
+    """Times (N,) [s] since the first cell, `start`, its date and time where cells have dates, and
+    what was mended.
 
     `remarks` are (row from 0, words) of what a column left open or a clock did.
     """
@@ -47,7 +65,9 @@ class ClockTimes:
 
 @dataclass(frozen=True)
 class _Moment:
-    """One cell: the text of its day, or the day; the second of it; whether AM or PM, and whether a zone, is written."""
+    """One cell: the text of its day, or the day; the second of it; whether AM or PM, and whether a
+    zone, is written.
+    """
 
     day: str | dt.date | None
     second: float
@@ -58,7 +78,9 @@ class _Moment:
 
 def is_time(cell: Any) -> bool:
     """Whether a cell is a time of day or a date with one."""
-    return isinstance(cell, dt.datetime | dt.time) or (isinstance(cell, str) and CLOCK.fullmatch(cell) is not None)
+    return isinstance(cell, dt.datetime | dt.time) or (
+        isinstance(cell, str) and CLOCK.fullmatch(cell) is not None
+    )
 
 
 def is_date(cell: Any) -> bool:
@@ -69,7 +91,9 @@ def is_date(cell: Any) -> bool:
 
 
 def first_day(cells: Sequence[Any]) -> dt.date | None:
-    """The day of the first of some cells that are dates, read as all of them can be; None where they are none."""
+    """The day of the first of some cells that are dates, read as all of them can be; None where
+    they are none.
+    """
     try:
         texts = [cell.strip() if isinstance(cell, str) else cell for cell in cells]
         return _dates(texts, american=False)[0][texts[0]]
@@ -100,17 +124,21 @@ def times(cells: Sequence[Any]) -> ClockTimes:
     else:
         turn = HOUR if isinstance(cells[0], str) and cells[0].count(":") == 1 else DAY
         seconds = seconds + turn * np.cumsum(np.diff(seconds, prepend=seconds[0]) < -turn / 2)
-    seconds = seconds + np.cumsum([0.0, *(a.leap and not b.leap for a, b in itertools.pairwise(moments))])
+    seconds = seconds + np.cumsum(
+        [0.0, *(a.leap and not b.leap for a, b in itertools.pairwise(moments))]
+    )
     local = None if any(one.zone for one in moments) else np.array([one.second for one in moments])
     seconds, jumps = _run_on(seconds, local)
     return ClockTimes(seconds - seconds[0], start, (*remarks, *jumps), moments[0].second)
 
 
-def _run_on(seconds: np.ndarray, local: np.ndarray | None) -> tuple[np.ndarray, list[tuple[int, str]]]:
+def _run_on(
+    seconds: np.ndarray, local: np.ndarray | None
+) -> tuple[np.ndarray, list[tuple[int, str]]]:
     """Times (N,) [s] without the jumps of a clock that was set, and what is said of each.
 
-    `local` are the seconds of the day by which an hour that is left out in spring is known; None for times of a zone,
-    which leave out none.
+    `local` are the seconds of the day by which an hour that is left out in spring is known; None
+    for times of a zone, which leave out none.
     """
     steps, remarks = np.diff(seconds), list[tuple[int, str]]()
     usual = float(np.median(steps)) if len(steps) else 0.0
@@ -123,10 +151,14 @@ def _run_on(seconds: np.ndarray, local: np.ndarray | None) -> tuple[np.ndarray, 
         forth = next((each for each in back if abs(each - jump) <= usual), HOUR if spring else None)
         if -SET_BACK <= jump < -SWAPPED * usual:
             back.append(-jump)
-            remarks.append((int(k) + 1, f"the clock was set back by {-jump:.6g} s here: times run on"))
+            remarks.append(
+                (int(k) + 1, f"the clock was set back by {-jump:.6g} s here: times run on")
+            )
         elif jump > 0 and forth is not None:
             back = [each for each in back if each != forth]
-            remarks.append((int(k) + 1, f"the clock was set forth by {jump:.6g} s here: times run on"))
+            remarks.append(
+                (int(k) + 1, f"the clock was set forth by {jump:.6g} s here: times run on")
+            )
         else:
             continue
         shifts[k + 1] = -jump
@@ -142,8 +174,14 @@ def _moment(cell: Any, row: int) -> _Moment:
         return _Moment(cell, 0.0)  # a sheet's midnight
     match = CLOCK.fullmatch(cell) if isinstance(cell, str) else None
     if match is None:
-        raise BadCell(row, f"{quote_cell(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25")
-    hours, minutes, second = int(match["h"] or 0), int(match["m"]), float(match["s"].replace(",", "."))
+        raise BadCell(
+            row, f"{quote_cell(cell)} is no time, such as 12:00:00.25 or 2024-03-31T12:00:00.25"
+        )
+    hours, minutes, second = (
+        int(match["h"] or 0),
+        int(match["m"]),
+        float(match["s"].replace(",", ".")),
+    )
     if hours > 24 or minutes > 59 or second >= 61:
         raise BadCell(row, f"{quote_cell(cell)} is no time of a day")
     if match["half"]:
@@ -166,8 +204,9 @@ def _offset(zone: str | None) -> float:
 def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], list[tuple[int, str]]]:
     """{day as written: the day}, all read in one way, and what is said where several ways would do.
 
-    That way is taken in which the days run on best; where that leaves it open, month before day where the times have
-    AM or PM (`american`), else day before month. Raises `BadCell` where no way reads all.
+    That way is taken in which the days run on best; where that leaves it open, month before day
+    where the times have AM or PM (`american`), else day before month. Raises `BadCell` where no way
+    reads all.
     """
     rows = {day: row for row, day in reversed([*enumerate(days)])}
     texts = [day for day in rows if isinstance(day, str)]
@@ -182,7 +221,10 @@ def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], lis
             ways.append((form, read))
     if not ways:
         odd = next((t for t in order if not is_date(t)), order[-1])
-        raise BadCell(rows[odd], f"{quote_cell(odd)} is no date, or not written as those before; write it as 2024-03-31")
+        raise BadCell(
+            rows[odd],
+            f"{quote_cell(odd)} is no date, or not written as those before; write it as 2024-03-31",
+        )
     spans = [sum(abs((b - a).days) for a, b in itertools.pairwise(way)) for _, way in ways]
     likely = [ways[k] for k in range(len(ways)) if spans[k] == min(spans)]
     first_month = [each for each in likely if each[0].startswith("%m")]
@@ -190,8 +232,17 @@ def _dates(days: Sequence[Any], american: bool) -> tuple[dict[Any, dt.date], lis
     remarks = []
     if len(ways) > 1:
         how = "month before day" if form.startswith("%m") else "day before month"
-        why = "as the days run on" if len(likely) == 1 else "as with AM and PM" if american else "as is usual"
-        said = f"'{order[0]}' is read as {dates[0]:%d %B %Y}, {how}, {why}; dates as 2024-03-31 leave nothing open"
+        why = (
+            "as the days run on"
+            if len(likely) == 1
+            else "as with AM and PM"
+            if american
+            else "as is usual"
+        )
+        said = (
+            f"'{order[0]}' is read as {dates[0]:%d %B %Y}, {how}, {why}; dates as 2024-03-31 leave"
+            " nothing open"
+        )
         remarks = [(rows[order[0]], said)]
     return {**known, **dict(zip(order, dates, strict=True))}, remarks
 

@@ -1,6 +1,6 @@
 """The meaning of column names: quantity, phase, unit.
 
-t   Time [s]   Zeit in ms   时间     U   Voltage (kV)   Va   UA(kV)   V1   m:u1:bus in p.u.     P [MW]   Active power
+t Time [s] Zeit in ms 时间 U Voltage (kV) Va UA(kV) V1 m:u1:bus in p.u. P [MW] Active power
 """
 
 import re
@@ -11,60 +11,223 @@ from tractexp.recording.phase_mark import ORDERS, plain, spell_marks
 from tractexp.recording.recording import unit_of
 from tractexp.recording.unit import amount
 
-# {unit in lower case, but those of voltage and current: (quantity, factor to s, MW, Mvar, Hz, rad, pu)}
+# {unit in lower case, but those of voltage and current: (quantity, factor to s, MW, Mvar, Hz, rad,
+# pu)}
 UNITS: Mapping[str, tuple[str, float]] = {
     **{unit: ("t", 1.0) for unit in ("s", "sec", "second", "seconds", "sek", "秒", "с", "сек")},
     **{unit: ("t", 1e-3) for unit in ("ms", "msec", "millisecond", "milliseconds", "毫秒", "мс")},
     **{unit: ("t", 1e-6) for unit in ("us", "µs", "μs", "usec", "microseconds", "微秒", "мкс")},
-    "ns": ("t", 1e-9), "min": ("t", 60.0), "h": ("t", 3600.0), "day": ("t", 86400.0), "days": ("t", 86400.0),
-    "mw": ("power", 1.0), "kw": ("power", 1e-3), "w": ("power", 1e-6), "gw": ("power", 1e3), "мвт": ("power", 1.0),
+    "ns": ("t", 1e-9),
+    "min": ("t", 60.0),
+    "h": ("t", 3600.0),
+    "day": ("t", 86400.0),
+    "days": ("t", 86400.0),
+    "mw": ("power", 1.0),
+    "kw": ("power", 1e-3),
+    "w": ("power", 1e-6),
+    "gw": ("power", 1e3),
+    "мвт": ("power", 1.0),
     "квт": ("power", 1e-3),
-    "mvar": ("reactive", 1.0), "kvar": ("reactive", 1e-3), "var": ("reactive", 1e-6), "gvar": ("reactive", 1e3),
-    "mva": ("reactive", 1.0), "kva": ("reactive", 1e-3), "va": ("reactive", 1e-6), "мвар": ("reactive", 1.0),
+    "mvar": ("reactive", 1.0),
+    "kvar": ("reactive", 1e-3),
+    "var": ("reactive", 1e-6),
+    "gvar": ("reactive", 1e3),
+    "mva": ("reactive", 1.0),
+    "kva": ("reactive", 1e-3),
+    "va": ("reactive", 1e-6),
+    "мвар": ("reactive", 1.0),
     "квар": ("reactive", 1e-3),
-    "hz": ("frequency", 1.0), "mhz": ("frequency", 1e-3), "гц": ("frequency", 1.0),
+    "hz": ("frequency", 1.0),
+    "mhz": ("frequency", 1e-3),
+    "гц": ("frequency", 1.0),
     "hz/s": ("rocof", 1.0),
-    **{unit: ("angle", 0.017453292519943295) for unit in ("deg", "degree", "degrees", "°", "grad", "度")},
+    **{
+        unit: ("angle", 0.017453292519943295)
+        for unit in ("deg", "degree", "degrees", "°", "grad", "度")
+    },
     **{unit: ("angle", 1.0) for unit in ("rad", "radian", "radians")},
-    **{unit: ("", 1.0) for unit in ("pu", "p.u.", "p.u", "per unit", "puv", "1")}, "%": ("", 1e-2),
-}  # fmt: skip
+    **{unit: ("", 1.0) for unit in ("pu", "p.u.", "p.u", "per unit", "puv", "1")},
+    "%": ("", 1e-2),
+}
 PER_UNIT = frozenset(unit for unit, (quantity, _) in UNITS.items() if not quantity)
 FITTING: Mapping[str, tuple[str, ...]] = {
-    "t": ("t",), "U": ("voltage", ""), "I": ("current", ""), "P": ("power", ""), "Q": ("reactive", ""),
-    "f": ("frequency", ""), "dfdt": ("rocof", "frequency", ""), "angle": ("angle", ""), "day": ("t", ""),
-    "frac": ("t", ""), "soc": ("t", ""),
-}  # fmt: skip
-ALSO: Mapping[str, tuple[str, ...]] = {"P": ("reactive",), "Q": ("power",), "t": ("",)}  # as files write them
+    "t": ("t",),
+    "U": ("voltage", ""),
+    "I": ("current", ""),
+    "P": ("power", ""),
+    "Q": ("reactive", ""),
+    "f": ("frequency", ""),
+    "dfdt": ("rocof", "frequency", ""),
+    "angle": ("angle", ""),
+    "day": ("t", ""),
+    "frac": ("t", ""),
+    "soc": ("t", ""),
+}
+# as files write them
+ALSO: Mapping[str, tuple[str, ...]] = {"P": ("reactive",), "Q": ("power",), "t": ("",)}
 BRACKETED = (
-    r"(.+?)[\s_]*[\[(（{<]\s*([^\])）}>]*?)\s*[\])）}>]", r"(.+?)\s*/\s*(\S+)", r"(.+?)\s+in\s+(\S+)",
-)  # fmt: skip
-UNMISTAKABLE = frozenset((  # as units after a space or an underscore, where V and A may be phases
-    "kV", "kA", "MW", "kW", "Mvar", "MVAr", "MVar", "kvar", "kVAr", "Hz", "s", "ms", "us", "pu", "deg", "rad",
-))  # fmt: skip
+    r"(.+?)[\s_]*[\[(（{<]\s*([^\])）}>]*?)\s*[\])）}>]",
+    r"(.+?)\s*/\s*(\S+)",
+    r"(.+?)\s+in\s+(\S+)",
+)
+UNMISTAKABLE = frozenset(
+    (  # as units after a space or an underscore, where V and A may be phases
+        "kV",
+        "kA",
+        "MW",
+        "kW",
+        "Mvar",
+        "MVAr",
+        "MVar",
+        "kvar",
+        "kVAr",
+        "Hz",
+        "s",
+        "ms",
+        "us",
+        "pu",
+        "deg",
+        "rad",
+    )
+)
 
 # {word: quantity}; longer ones match within a name too, in scripts that do not part words
 WORDS: Mapping[str, str] = {
-    **dict.fromkeys(("t", "time", "timestamp", "datetime", "zeit", "zeitpunkt", "uhrzeit", "zeitstempel", "clock",
-                     "temps", "tiempo", "tempo", "tnow", "utc", "unixtime", "epoch", "время", "时间", "时刻"), "t"),
+    **dict.fromkeys(
+        (
+            "t",
+            "time",
+            "timestamp",
+            "datetime",
+            "zeit",
+            "zeitpunkt",
+            "uhrzeit",
+            "zeitstempel",
+            "clock",
+            "temps",
+            "tiempo",
+            "tempo",
+            "tnow",
+            "utc",
+            "unixtime",
+            "epoch",
+            "время",
+            "时间",
+            "时刻",
+        ),
+        "t",
+    ),
     **dict.fromkeys(("soc", "century"), "soc"),
     **dict.fromkeys(("date", "datum", "日期", "дата"), "day"),
-    **dict.fromkeys(("u", "v", "vm", "um", "voltage", "volt", "volts", "vmag", "umag", "urms", "vrms", "u1l", "ul",
-                     "ull", "uln", "vll", "vln", "ulg", "vlg", "uac", "vac", "umean", "vmean", "uavg",
-                     "vavg", "spannung", "напряжение", "напряж", "电压",
-                     "tension", "tensión", "voltaje", "tensione"), "U"),
-    **dict.fromkeys(("i", "im", "current", "curr", "irms", "strom", "ток", "电流", "courant", "corriente",
-                     "corrente"), "I"),
-    **dict.fromkeys(("p", "ptot", "psum", "ptotal", "pload", "pl", "pelec", "plod", "powr", "ppq", "active", "real",
-                     "wirkleistung", "активная", "有功", "有功功率"), "P"),
-    **dict.fromkeys(("q", "qtot", "qsum", "qtotal", "qload", "ql", "qelec", "qlod", "vars", "qpq", "reactive",
-                     "blindleistung", "реактивная", "无功", "无功功率"), "Q"),
-    **dict.fromkeys(("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"),
+    **dict.fromkeys(
+        (
+            "u",
+            "v",
+            "vm",
+            "um",
+            "voltage",
+            "volt",
+            "volts",
+            "vmag",
+            "umag",
+            "urms",
+            "vrms",
+            "u1l",
+            "ul",
+            "ull",
+            "uln",
+            "vll",
+            "vln",
+            "ulg",
+            "vlg",
+            "uac",
+            "vac",
+            "umean",
+            "vmean",
+            "uavg",
+            "vavg",
+            "spannung",
+            "напряжение",
+            "напряж",
+            "电压",
+            "tension",
+            "tensión",
+            "voltaje",
+            "tensione",
+        ),
+        "U",
+    ),
+    **dict.fromkeys(
+        (
+            "i",
+            "im",
+            "current",
+            "curr",
+            "irms",
+            "strom",
+            "ток",
+            "电流",
+            "courant",
+            "corriente",
+            "corrente",
+        ),
+        "I",
+    ),
+    **dict.fromkeys(
+        (
+            "p",
+            "ptot",
+            "psum",
+            "ptotal",
+            "pload",
+            "pl",
+            "pelec",
+            "plod",
+            "powr",
+            "ppq",
+            "active",
+            "real",
+            "wirkleistung",
+            "активная",
+            "有功",
+            "有功功率",
+        ),
+        "P",
+    ),
+    **dict.fromkeys(
+        (
+            "q",
+            "qtot",
+            "qsum",
+            "qtotal",
+            "qload",
+            "ql",
+            "qelec",
+            "qlod",
+            "vars",
+            "qpq",
+            "reactive",
+            "blindleistung",
+            "реактивная",
+            "无功",
+            "无功功率",
+        ),
+        "Q",
+    ),
+    **dict.fromkeys(
+        ("f", "fe", "freq", "frequency", "fehz", "fq", "frequenz", "frq", "частота", "频率"), "f"
+    ),
     **dict.fromkeys(("dfdt", "df", "rocof", "dfreq"), "dfdt"),
-}  # fmt: skip
-# {word of a column that holds the fractions of the seconds in another: their unit, "" where their size tells it}
+}
+# {word of a column that holds the fractions of the seconds in another: their unit, "" where their
+# size tells it}
 FRACTIONS: Mapping[str, str] = {
-    **dict.fromkeys(("fracsec", "frac", "fraction", "fractions", "fractional", "subsecond", "subseconds"), ""),
-    **dict.fromkeys(("ms", "msec", "millis", "millisec", "millisecond", "milliseconds", "毫秒"), "ms"),
+    **dict.fromkeys(
+        ("fracsec", "frac", "fraction", "fractions", "fractional", "subsecond", "subseconds"), ""
+    ),
+    **dict.fromkeys(
+        ("ms", "msec", "millis", "millisec", "millisecond", "milliseconds", "毫秒"), "ms"
+    ),
     **dict.fromkeys(("usec", "micros", "microsec", "microsecond", "microseconds", "微秒"), "us"),
     **dict.fromkeys(("nsec", "nanosecond", "nanoseconds", "纳秒"), "ns"),
 }
@@ -77,15 +240,21 @@ PHASES: Mapping[str, str] = {
     **dict.fromkeys(("ab", "12", "l12", "l1l2"), "ab"),
     **dict.fromkeys(("bc", "23", "l23", "l2l3"), "bc"),
     **dict.fromkeys(("ca", "31", "l31", "l3l1"), "ca"),
-    "ba": "ba", "cb": "cb", "ac": "ac",
+    "ba": "ba",
+    "cb": "cb",
+    "ac": "ac",
     **dict.fromkeys(POSITIVE, "1"),
     **dict.fromkeys(("neg", "negative", "ns", "2", "负序", "gegensystem"), "2"),
     **dict.fromkeys(("0", "zero", "zs", "零序"), "0"),
-    "3": "3", "n": "n",
-}  # fmt: skip
-BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}  # line voltages that are the opposite of those of `data.columns`
+    "3": "3",
+    "n": "n",
+}
+# line voltages that are the opposite of those of `data.columns`
+BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}
 LINE = frozenset(("ll", "ul", "ull", "vll", "u1l", "line", "pp"))
-GROUND = frozenset(("ln", "lg", "uln", "vln", "ulg", "vlg", "ph", "an", "bn", "cn", "ag", "bg", "cg"))
+GROUND = frozenset(
+    ("ln", "lg", "uln", "vln", "ulg", "vlg", "ph", "an", "bn", "cn", "ag", "bg", "cg")
+)
 COMPOUND = re.compile(
     r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|ba|cb|ac|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns"
     r"|a|b|c|0|1|2|3|n)(mag|m|ang|rms)?"
@@ -97,9 +266,13 @@ BY_UNIT: Mapping[str, str] = {"voltage": "U", "current": "I", "power": "P", "rea
 
 @dataclass(frozen=True)
 class Role:
-    """What a column is: `key` as in `data.columns`, the factor to the unit used inside, and what the unit says."""
+    """What a column is: `key` as in `data.columns`, the factor to the unit used inside, and what
+    the unit says.
+    """
 
-    key: str  # t, frac, soc, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in _angle
+    # t, frac, soc, U, U2, P, Q, f, dfdt, day; Ua ... Uca, U1, Ia ..., Pa ...; an angle ends in
+    # _angle
+    key: str
     unit: str = ""
     line: bool | None = None  # of a voltage: line to line, phase to ground, unsaid
     backward: bool = False  # of a line voltage: BA, which is the opposite of AB
@@ -113,13 +286,17 @@ class Role:
 
 
 def split_unit(name: str) -> tuple[str, str]:
-    """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms", "P_MW"."""
+    """A header's name and its unit, "" where it has none: "Voltage [kV]", "U/kV", "Zeit in ms",
+    "P_MW".
+    """
     name = name.strip().strip('"').strip("'").strip()
     for pattern in BRACKETED:
         if (match := re.fullmatch(pattern, name)) and is_unit(match[2]):
             return match[1].strip(), match[2]
     match = re.fullmatch(r"(.+?)(?:\s*,\s*|\s+|_)(\S+)", name)
-    sure = match is not None and (match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2])))
+    sure = match is not None and (
+        match[2] in UNMISTAKABLE or (not match[2].isascii() and is_unit(match[2]))
+    )
     return (match[1], match[2]) if match and sure else (name, "")
 
 
@@ -129,7 +306,9 @@ def is_unit(text: str) -> bool:
 
 
 def meaning(unit: str) -> tuple[str, float] | None:
-    """(quantity, factor to the unit used inside) of a unit; the quantity is "" of per unit. None for no unit."""
+    """(quantity, factor to the unit used inside) of a unit; the quantity is "" of per unit. None
+    for no unit.
+    """
     if unit.strip() == "mW":
         return "power", 1e-9
     electrical = unit_of(unit)
@@ -137,41 +316,55 @@ def meaning(unit: str) -> tuple[str, float] | None:
 
 
 def factor(unit: str) -> float:
-    """From a unit to the one used inside, 1 for none; a setting's may have a number before it: "89.8 kV"."""
+    """From a unit to the one used inside, 1 for none; a setting's may have a number before it:
+    "89.8 kV".
+    """
     number, unit = amount(unit)
     return number * (meaning(unit) or ("", 1.0))[1]
 
 
 def fits(quantity: str, unit: str, exact: bool = False) -> bool:
-    """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless `exact`."""
+    """Whether a unit is one of a quantity, as `data.units` calls it; P in Mvar, Q in MW are, unless
+    `exact`.
+    """
     kind = (meaning(amount(unit)[1]) or ("",))[0]
     return kind in (FITTING[quantity] if exact else {*FITTING[quantity], *ALSO.get(quantity, ())})
 
 
 def order_of(names: Sequence[str], units: Sequence[str]) -> str:
-    """The order of phases, one of `TABLE_ORDERS`, in which most columns of a table have marks; the first of several."""
+    """The order of phases, one of `TABLE_ORDERS`, in which most columns of a table have marks; the
+    first of several.
+    """
 
     def marked(order: str) -> int:
         roles = (role(name, unit, order) for name, unit in zip(names, units, strict=True) if name)
         ours = [one for one in roles if one and one.key[:1] in tuple("UIPQ")]
         keys = {one.key.removesuffix("_angle") for one in ours}
-        sets = ([key for key in keys if key[0] == letter and key[1:] in PHASE_KEYS] for letter in "UIPQ")
+        sets = (
+            [key for key in keys if key[0] == letter and key[1:] in PHASE_KEYS] for letter in "UIPQ"
+        )
         counts = ([sum(len(key) == size for key in one) for size in (2, 3)] for one in sets)
         grounded = len({one.key for one in ours if one.line is False and one.key[1:] in PHASE_KEYS})
-        return max(grounded, sum(max(singles if singles == 3 else 0, pairs) for singles, pairs in counts))
+        return max(
+            grounded, sum(max(singles if singles == 3 else 0, pairs) for singles, pairs in counts)
+        )
 
     return max(TABLE_ORDERS, key=marked)
 
 
 def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
-    """What a column of that name and unit is, in a table with that order of phases; None for anything else."""
+    """What a column of that name and unit is, in a table with that order of phases; None for
+    anything else.
+    """
     words = _words(name)
     fractions = [word for word in words if word in FRACTIONS]
     for fraction in fractions:
         if not FRACTIONS[fraction] or len(words) == 1:
             return Role("frac", unit or FRACTIONS[fraction])
     kind = (meaning(unit) or ("",))[0]
-    electrical = kind in (*BY_UNIT, "angle") or any(WORDS.get(word) in BY_UNIT.values() for word in words)
+    electrical = kind in (*BY_UNIT, "angle") or any(
+        WORDS.get(word) in BY_UNIT.values() for word in words
+    )
     unmarked = None if electrical else _quantity(words)
     if unmarked and unmarked[0] not in BY_UNIT.values():
         return Role(unmarked[0], unit)
@@ -186,7 +379,12 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
     if (key, kind) in (("U", "current"), ("I", "voltage")):  # "Voltage (A)": a phase, no unit
         return role(f"{name} {unit}", order=order)
     whole, backward = BACKWARD.get(phase, phase), phase in BACKWARD
-    angle = kind == "angle" or ANGLE & set(words) or words[-1] == "phase" or any(word.endswith("ang") for word in words)
+    angle = (
+        kind == "angle"
+        or ANGLE & set(words)
+        or words[-1] == "phase"
+        or any(word.endswith("ang") for word in words)
+    )
     if key in ("U", "I") and angle:
         return Role(f"{key}{whole}_angle", unit, backward=backward)
     if key not in ("U", "I", "P", "Q"):
@@ -200,16 +398,28 @@ def role(name: str, unit: str = "", order: str = ORDERS[0]) -> Role | None:
 
 def _quantity(words: Sequence[str]) -> tuple[str, str] | None:
     """(quantity, phase) that words say."""
-    return next((pair for pair in (_compound(words), _match_words(words)) if pair), None) if words else None
+    return (
+        next((pair for pair in (_compound(words), _match_words(words)) if pair), None)
+        if words
+        else None
+    )
 
 
 def _match_mark(words: Sequence[str], kind: str, ground: bool) -> tuple[str, str] | None:
-    """(quantity, phase) of a name that is little more than a mark: its unit, or two phases or ground, say it."""
+    """(quantity, phase) of a name that is little more than a mark: its unit, or two phases or
+    ground, say it.
+    """
     phase = next((PHASES[word] for word in words if PHASES.get(word, "0")[0] in "abc"), "")
-    more = [word for word in words if word not in PHASES and word not in ANGLE and word not in ("mag", "rms")]
+    more = [
+        word
+        for word in words
+        if word not in PHASES and word not in ANGLE and word not in ("mag", "rms")
+    ]
     if not phase or (more and not kind):
         return None
-    quantity = BY_UNIT.get(kind) or ("U" if (ground or len(phase) == 2) and kind in ("", "angle") else "")
+    quantity = BY_UNIT.get(kind) or (
+        "U" if (ground or len(phase) == 2) and kind in ("", "angle") else ""
+    )
     return (quantity, phase) if quantity else None
 
 
@@ -238,11 +448,19 @@ def _match_words(words: Sequence[str]) -> tuple[str, str] | None:
     quantity = next((WORDS[word] for word in first if word in words and word in WORDS), "")
     text = " ".join(words)
     if not quantity:  # where no spaces part the words
-        within = (key for word, key in WORDS.items() if len(word) > 1 and not word.isascii() and word in text)
+        within = (
+            key
+            for word, key in WORDS.items()
+            if len(word) > 1 and not word.isascii() and word in text
+        )
         quantity = next(within, "")
     if not quantity:
         return None
     if quantity not in ("U", "I"):
         return quantity, ""
-    spelled = (p for w in words if (p := PHASES.get(w)) and not (w.isascii() and len(w) == 1 and "phase" not in words))
+    spelled = (
+        p
+        for w in words
+        if (p := PHASES.get(w)) and not (w.isascii() and len(w) == 1 and "phase" not in words)
+    )
     return quantity, next(spelled, "1" if "正序" in text else "2" if "负序" in text else "")

@@ -1,7 +1,8 @@
-"""COMTRADE records (IEEE C37.111-1991, -1999, -2013): .cfg with .dat, or both in one .cff, read and written.
+"""COMTRADE records (IEEE C37.111-1991, -1999, -2013): .cfg with .dat, or both in one .cff, read and
+written.
 
-Read here and not by a library: the samples stay views of the file in the type they have there, no time is computed
-per sample, and errors name file, line, channel and value.
+Read here and not by a library: the samples stay views of the file in the type they have there, no
+time is computed per sample, and errors name file, line, channel and value.
 """
 
 import re
@@ -33,21 +34,32 @@ _SECTION = re.compile(
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
-    """Read a .cfg and the .dat beside it, or a .cff; raises `UserError` where they are missing, cut short or disagree.
+    """Read a .cfg and the .dat beside it, or a .cff; raises `UserError` where they are missing, cut
+    short or disagree.
 
     `encoding` is that of the configuration; None: guessed from its letters.
     """
     path = Path(path)
     if path.is_dir():
-        raise UserError(f"{path} is a folder; task=survey data.path={path} makes a table of all records in it")
+        raise UserError(
+            f"{path} is a folder; task=survey data.path={path} makes a table of all records in it"
+        )
     try:
-        return _read_combined(_find_existing_path(path), encoding) if path.suffix.lower() == ".cff" else _read_pair(path, encoding)
+        return (
+            _read_combined(_find_existing_path(path), encoding)
+            if path.suffix.lower() == ".cff"
+            else _read_pair(path, encoding)
+        )
     except OSError as error:
-        raise UserError(f"{error.filename or path} cannot be read: {error.strerror or error}") from error
+        raise UserError(
+            f"{error.filename or path} cannot be read: {error.strerror or error}"
+        ) from error
 
 
 def read_header(path: Path, encoding: str | None = None) -> Header:
-    """What the configuration of a record announces, without its samples; raises `UserError` as `load` does."""
+    """What the configuration of a record announces, without its samples; raises `UserError` as
+    `load` does.
+    """
     path = Path(path)
     if path.suffix.lower() == ".cff":
         parts = _sections(_find_existing_path(path))
@@ -79,7 +91,8 @@ def _read_combined(path: Path, encoding: str | None) -> Recording:
     if "CFG" not in parts or "DAT" not in parts:
         lack = "CFG" if "CFG" not in parts else "DAT"
         raise UserError(
-            f"{path}: no section {lack}: a .cff has headings like '--- file type: {lack} ---'; if this is only the "
+            f"{path}: no section {lack}: a .cff has headings like '--- file type: {lack} ---'; if"
+            " this is only the "
             "configuration, name it .cfg and put its .dat beside it"
         )
     remarks = Remarks(str(path))
@@ -129,7 +142,12 @@ def _recording(
         trigger=_trigger(header, stretches, remarks),
         status=[
             StatusChannel(
-                d.name, timeline.nearest(samples.words[:, k // 16], stretches), d.phase, d.circuit, d.normal, bit=k % 16
+                d.name,
+                timeline.nearest(samples.words[:, k // 16], stretches),
+                d.phase,
+                d.circuit,
+                d.normal,
+                bit=k % 16,
             )
             for k, d in enumerate(header.digitals)
         ],
@@ -142,10 +160,20 @@ def _channel(header: Header, k: int, samples: Samples, stretches: list[Stretch])
     analog, raw = header.analogs[k], samples.analogs[k]
     raw, missing = _find_missing_values(header.kind, analog, raw)
     return Channel(
-        analog.name, timeline.resample_evenly(raw, stretches, missing), analog.unit, quantity_of(analog.unit),
-        analog.phase, analog.circuit, analog.gain, analog.offset, analog.ratio, analog.skew * 1e-6, analog.limits,
-        missing, _side(header, analog),
-    )  # fmt: skip
+        analog.name,
+        timeline.resample_evenly(raw, stretches, missing),
+        analog.unit,
+        quantity_of(analog.unit),
+        analog.phase,
+        analog.circuit,
+        analog.gain,
+        analog.offset,
+        analog.ratio,
+        analog.skew * 1e-6,
+        analog.limits,
+        missing,
+        _side(header, analog),
+    )
 
 
 def _side(header: Header, analog: Analog) -> str:
@@ -155,8 +183,12 @@ def _side(header: Header, analog: Analog) -> str:
     return "?" if not analog.side and header.revision < FIRST_WITH_RATIO else ""
 
 
-def _find_missing_values(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np.ndarray, float | None]:
-    """The raw values, and which of them stands for none: a value that the file declares possible does not."""
+def _find_missing_values(
+    kind: str, analog: Analog, raw: np.ndarray
+) -> tuple[np.ndarray, float | None]:
+    """The raw values, and which of them stands for none: a value that the file declares possible
+    does not.
+    """
     least, greatest = analog.limits or (-np.inf, np.inf)
     if kind == "BINARY" and least >= 0 and greatest > 32767:  # declared without sign
         return raw.view("<u2"), 65535.0 if greatest < 65535 else None
@@ -170,35 +202,48 @@ def _find_missing_values(kind: str, analog: Analog, raw: np.ndarray) -> tuple[np
     return raw, missing if missing is None or analog.limits is None or least > missing else None
 
 
-def _stretches(data: ByteRange, header: Header, samples: Samples, remarks: Remarks) -> list[Stretch]:
+def _stretches(
+    data: ByteRange, header: Header, samples: Samples, remarks: Remarks
+) -> list[Stretch]:
     """Segments from the rates; from the time stamps where there are none."""
     fine = all("." in date and len(date.strip().rpartition(".")[2]) > 6 for date in header.dates)
     unit = header.timemult * (1e-9 if fine else 1e-6)
     if header.rates[0][0] > 0:
-        result = timeline.from_rates(header.rates, _read_stamped_times(header, samples.stamps, unit, remarks))
+        result = timeline.from_rates(
+            header.rates, _read_stamped_times(header, samples.stamps, unit, remarks)
+        )
         if any(s.t is not None for s in result):
             remarks.add(
-                "sampling rates within 2 % of their neighbours are taken as one waveform", header.lines["rates"]
+                "sampling rates within 2 % of their neighbours are taken as one waveform",
+                header.lines["rates"],
             )
         return result
     stamps = samples.stamps.astype(np.float64)
     if header.kind != "ASCII":
-        stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))  # the counter ran over
+        # the counter ran over
+        stamps += 2.0**32 * np.cumsum(np.diff(stamps, prepend=stamps[0]) < -(2.0**31))
     result = timeline.from_stamps((stamps - stamps[0]) * unit, unit, str(data.path))
     if header.timemult != 1:
         rates = ", ".join(f"{s.segment.rate:g}" for s in result[:3])
         remarks.add(
-            f"sampled at {rates} Hz, by the time stamps and the time multiplier {header.timemult:g}; if that is wrong, "
+            f"sampled at {rates} Hz, by the time stamps and the time multiplier"
+            f" {header.timemult:g}; if that is wrong, "
             "correct the multiplier"
         )
     if len(result) > 1:
-        gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (" ..." if len(result) > 6 else "")
+        gaps = ", ".join(f"{s.segment.start:.6g}" for s in result[1:6]) + (
+            " ..." if len(result) > 6 else ""
+        )
         remarks.add(f"the steps between time stamps change: a new segment begins at {gaps} s")
     return result
 
 
-def _read_stamped_times(header: Header, stamps: np.ndarray, unit: float, remarks: Remarks) -> np.ndarray | None:
-    """Times (N,) [s] by the time stamps; None where there are none or they contradict the rates, which is said."""
+def _read_stamped_times(
+    header: Header, stamps: np.ndarray, unit: float, remarks: Remarks
+) -> np.ndarray | None:
+    """Times (N,) [s] by the time stamps; None where there are none or they contradict the rates,
+    which is said.
+    """
     if stamps[-1] in (NONE, 0) or stamps[0] == stamps[-1] or not np.isfinite(stamps).all():
         return None
     t = (stamps.astype(np.float64) - float(stamps[0])) * unit
@@ -210,7 +255,10 @@ def _read_stamped_times(header: Header, stamps: np.ndarray, unit: float, remarks
         duration, stamped = (stop - first - 1) / rate, float(t[stop - 1] - t[first])
         if abs(duration - stamped) > 2 * unit + 0.01 * duration:
             at = f"samples {first + 1} to {stop} take {duration:.6g} s at {rate:g} Hz"
-            remarks.add(f"{at}, but {stamped:.6g} s by their time stamps; the rate is taken", header.lines["rates"])
+            remarks.add(
+                f"{at}, but {stamped:.6g} s by their time stamps; the rate is taken",
+                header.lines["rates"],
+            )
             return None
         first = stop
     return t
@@ -218,19 +266,31 @@ def _read_stamped_times(header: Header, stamps: np.ndarray, unit: float, remarks
 
 def _trigger(header: Header, stretches: list[Stretch], remarks: Remarks) -> float | None:
     last = stretches[-1].segment
-    if header.trigger is None or -1e-6 <= header.trigger <= last.start + (last.stop - last.first) / last.rate:
+    if (
+        header.trigger is None
+        or -1e-6 <= header.trigger <= last.start + (last.stop - last.first) / last.rate
+    ):
         return header.trigger
-    remarks.add(f"the trigger, {header.trigger:g} s after the first sample, lies outside the record and is not used")
+    remarks.add(
+        f"the trigger, {header.trigger:g} s after the first sample, lies outside the record and is"
+        " not used"
+    )
     return None
 
 
 def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[str, Any]:
     """Fields of the file that a recording has no attribute for, for a round trip."""
     extra: dict[str, Any] = {
-        "format": "COMTRADE", "revision": header.revision, "kind": header.kind, "dates": header.dates,
-        "timemult": header.timemult, "time_code": header.time_code, "quality": header.quality,
-        "sides": [(analog.primary, analog.secondary, analog.side) for analog in header.analogs], "rates": header.rates,
-    }  # fmt: skip
+        "format": "COMTRADE",
+        "revision": header.revision,
+        "kind": header.kind,
+        "dates": header.dates,
+        "timemult": header.timemult,
+        "time_code": header.time_code,
+        "quality": header.quality,
+        "sides": [(analog.primary, analog.secondary, analog.side) for analog in header.analogs],
+        "rates": header.rates,
+    }
     if any(s.t is not None for s in stretches):
         return extra  # numbers and stamps of other samples
     count = len(samples.numbers)
@@ -253,19 +313,24 @@ def _pair(path: Path) -> tuple[Path, Path, str]:
     ending = path.suffix.lower()
     if ending not in (".cfg", ".dat"):
         raise UserError(
-            f"{DATA.path}={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside it, or a .cff"
+            f"{DATA.path}={path}: give the .cfg file of a COMTRADE record, whose .dat lies beside"
+            " it, or a .cff"
         )
     _find_existing_path(path)
     if ending == ".dat":
         cfg = _find_companion(path, ".cfg")
         if cfg is None:
             raise UserError(
-                f"{path}: the configuration {path.stem}.cfg is not beside it, and the data mean nothing without"
+                f"{path}: the configuration {path.stem}.cfg is not beside it, and the data mean"
+                " nothing without"
             )
         return cfg, path, f"it lies beside {path.name}"
     dat = _find_companion(path, ".dat")
     if dat is None:
-        raise UserError(f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside {path.name}")
+        raise UserError(
+            f"{path.with_suffix('.dat')}: there is no such file; the data must lie beside"
+            f" {path.name}"
+        )
     return path, dat, ""
 
 
@@ -275,11 +340,19 @@ def _find_companion(path: Path, ending: str) -> Path | None:
             return path.with_suffix(one)
     wanted = path.with_suffix(ending).name.casefold()
     return next(
-        (item for item in sorted(path.parent.iterdir()) if item.name.casefold() == wanted and item.is_file()), None
+        (
+            item
+            for item in sorted(path.parent.iterdir())
+            if item.name.casefold() == wanted and item.is_file()
+        ),
+        None,
     )
 
 
 def _configuration(place: ByteRange) -> bytes:
     if place.size > LARGEST_CFG:
-        raise UserError(f"{place.path}: {place.size} bytes are no COMTRADE configuration; the limit is {LARGEST_CFG}")
+        raise UserError(
+            f"{place.path}: {place.size} bytes are no COMTRADE configuration; the limit is"
+            f" {LARGEST_CFG}"
+        )
     return place.content()

@@ -1,4 +1,6 @@
-"""Numbers and dates as the lines of recorders' files hold them, and a value of a file for a message."""
+"""Numbers and dates as the lines of recorders' files hold them, and a value of a file for a
+message.
+"""
 
 import re
 from datetime import datetime
@@ -6,7 +8,8 @@ from math import isfinite
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d{1,4})?", re.ASCII)
 _DATE = re.compile(
-    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,; T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
+    r"(\d{1,4})[/.\-](\d{1,2})[/.\-](\d{1,4})\s*[,;"
+    r" T]*\s*(\d{1,2})\s*:\s*(\d{1,2})\s*:\s*(\d{1,2})(?:[.,](\d*))?\s*,?",
     re.ASCII,
 )
 
@@ -32,7 +35,11 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
     """
     match = _DATE.fullmatch(text.strip())
     if match is None:
-        return None, f"{quote_field(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not used"
+        return (
+            None,
+            f"{quote_field(text)} is not a date and time, as in 31/12/2024,23:59:59.000000; not"
+            " used",
+        )
     a, b, c, hour, minute, second = map(int, match.groups()[:6])
     micro = int((match[7] or "0")[:6].ljust(6, "0"))
     orders = [(c, a, b), (c, b, a)] if american else [(c, b, a), (c, a, b)]  # (year, month, day)
@@ -44,5 +51,7 @@ def date(text: str, american: bool) -> tuple[datetime | None, str]:
             moment = datetime(year, month, day, hour, minute, second, micro)
         except ValueError:
             continue
-        return moment, f"date {quote_field(text)} read as {moment:%Y-%m-%d}" if k or len(match[1]) > 2 else ""
+        return moment, f"date {quote_field(text)} read as {moment:%Y-%m-%d}" if k or len(
+            match[1]
+        ) > 2 else ""
     return None, f"{quote_field(text)} is not a day of the calendar; not used"

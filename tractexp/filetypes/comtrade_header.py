@@ -1,6 +1,8 @@
-"""The configuration (.cfg) of a COMTRADE record, read line by line and checked before any data is read.
+"""The configuration (.cfg) of a COMTRADE record, read line by line and checked before any data is
+read.
 
-Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and noted with their line.
+Source: IEEE C37.111-1991, -1999 and -2013. Harmless departures are mended and noted with their
+line.
 """
 
 import re
@@ -16,11 +18,14 @@ from tractexp.wording import count_noun
 
 VALUE = {"ASCII": "f8", "BINARY": "<i2", "BINARY32": "<i4", "FLOAT32": "<f4"}  # of one analog value
 FREQUENCY = (10.0, 100.0)  # Hz, nominal: 16.7 and 25 Hz railways to 60 Hz, with room
-_SIXTEEN = re.compile(r"^\s*(?:16[ +]2/3|50/3|16,(?:7|67|667|6667))(?!\d)")  # Hz, as a third of 50 is written
+# Hz, as a third of 50 is written
+_SIXTEEN = re.compile(r"^\s*(?:16[ +]2/3|50/3|16,(?:7|67|667|6667))(?!\d)")
 MOST_RATES = 10  # sampling rates of one file, where their number stands for the nominal frequency
 GREATEST = 1e12  # of a multiplier, an offset or a ratio: beyond it no unit makes sense
 EPOCH = datetime(1970, 1, 1)  # a clock that was not set
-_COUNTS = re.compile(r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE)
+_COUNTS = re.compile(
+    r"(\d{1,12})\s*,\s*(\d{1,12})\s*([AD])\s*,\s*(\d{1,12})\s*([AD])\s*,?", re.ASCII | re.IGNORECASE
+)
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,8 @@ class Header:
     analogs: list[Analog] = field(default_factory=list)
     digitals: list[Digital] = field(default_factory=list)
     frequency: float = 50.0
-    rates: list[tuple[float, int]] = field(default_factory=list)  # (Hz, last sample from 1); 0 Hz: see the time stamps
+    # (Hz, last sample from 1); 0 Hz: see the time stamps
+    rates: list[tuple[float, int]] = field(default_factory=list)
     dates: tuple[str, str] = ("", "")  # of the first sample and the trigger, as written
     start: datetime | None = None
     trigger: float | None = None  # s since the first sample
@@ -94,7 +100,9 @@ class _Lines:
 
     def take(self, what: str) -> tuple[int, str]:
         if not self.rest:
-            raise UserError(f"{self.where}: ends after line {self.last}, before {what}; the file is cut short")
+            raise UserError(
+                f"{self.where}: ends after line {self.last}, before {what}; the file is cut short"
+            )
         return self.rest.popleft()
 
     def peek(self) -> str:
@@ -134,7 +142,11 @@ def _station(rows: _Lines, header: Header) -> None:
     if len(fields) > 1 and re.fullmatch(r"(19|20)\d\d", fields[-1], re.ASCII):
         header.revision = int(fields.pop())
     elif len(fields) > 2:
-        rows.remarks.add(f"the standard's year {quote_field(fields.pop())} is none of 1991, 1999, 2013; taken as 1999", line)
+        rows.remarks.add(
+            f"the standard's year {quote_field(fields.pop())} is none of 1991, 1999, 2013; taken as"
+            " 1999",
+            line,
+        )
         header.revision = 1999
     header.station, header.device = fields[0], ",".join(fields[1:])
 
@@ -143,20 +155,31 @@ def _counts(rows: _Lines) -> tuple[int, int]:
     line, text = rows.take("the numbers of channels")
     match = _COUNTS.fullmatch(text)
     if match is None or match[3].upper() == match[5].upper():
-        raise rows.refuse(line, f"{quote_field(text)} is not the numbers of channels, as in 8,6A,2D: all, analog, status")
+        raise rows.refuse(
+            line,
+            f"{quote_field(text)} is not the numbers of channels, as in 8,6A,2D: all, analog,"
+            " status",
+        )
     counts = {match[3].upper(): int(match[2]), match[5].upper(): int(match[4])}
     analogs, digitals = counts["A"], counts["D"]
     if int(match[1]) != analogs + digitals:
         raise rows.refuse(
-            line, f"announces {match[1]} channels but {analogs} analog and {digitals} status ones; correct the numbers"
+            line,
+            f"announces {match[1]} channels but {analogs} analog and {digitals} status ones;"
+            " correct the numbers",
         )
     if analogs + digitals > len(rows.rest):
         raise rows.refuse(
-            line, f"announces {analogs + digitals} channels, but only {len(rows.rest)} lines follow; correct the "
+            line,
+            f"announces {analogs + digitals} channels, but only {len(rows.rest)} lines follow;"
+            " correct the "
             "numbers, or the file is cut short",
-        )  # fmt: skip
+        )
     if analogs == 0:
-        raise rows.refuse(line, "announces no analog channel; a record of status channels alone has nothing to read")
+        raise rows.refuse(
+            line,
+            "announces no analog channel; a record of status channels alone has nothing to read",
+        )
     return analogs, digitals
 
 
@@ -167,12 +190,15 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
         fields = fields[:13]
     name = fields[1] if len(fields) > 1 else ""
     channel = f"analog channel {k + 1} of {count} {quote_field(name)}"
-    short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None  # without P or S
+    # without P or S
+    short = len(fields) == 12 and number(fields[4]) is None and number(fields[11]) is not None
     if len(fields) not in (10, 13) and not short:
         raise rows.refuse(
-            line, f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10 by the standard "
+            line,
+            f"{channel} has {count_noun(len(fields), 'field')}, but an analog channel has 13, or 10"
+            " by the standard "
             "of 1991; correct the line, or the numbers of channels in line 2",
-        )  # fmt: skip
+        )
 
     def value(i: int, what: str, default: float | None) -> float:
         if not fields[i] and default is not None:
@@ -181,7 +207,9 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
         parsed = number(fields[i])
         if parsed is None or abs(parsed) > GREATEST:
             raise rows.refuse(
-                line, f"{channel}: {what} {quote_field(fields[i])} is not a number between -1e12 and 1e12; correct it"
+                line,
+                f"{channel}: {what} {quote_field(fields[i])} is not a number between -1e12 and"
+                " 1e12; correct it",
             )
         return parsed
 
@@ -189,18 +217,25 @@ def _analog(rows: _Lines, k: int, count: int) -> Analog:
     side = fields[12].upper()
     declared = side in ("P", "S")
     if side and not declared:
-        rows.remarks.add(f"{quote_field(fields[12])} is neither P nor S, primary values taken", line)
+        rows.remarks.add(
+            f"{quote_field(fields[12])} is neither P nor S, primary values taken", line
+        )
     elif not declared and any(fields[10:12]):
         rows.remarks.add("neither P nor S stands there, primary values taken", line)
     low, high = number(fields[8]), number(fields[9])
     analog = Analog(
-        name, fields[2], fields[3], fields[4],
-        value(5, "multiplier", None), value(6, "offset", 0.0), value(7, "time skew", 0.0) if fields[7] else 0.0,
+        name,
+        fields[2],
+        fields[3],
+        fields[4],
+        value(5, "multiplier", None),
+        value(6, "offset", 0.0),
+        value(7, "time skew", 0.0) if fields[7] else 0.0,
         (low, high) if low is not None and high is not None and low < high else None,
         value(10, "primary ratio", 1.0) if declared else number(fields[10]) or 1.0,
         value(11, "secondary ratio", 1.0) if declared else number(fields[11]) or 1.0,
         side if declared else "",
-    )  # fmt: skip
+    )
     return _checked_ratio(rows, line, channel, analog)
 
 
@@ -211,9 +246,11 @@ def _checked_ratio(rows: _Lines, line: int, channel: str, analog: Analog) -> Ana
     words = f"its ratio {analog.primary:g}/{analog.secondary:g} is not positive"
     if unit_of(analog.unit)[0]:
         raise rows.refuse(
-            line, f"{channel} is in secondary values, but {words}; write the ratio of its transformer there, or P for "
+            line,
+            f"{channel} is in secondary values, but {words}; write the ratio of its transformer"
+            " there, or P for "
             "primary values",
-        )  # fmt: skip
+        )
     rows.remarks.add(f"secondary values, but {words}; 1/1 taken", line)
     return Analog(**{**vars(analog), "primary": 1.0, "secondary": 1.0})
 
@@ -226,9 +263,12 @@ def _digital(rows: _Lines, k: int, count: int) -> Digital:
     if not 2 <= len(fields) <= 5 or "/" in fields[0]:
         name = quote_field(fields[1]) if len(fields) > 1 else quote_field(fields[0])
         raise rows.refuse(
-            line, f"status channel {k + 1} of {count} {name} has {count_noun(len(fields), 'field')}, but a status channel "
-            "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in line 2",
-        )  # fmt: skip
+            line,
+            f"status channel {k + 1} of {count} {name} has {count_noun(len(fields), 'field')}, but"
+            " a status channel "
+            "has 5, or 3 by the standard of 1991; correct the line, or the numbers of channels in"
+            " line 2",
+        )
     if len(fields) == 5:
         name, phase, circuit = fields[1:4]
         return Digital(name, phase, circuit, int(fields[4] == "1"))
@@ -241,26 +281,37 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     header.lines["frequency"] = line
     text = _SIXTEEN.sub("16.6667", text)
     parsed = number(text.strip(", "))
-    if parsed is not None and 0 < parsed < MOST_RATES and parsed == int(parsed) and _is_rate(rows.peek()):
-        rows.rest.appendleft((line, text))  # the number of sampling rates: the line of the frequency is blank
+    if (
+        parsed is not None
+        and 0 < parsed < MOST_RATES
+        and parsed == int(parsed)
+        and _is_rate(rows.peek())
+    ):
+        # the number of sampling rates: the line of the frequency is blank
+        rows.rest.appendleft((line, text))
         text, parsed = "", None
     if "," in text.strip(", "):
         raise rows.refuse(
             line,
-            f"{quote_field(text)} where the nominal frequency should be; more lines of channels may be there than line 2 "
+            f"{quote_field(text)} where the nominal frequency should be; more lines of channels may"
+            " be there than line 2 "
             "announces, or the frequency is missing",
         )
     if parsed == 0 or not text.strip(", "):
         rows.remarks.add(
-            f"the nominal frequency is missing: {header.frequency:g} Hz, unless the voltage shows another", line
+            f"the nominal frequency is missing: {header.frequency:g} Hz, unless the voltage shows"
+            " another",
+            line,
         )
         parsed = header.frequency
     if parsed is None or not FREQUENCY[0] <= parsed <= FREQUENCY[1]:
         low, high = FREQUENCY
         raise rows.refuse(
-            line, f"nominal frequency {quote_field(text)} is not a number between {low:g} and {high:g} Hz; write that of "
+            line,
+            f"nominal frequency {quote_field(text)} is not a number between {low:g} and {high:g}"
+            " Hz; write that of "
             "the network there, 50 or 60",
-        )  # fmt: skip
+        )
     header.frequency = parsed
     if "," in rows.peek().strip(", "):
         rows.remarks.add("the number of sampling rates is missing", rows.rest[0][0])
@@ -268,7 +319,10 @@ def _frequency(rows: _Lines, header: Header) -> int | None:
     line, text = rows.take("the number of sampling rates")
     parsed = number(text.strip(", "))
     if parsed is None or parsed < 0 or parsed != int(parsed) or parsed > 1e6:
-        raise rows.refuse(line, f"the number of sampling rates {quote_field(text)} is not a whole number from 0 on")
+        raise rows.refuse(
+            line,
+            f"the number of sampling rates {quote_field(text)} is not a whole number from 0 on",
+        )
     return int(parsed)
 
 
@@ -282,26 +336,37 @@ def _rates(rows: _Lines, header: Header, count: int | None) -> None:
         fields = [number(part) for part in text.strip(", ").split(",")]
         rate, end = (*fields, None, None)[:2]
         if len(fields) != 2 or rate is None or end is None or end != int(end) or abs(end) > 1e15:
-            raise rows.refuse(line, f"{quote_field(text)} is not a sampling rate [Hz] and its last sample, as in 4000,8000")
+            raise rows.refuse(
+                line,
+                f"{quote_field(text)} is not a sampling rate [Hz] and its last sample, as in"
+                " 4000,8000",
+            )
         last = header.rates[-1][1] if header.rates else 0
         if rate < 0 or rate > 1e9:
-            raise rows.refuse(line, f"sampling rate {quote_field(text.split(',')[0])} is not between 0 and 1e9 Hz")
+            raise rows.refuse(
+                line, f"sampling rate {quote_field(text.split(',')[0])} is not between 0 and 1e9 Hz"
+            )
         if end == last and last:
             rows.remarks.add("a sampling rate without samples of its own is passed over", line)
             continue
         if end < last or end < 1:
             raise rows.refuse(
-                line, f"last sample {end:g} must be above zero, and above {last}, that of the line before"
+                line,
+                f"last sample {end:g} must be above zero, and above {last},"
+                " that of the line before",
             )
         header.rates.append((rate, int(end)))
     if count not in (None, 0, read) or (count == 0 and read > 1):
-        rows.remarks.add(f"{count} sampling rates announced, {read} present", header.lines["rates"] - 1)
+        rows.remarks.add(
+            f"{count} sampling rates announced, {read} present", header.lines["rates"] - 1
+        )
     if len({rate > 0 for rate, _ in header.rates}) > 1:
         listed = ", ".join(f"{rate:g}" for rate, _ in header.rates)
         raise rows.refuse(
-            header.lines["rates"], f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and "
+            header.lines["rates"],
+            f"sampling rates {listed} Hz: a rate of 0 means that time stamps are valid, and "
             "must be the only one",
-        )  # fmt: skip
+        )
 
 
 def _is_rate(text: str) -> bool:
@@ -327,7 +392,9 @@ def _dates(rows: _Lines, header: Header) -> None:
     unset = begin is not None and begin.date() == EPOCH.date()
     header.start = None if unset else begin
     if unset:
-        rows.remarks.add("the clock was not set (1970); the time of the first sample is missing", entries[0][0])
+        rows.remarks.add(
+            "the clock was not set (1970); the time of the first sample is missing", entries[0][0]
+        )
     if begin is not None and at is not None and at != EPOCH:
         header.trigger = (at - begin) / timedelta(seconds=1)
 
@@ -339,16 +406,22 @@ def _kind(rows: _Lines, header: Header) -> None:
     line, text = rows.take("the type of the data file")
     header.kind, header.lines["kind"] = text.strip(", ").upper(), line
     if header.kind not in VALUE:
-        raise rows.refuse(line, f"data file type {quote_field(text)} is not one of {', '.join(VALUE)}")
+        raise rows.refuse(
+            line, f"data file type {quote_field(text)} is not one of {', '.join(VALUE)}"
+        )
 
 
 def _trailer(rows: _Lines, header: Header) -> None:
-    """Time multiplier (1999), time codes and clock quality (2013): missing ones have their defaults."""
+    """Time multiplier (1999), time codes and clock quality (2013): missing ones have their
+    defaults.
+    """
     if rows.rest and "," not in rows.peek().strip(", "):
         line, text = rows.take("the time multiplier")
         parsed = number(text.strip(", "))
         if parsed is None or not 0 < parsed <= GREATEST:
-            rows.remarks.add(f"time multiplier {quote_field(text)} is not a number above zero, 1 taken", line)
+            rows.remarks.add(
+                f"time multiplier {quote_field(text)} is not a number above zero, 1 taken", line
+            )
             parsed = 1.0
         header.timemult = parsed
     elif header.revision >= 1999:

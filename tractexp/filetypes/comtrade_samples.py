@@ -1,4 +1,5 @@
-"""The data (.dat) of a COMTRADE record: binary rows as views of the file, text rows parsed block by block.
+"""The data (.dat) of a COMTRADE record: binary rows as views of the file, text rows parsed block by
+block.
 
 Nothing is allocated before the size of the file has shown that the announced samples are there.
 """
@@ -62,19 +63,29 @@ class Samples:
 def row(kind: str, analogs: int, digitals: int) -> np.dtype:
     """One binary sample."""
     words = -(-digitals // 16)
-    return np.dtype([("n", "<u4"), ("t", "<u4"), ("a", VALUE[kind], (analogs,)), ("d", "<u2", (words,))])
+    return np.dtype(
+        [("n", "<u4"), ("t", "<u4"), ("a", VALUE[kind], (analogs,)), ("d", "<u2", (words,))]
+    )
 
 
 def read(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
-    """The samples that the header announces; raises `UserError` where they are not there or not of that kind."""
-    text = re.fullmatch(rb"[0-9+\-.,eE \t\r\n]*", place.content(4096)) is not None and place.size > 0
+    """The samples that the header announces; raises `UserError` where they are not there or not of
+    that kind.
+    """
+    text = (
+        re.fullmatch(rb"[0-9+\-.,eE \t\r\n]*", place.content(4096)) is not None and place.size > 0
+    )
     if header.kind != "ASCII" and text:
-        remarks.add(f"{header.kind} announced, but {place.path.name} is text and read as ASCII", header.lines["kind"])
+        remarks.add(
+            f"{header.kind} announced, but {place.path.name} is text and read as ASCII",
+            header.lines["kind"],
+        )
         header.kind = "ASCII"
     if header.kind == "ASCII":
         if b"\0" in place.content(4096).rstrip(b"\0\x1a"):
             raise UserError(
-                f"{place.path}: not text, but line {header.lines['kind']} of the configuration says ASCII; write "
+                f"{place.path}: not text, but line {header.lines['kind']} of the configuration says"
+                " ASCII; write "
                 "BINARY, BINARY32 or FLOAT32 there"
             )
         return _text(place, header, remarks)
@@ -87,32 +98,49 @@ def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     _enough(place, header, remarks, count_there, header.samples * one.itemsize, place.size, "bytes")
     over = place.size - count_there * one.itemsize
     if over > 2:  # a line end or Ctrl-Z behind the data says nothing
-        remarks.add(f"{place.path.name} holds {over} bytes more than whole samples of {one.itemsize} bytes")
+        remarks.add(
+            f"{place.path.name} holds {over} bytes more than whole samples of {one.itemsize} bytes"
+        )
     count = header.samples
     if place.size > LARGE:
         table = np.memmap(place.path, one, "r", place.first, (count,))
     else:
         table = np.fromfile(place.path, one, count, offset=place.first)
     _check_sample_numbers(place, header, table["n"])
-    return Samples(table["n"], table["t"], [table["a"][:, k] for k in range(len(header.analogs))], table["d"])
+    return Samples(
+        table["n"], table["t"], [table["a"][:, k] for k in range(len(header.analogs))], table["d"]
+    )
 
 
 def _enough(
-    place: ByteRange, header: Header, remarks: Remarks, present: int, wanted: int, there: int, unit: str
-) -> None:  # fmt: skip
+    place: ByteRange,
+    header: Header,
+    remarks: Remarks,
+    present: int,
+    wanted: int,
+    there: int,
+    unit: str,
+) -> None:
     """Compare the samples present with those announced: a few too few shorten the record."""
     announced = header.samples
     if present > announced:
-        remarks.add(f"{place.path.name} holds {present} samples, {announced} are announced; the rest is not used")
+        remarks.add(
+            f"{place.path.name} holds {present} samples, {announced} are announced; the rest is not"
+            " used"
+        )
     if present >= announced:
         return
     if present < 1 or announced - present > max(1, LACKING * announced):
         raise UserError(
-            f"{place.path}: cut short: {announced} samples of {len(header.analogs)} analog and {len(header.digitals)} "
-            f"status channels take {wanted} {unit}, and the file has {there}; get the whole file, or correct the last "
+            f"{place.path}: cut short: {announced} samples of {len(header.analogs)} analog and"
+            f" {len(header.digitals)} "
+            f"status channels take {wanted} {unit}, and the file has {there}; get the whole file,"
+            " or correct the last "
             f"sample in line {header.lines['rates']} of the configuration"
         )
-    remarks.add(f"{place.path.name} holds {present} of the {announced} samples announced; those are read")
+    remarks.add(
+        f"{place.path.name} holds {present} of the {announced} samples announced; those are read"
+    )
     rates = [(rate, stop) for rate, stop in header.rates if stop < present]
     header.rates = [*rates, (header.rates[len(rates)][0], present)]
 
@@ -128,9 +156,12 @@ def _check_sample_numbers(place: ByteRange, header: Header, numbers: np.ndarray)
     if len(wild) or abs(usual) > 10_000:
         i = int(wild[0]) if len(wild) else 0
         raise UserError(
-            f"{place.path}: sample {i + 2}: its number is {numbers[i + 1]} after {numbers[i]}: the rows are not "
-            f"{header.kind} of {len(header.analogs)} analog and {len(header.digitals)} status channels, or bytes were "
-            "lost or added before it; correct the channels or the type of the data file in the configuration, or get "
+            f"{place.path}: sample {i + 2}: its number is {numbers[i + 1]} after {numbers[i]}: the"
+            " rows are not "
+            f"{header.kind} of {len(header.analogs)} analog and {len(header.digitals)} status"
+            " channels, or bytes were "
+            "lost or added before it; correct the channels or the type of the data file in the"
+            " configuration, or get "
             "the file again"
         )
 
@@ -139,7 +170,10 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
     width = 2 + len(header.analogs) + len(header.digitals)
     wanted = header.samples
     if place.size < 2 * width - 1:
-        raise UserError(f"{place.path}: cut short: there is no sample of {width} cells in its {place.size} bytes")
+        raise UserError(
+            f"{place.path}: cut short: there is no sample of {width} cells in its {place.size}"
+            " bytes"
+        )
     room = min(wanted, place.size // (2 * width - 1) + 1)
     head = np.empty((room, 2))
     table = np.empty((room, len(header.analogs)), order="F")
@@ -151,14 +185,22 @@ def _text(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
         head[there], table[there] = block[:, :2], block[:, 2 : 2 + len(header.analogs)]
         words[there] = pack(np.nan_to_num(block[:, 2 + len(header.analogs) :]) != 0)
         filled += len(cells)
-    if not header.digitals and not place.ends_a_line():  # the state of a status channel is one digit, and whole
+    # the state of a status channel is one digit, and whole
+    if not header.digitals and not place.ends_a_line():
         remarks.add(f"{place.path.name} ends without a line end: its last value may be cut short")
     _enough(place, header, remarks, filled, wanted, filled, "lines")
     count = header.samples
     if np.isnan(table[:count]).any():
-        remarks.add(f"{int(np.isnan(table[:count]).sum())} empty cells in {place.path.name}: no value there")
+        remarks.add(
+            f"{int(np.isnan(table[:count]).sum())} empty cells in {place.path.name}: no value there"
+        )
     _steps(place, head[:count, 0], remarks)
-    return Samples(head[:count, 0], head[:count, 1], [_narrow(column[:count]) for column in table.T], words[:count])
+    return Samples(
+        head[:count, 0],
+        head[:count, 1],
+        [_narrow(column[:count]) for column in table.T],
+        words[:count],
+    )
 
 
 def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarray]:
@@ -176,8 +218,12 @@ def _blocks(place: ByteRange, width: int, remarks: Remarks) -> Iterator[np.ndarr
             line += len(lines)
 
 
-def _cells(place: ByteRange, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks) -> np.ndarray:
-    numbered = [(n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))]
+def _cells(
+    place: ByteRange, width: int, lines: list[bytes], first: int, last: bool, remarks: Remarks
+) -> np.ndarray:
+    numbered = [
+        (n, text) for n, line in enumerate(lines, first) if (text := line.strip(b" \t\x1a"))
+    ]
     if len(numbered) < len(lines) - last:
         remarks.add(f"blank lines in {place.path.name} are passed over")
     rows = []
@@ -189,8 +235,10 @@ def _cells(place: ByteRange, width: int, lines: list[bytes], first: int, last: b
                 remarks.add(f"{place.path.name} ends within a line, which is not used", None)
                 break
             raise UserError(
-                f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced: number, time, and "
-                "one for each channel; correct the line, or the numbers of channels in the configuration"
+                f"{place.path}: line {n}: {text.count(b',') + 1} cells, but {width} are announced:"
+                " number, time, and "
+                "one for each channel; correct the line, or the numbers of channels in the"
+                " configuration"
             )
         rows.append(text)
     if not rows:
@@ -198,7 +246,11 @@ def _cells(place: ByteRange, width: int, lines: list[bytes], first: int, last: b
     flat = _numbers(b",".join(rows), len(rows) * width)
     if flat is None:  # empty cells, or something that is no number
         flat = np.array(
-            [_cell(place, n, k, cell) for n, text in numbered for k, cell in enumerate(text.split(b",")[:width])]
+            [
+                _cell(place, n, k, cell)
+                for n, text in numbered
+                for k, cell in enumerate(text.split(b",")[:width])
+            ]
         )
         flat = flat[: len(rows) * width]
     return flat.reshape(-1, width)
@@ -220,7 +272,8 @@ def _cell(place: ByteRange, line: int, k: int, cell: bytes) -> float:
     if value is None or abs(value) > HUGE:
         what = ("sample number", "time stamp")[k] if k < 2 else f"channel {k - 1}"
         raise UserError(
-            f"{place.path}: line {line}: {what} {quote_field(text)} is not a number, up to 1e38; correct it, or leave "
+            f"{place.path}: line {line}: {what} {quote_field(text)} is not a number, up to 1e38;"
+            " correct it, or leave "
             "the cell empty for a missing value"
         )
     return value
@@ -233,7 +286,8 @@ def _steps(place: ByteRange, numbers: np.ndarray, remarks: Remarks) -> None:
     if len(odd) and len(odd) < 0.5 * len(steps):
         i = int(odd[0])
         remarks.add(
-            f"{place.path.name}: sample number {numbers[i + 1]:g} follows {numbers[i]:g}: a sample may be missing or "
+            f"{place.path.name}: sample number {numbers[i + 1]:g} follows {numbers[i]:g}: a sample"
+            " may be missing or "
             "double there, and times after it off by a step"
         )
 

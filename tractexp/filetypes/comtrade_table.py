@@ -1,4 +1,6 @@
-"""COMTRADE records of values and not of waveforms: a swing recorder's U, P, Q and f, a PMU's phasors, as a table."""
+"""COMTRADE records of values and not of waveforms: a swing recorder's U, P, Q and f, a PMU's
+phasors, as a table.
+"""
 
 from pathlib import Path
 
@@ -19,10 +21,11 @@ def recognizes(path: Path | str) -> bool:
 
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
-    """Whether the samples are waveforms: all but powers, or phasors, sampled more slowly than waveforms are.
+    """Whether the samples are waveforms: all but powers, or phasors, sampled more slowly than
+    waveforms are.
 
-    Powers without a current beside them are values however fast they come. A record that cannot be read counts as
-    waveforms, whose reader says what is wrong.
+    Powers without a current beside them are values however fast they come. A record that cannot be
+    read counts as waveforms, whose reader says what is wrong.
     """
     try:
         header = comtrade.read_header(path, encoding)
@@ -30,7 +33,9 @@ def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
         return True
     parted = [(*split_unit(one.name.strip()), one.unit) for one in header.analogs]
     units = [unit or inside for _, inside, unit in parted]
-    roles = {one.key for (name, *_), unit in zip(parted, units, strict=True) if (one := role(name, unit))}
+    roles = {
+        one.key for (name, *_), unit in zip(parted, units, strict=True) if (one := role(name, unit))
+    }
     quantities = [(meaning(unit) or ("",))[0] for unit in units]
     powers = {"power", "reactive"} <= {*quantities} or {"P", "Q"} <= {key[0] for key in roles}
     phasors = {"U", "I"} <= {key[0] for key in roles if key.endswith("_angle")}
@@ -41,7 +46,8 @@ def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
 
 
 def table(path: Path, encoding: str | None = None) -> Rows:
-    """The channels of a record as columns, on the primary side, in their units; the longest stretch of one rate.
+    """The channels of a record as columns, on the primary side, in their units; the longest stretch
+    of one rate.
 
     Raises `UserError` as `comtrade.load`.
     """
@@ -51,14 +57,22 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     names = [channel.name.strip() for channel in recording.channels]
     columns = [("t", "s", segment.t)]
     for name, channel in zip(names, recording.channels, strict=True):
-        columns.append((*_heading(name, channel, names.count(name) > 1), channel.ratio * channel.recorded()[part]))
+        columns.append(
+            (
+                *_heading(name, channel, names.count(name) > 1),
+                channel.ratio * channel.recorded()[part],
+            )
+        )
     notes = list(recording.notes)
     if len(recording.segments) > 1:
         notes.append(
-            f"{len(recording.segments)} stretches of samples: the longest is read, {segment.rate:g} Hz from "
+            f"{len(recording.segments)} stretches of samples: the longest is read, {segment.rate:g}"
+            " Hz from "
             f"{segment.start:.3f} s"
         )
-    rows = Rows.of(path, [(name, unit, np.asarray(v, float)) for name, unit, v in columns], 1, tuple(notes))
+    rows = Rows.of(
+        path, [(name, unit, np.asarray(v, float)) for name, unit, v in columns], 1, tuple(notes)
+    )
     rows.start, rows.frequency = recording.start, recording.frequency
     return rows
 

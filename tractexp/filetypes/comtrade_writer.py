@@ -12,23 +12,35 @@ from tractexp.filetypes.comtrade_header import EPOCH, VALUE
 from tractexp.filetypes.comtrade_samples import NONE, row
 from tractexp.recording.recording import Channel, Recording
 
-KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}  # ever more values fit
-FULL = {"BINARY": (-32767, 32767), "BINARY32": (-2147483647, 2147483647), "FLOAT32": (-3.4028235e38, 3.4028235e38)}
+# ever more values fit
+KINDS = {1999: ("BINARY", "ASCII"), 2013: ("BINARY", "BINARY32", "FLOAT32", "ASCII")}
+FULL = {
+    "BINARY": (-32767, 32767),
+    "BINARY32": (-2147483647, 2147483647),
+    "FLOAT32": (-3.4028235e38, 3.4028235e38),
+}
 FULL["ASCII"] = (-99999, 99998)
 
 
-def write(recording: Recording, path: Path, kind: str = "BINARY", revision: int = 2013) -> list[Path]:
-    """Write a .cfg and .dat, or one .cff where `path` ends so; returns the files, each written whole or not at all.
+def write(
+    recording: Recording, path: Path, kind: str = "BINARY", revision: int = 2013
+) -> list[Path]:
+    """Write a .cfg and .dat, or one .cff where `path` ends so; returns the files, each written
+    whole or not at all.
 
-    `kind` is BINARY (16 bits), BINARY32, FLOAT32 or ASCII (1999: BINARY or ASCII). Raw values that do not fit go to the
-    next kind that holds them exactly; FLOAT32, where chosen, rounds to 24 bits. Commas in names become semicolons.
+    `kind` is BINARY (16 bits), BINARY32, FLOAT32 or ASCII (1999: BINARY or ASCII). Raw values that
+    do not fit go to the next kind that holds them exactly; FLOAT32, where chosen, rounds to 24
+    bits. Commas in names become semicolons.
     """
     path = Path(path)
     check_choice("the ending of a COMTRADE file", path.suffix.lower(), (".cfg", ".cff"))
     check_choice("revision", revision, KINDS)
     check_choice("kind", kind, KINDS[revision])
     if path.suffix.lower() == ".cff" and revision < 2013:
-        raise UserError(f"{path}: a .cff is of the standard of 2013; give revision=2013, or a name that ends in .cfg")
+        raise UserError(
+            f"{path}: a .cff is of the standard of 2013; give revision=2013, or a name that ends in"
+            " .cfg"
+        )
     kind = _kind(recording, kind, revision)
     rates, stamps, timemult = _times(recording)
     data = _ascii(recording, stamps) if kind == "ASCII" else _binary(recording, kind, stamps)
@@ -45,7 +57,10 @@ def _kind(recording: Recording, first_kind: str, revision: int) -> str:
     if first_kind == "FLOAT32":
         return first_kind
     kinds = KINDS[revision][KINDS[revision].index(first_kind) :]
-    return next((kind for kind in kinds if all(_fits(channel, kind) for channel in recording.channels)), "ASCII")
+    return next(
+        (kind for kind in kinds if all(_fits(channel, kind) for channel in recording.channels)),
+        "ASCII",
+    )
 
 
 def _fits(channel: Channel, kind: str) -> bool:
@@ -59,7 +74,9 @@ def _fits(channel: Channel, kind: str) -> bool:
     least, greatest = (0, 65534) if _is_unsigned(channel, kind) else FULL[kind]
     if not lacking.any():  # then the value that stands for none is free
         least, greatest = (0, 65535) if _is_unsigned(channel, kind) else (least - 1, greatest)
-    elif channel.limits is not None and (channel.limits[0] < least or greatest < channel.limits[1] == 65535):
+    elif channel.limits is not None and (
+        channel.limits[0] < least or greatest < channel.limits[1] == 65535
+    ):
         return False  # the file would declare that value possible
     if raw.dtype.kind == "f" and (present != np.trunc(present)).any():
         return False
@@ -67,7 +84,12 @@ def _fits(channel: Channel, kind: str) -> bool:
 
 
 def _is_unsigned(channel: Channel, kind: str) -> bool:
-    return kind == "BINARY" and channel.limits is not None and channel.limits[0] >= 0 and channel.limits[1] > 32767
+    return (
+        kind == "BINARY"
+        and channel.limits is not None
+        and channel.limits[0] >= 0
+        and channel.limits[1] > 32767
+    )
 
 
 def _find_lacking_samples(channel: Channel) -> np.ndarray:
@@ -77,7 +99,9 @@ def _find_lacking_samples(channel: Channel) -> np.ndarray:
 
 
 def _limits(channel: Channel, kind: str) -> tuple[float, float]:
-    """Those of the channel, or of the kind; wider where a value would else be taken for a missing one."""
+    """Those of the channel, or of the kind; wider where a value would else be taken for a missing
+    one.
+    """
     raw = np.asarray(channel.raw)[~_find_lacking_samples(channel)]
     if not len(raw):
         return channel.limits or FULL[kind]
@@ -93,7 +117,9 @@ def _limits(channel: Channel, kind: str) -> tuple[float, float]:
 
 
 def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, float]:
-    """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had some."""
+    """Rates with last samples, time stamps (N,) and their multiplier: the file's own where it had
+    some.
+    """
     extra, segments = recording.extra, recording.segments
     own, timemult = extra.get("stamps"), float(extra.get("timemult", 1.0))
     usable = own is not None and len(own) == recording.samples
@@ -102,7 +128,8 @@ def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, f
     if [s.first for s in segments] != edges[:-1] or edges[-1] != recording.samples or by_stamps:
         if not usable:
             raise UserError(
-                f"{recording.source}: its segments leave samples out, and it has no time stamps: it cannot be written "
+                f"{recording.source}: its segments leave samples out, and it has no time stamps: it"
+                " cannot be written "
                 "as COMTRADE; write it as a table"
             )
         return [(0.0, recording.samples)], np.asarray(own, float), timemult
@@ -110,7 +137,9 @@ def _times(recording: Recording) -> tuple[list[tuple[float, int]], np.ndarray, f
         last = segments[-1].t[-1] if len(segments) else 0.0
         while not usable and last > 4.29e3 * timemult:  # a counter of 32 bits
             timemult *= 10
-        own = own if usable else np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
+        own = (
+            own if usable else np.concatenate([np.round(s.t / (1e-6 * timemult)) for s in segments])
+        )
     return [(s.rate, s.stop) for s in segments], np.asarray(own, float), timemult
 
 
@@ -121,20 +150,36 @@ def _lines(
     sides = recording.extra.get("sides", [])
     if len(sides) != count:
         sides = [(1.0, 1.0, "P" if channel.ratio == 1 else "") for channel in recording.channels]
-    lines = [f"{_name(recording.station)},{_name(recording.device)},{revision}", f"{count + states},{count}A,{states}D"]
+    lines = [
+        f"{_name(recording.station)},{_name(recording.device)},{revision}",
+        f"{count + states},{count}A,{states}D",
+    ]
     for k, (channel, side) in enumerate(zip(recording.channels, sides, strict=True), 1):
         primary, secondary, letter = _side(channel, side)
         low, high = _limits(channel, kind)
         fields = [k, *map(_name, (channel.name, channel.phase, channel.circuit, channel.unit))]
-        numbers = (channel.gain, channel.offset, round(1e6 * channel.skew, 9), low, high, primary, secondary)
+        numbers = (
+            channel.gain,
+            channel.offset,
+            round(1e6 * channel.skew, 9),
+            low,
+            high,
+            primary,
+            secondary,
+        )
         lines.append(",".join(map(str, [*fields, *map(_number, numbers), letter])))
     for k, status in enumerate(recording.status, 1):
-        lines.append(f"{k},{_name(status.name)},{_name(status.phase)},{_name(status.circuit)},{status.normal}")
+        lines.append(
+            f"{k},{_name(status.name)},{_name(status.phase)},{_name(status.circuit)},{status.normal}"
+        )
     lines += [_number(recording.frequency), "0" if rates[0][0] == 0 else str(len(rates))]
     lines += [f"{_number(rate)},{stop}" for rate, stop in rates]
     lines += [*_dates(recording), kind, _number(timemult)]
     if revision >= 2013:
-        lines += [recording.extra.get("time_code") or "0,0", recording.extra.get("quality") or "0,0"]
+        lines += [
+            recording.extra.get("time_code") or "0,0",
+            recording.extra.get("quality") or "0,0",
+        ]
     return lines
 
 
@@ -143,7 +188,9 @@ def _side(channel: Channel, original: tuple[float, float, str]) -> tuple[float, 
     if channel.ratio == 1 and side != "S":
         return primary or 1.0, secondary or 1.0, "P"
     return (
-        (primary, secondary, "S") if side == "S" and primary / secondary == channel.ratio else (channel.ratio, 1.0, "S")
+        (primary, secondary, "S")
+        if side == "S" and primary / secondary == channel.ratio
+        else (channel.ratio, 1.0, "S")
     )
 
 
@@ -174,9 +221,17 @@ def _binary(recording: Recording, kind: str, stamps: np.ndarray) -> bytes:
     good = (stamps >= 0) & (stamps < NONE)
     table["t"] = np.where(good, stamps, NONE).astype(np.uint32)
     for k, channel in enumerate(recording.channels):
-        none = np.nan if kind == "FLOAT32" else 65535 if _is_unsigned(channel, kind) else FULL[kind][0] - 1
+        none = (
+            np.nan
+            if kind == "FLOAT32"
+            else 65535
+            if _is_unsigned(channel, kind)
+            else FULL[kind][0] - 1
+        )
         with np.errstate(over="ignore", invalid="ignore"):
-            values = np.asarray(channel.raw).astype("<u2" if _is_unsigned(channel, kind) else VALUE[kind])
+            values = np.asarray(channel.raw).astype(
+                "<u2" if _is_unsigned(channel, kind) else VALUE[kind]
+            )
         values[_find_lacking_samples(channel)] = none
         table["a"][:, k] = values.view(VALUE[kind])
     for k, status in enumerate(recording.status):

@@ -1,4 +1,6 @@
-"""The heading of a table, titles, names of columns and units, and the row at which its values begin."""
+"""The heading of a table, titles, names of columns and units, and the row at which its values
+begin.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +16,9 @@ FEWEST_ALIKE_ROWS = 3  # rows of numbers of one length make sure that a table ha
 
 @dataclass(frozen=True)
 class TableHeading:
-    """The columns' names and units ("" where there is none), and the number of the first row of values, from 0."""
+    """The columns' names and units ("" where there is none), and the number of the first row of
+    values, from 0.
+    """
 
     names: tuple[str, ...]
     units: tuple[str, ...]
@@ -23,7 +27,8 @@ class TableHeading:
 
 
 def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = None) -> TableHeading:
-    """The heading of a table's first rows; `header` is the row of the names, from 0, None to search for it.
+    """The heading of a table's first rows; `header` is the row of the names, from 0, None to search
+    for it.
 
     Raises `UserError` where there are no rows of numbers, or no names above them.
     """
@@ -32,9 +37,13 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     if first is None:
         above = "" if header is None else f" below the header line {header + 1}"
         names_only = len(rows) == 1 and len(rows[0]) > 1
-        raise UserError(f"{source}: there are no rows below the header line" if names_only else
-                        f"{source}: there are no rows of numbers{above}; a table has a line that names its columns, "
-                        "such as t,U,P,Q, and rows of numbers below it")  # fmt: skip
+        raise UserError(
+            f"{source}: there are no rows below the header line"
+            if names_only
+            else f"{source}: there are no rows of numbers{above}; a table has a line that names its"
+            " columns, "
+            "such as t,U,P,Q, and rows of numbers below it"
+        )
     named = header if header is not None else _find_name_row(rows, first)
     if named is None:
         width = len(rows[first])
@@ -43,7 +52,10 @@ def heading(rows: Sequence[Sequence[Any]], source: str, header: int | None = Non
     parted = [split_unit(_text(cell)) for cell in rows[named]]
     beside = _units_beside(rows, named, first, any(unit for _, unit in parted))
     unit_row = [] if beside is None else _bare(rows[beside])
-    units = [unit_row[k] if k < len(unit_row) and unit_row[k] else unit for k, (_, unit) in enumerate(parted)]
+    units = [
+        unit_row[k] if k < len(unit_row) and unit_row[k] else unit
+        for k, (_, unit) in enumerate(parted)
+    ]
     groups = named - 2 if beside == named - 1 else named - 1
     names = _join_group_names(rows[groups] if groups >= 0 else [], [name for name, _ in parted])
     return TableHeading(_pad_texts(names, width), _pad_texts(units, width), first, named)
@@ -66,13 +78,19 @@ def _numeric(row: Sequence[Any]) -> bool:
 
 
 def _begins(rows: Sequence[Sequence[Any]], i: int) -> bool:
-    """Whether values begin with row `i`: it and those after it are alike. One bad cell in a row is no heading."""
+    """Whether values begin with row `i`: it and those after it are alike. One bad cell in a row is
+    no heading.
+    """
     following = [row for row in rows[i : i + FEWEST_ALIKE_ROWS] if row]
-    return _numeric(rows[i]) and all(_numeric(row) and len(row) >= len(rows[i]) - 1 for row in following)
+    return _numeric(rows[i]) and all(
+        _numeric(row) and len(row) >= len(rows[i]) - 1 for row in following
+    )
 
 
 def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
-    """The row of names above the values: the nearest with a text for most columns that is no row of units."""
+    """The row of names above the values: the nearest with a text for most columns that is no row of
+    units.
+    """
     for i in range(first - 1, -1, -1):
         texts = [_text(cell) for cell in rows[i]]
         filled = [text for text in texts if text]
@@ -82,8 +100,12 @@ def _find_name_row(rows: Sequence[Sequence[Any]], first: int) -> int | None:
     return None
 
 
-def _units_beside(rows: Sequence[Sequence[Any]], named: int, first: int, with_units: bool) -> int | None:
-    """The row of units below the names, or above names without units of their own (one letter alone is a group's)."""
+def _units_beside(
+    rows: Sequence[Sequence[Any]], named: int, first: int, with_units: bool
+) -> int | None:
+    """The row of units below the names, or above names without units of their own (one letter alone
+    is a group's).
+    """
     if named + 1 < first and _are_units(_bare(rows[named + 1])):
         return named + 1
     above = _bare(rows[named - 1]) if named and not with_units else []
@@ -103,9 +125,13 @@ def _are_units(texts: Sequence[str]) -> bool:
 
 
 def _join_group_names(groups: Sequence[Any], names: list[str]) -> list[str]:
-    """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is one."""
+    """The names, after those of a row of groups above them ("Bus 1; Bus 1; Load 2") where there is
+    one.
+    """
     above = _spread_merged_cells([_text(cell) for cell in groups], names)
-    repeated = [upper for upper, name in zip(above, names, strict=False) if name and names.count(name) > 1]
+    repeated = [
+        upper for upper, name in zip(above, names, strict=False) if name and names.count(name) > 1
+    ]
     told = bool(repeated) and all(repeated) and len({*repeated}) > 1
     few = sum(map(bool, above)) < len(names) - 1
     if len(above) != len(names) or len(names) < 3 or (few and not told):
@@ -114,7 +140,8 @@ def _join_group_names(groups: Sequence[Any], names: list[str]) -> list[str]:
 
 
 def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
-    """A row of groups with the text of a merged cell, which stands over its first column, over all of its columns.
+    """A row of groups with the text of a merged cell, which stands over its first column, over all
+    of its columns.
 
     Only where names repeat, so that they need the groups to be told apart.
     """

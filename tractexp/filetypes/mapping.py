@@ -18,14 +18,23 @@ CONTRACT = ("t", "U", "P", "Q", "f", "U2")
 PHASES = ("a", "b", "c")
 LINES = ("ab", "bc", "ca")
 KEYS = (
-    *CONTRACT, "dfdt", "frac", "I", *(x + p for x in "UI" for p in (*PHASES, *LINES, "1", "2", "0") if x + p != "U2"),
+    *CONTRACT,
+    "dfdt",
+    "frac",
+    "I",
+    *(x + p for x in "UI" for p in (*PHASES, *LINES, "1", "2", "0") if x + p != "U2"),
     *(x + p for x in "PQ" for p in PHASES),
-)  # fmt: skip
+)
 ANGLES = tuple(f"{key}_angle" for key in KEYS if key[0] in "UI")
 OF: Mapping[str, tuple[str, ...]] = {  # {quantity as data.units names it: units of it}
-    "t": ("s", "ms", "us", "ns"), "U": ("kV", "V", "pu"), "I": ("kA", "A", "pu"), "P": ("MW", "kW", "W", "pu"),
-    "Q": ("Mvar", "kvar", "var", "pu"), "f": ("Hz", "mHz", "pu"), "angle": ("deg", "rad"),
-}  # fmt: skip
+    "t": ("s", "ms", "us", "ns"),
+    "U": ("kV", "V", "pu"),
+    "I": ("kA", "A", "pu"),
+    "P": ("MW", "kW", "W", "pu"),
+    "Q": ("Mvar", "kvar", "var", "pu"),
+    "f": ("Hz", "mHz", "pu"),
+    "angle": ("deg", "rad"),
+}
 QUANTITIES = tuple(OF)
 
 
@@ -53,15 +62,22 @@ class Mapped:
 
 
 def map_columns(
-    table: TableFile, columns: Mapping[str, Any], units: Mapping[str, str], other_columns: Collection[str] = ()
+    table: TableFile,
+    columns: Mapping[str, Any],
+    units: Mapping[str, str],
+    other_columns: Collection[str] = (),
 ) -> Mapped:
-    """What the columns of a table are, by the user's `columns` {key: name, number from 0, or None to leave it
-    out}, `units` {quantity: unit}.
+    """What the columns of a table are, by the user's `columns` {key: name, number from 0, or None
+    to leave it out}, `units` {quantity: unit}.
 
-    No note mentions `other_columns`, which serve elsewhere. Raises `UserError` for a chosen column that is not there,
-    for one that is missing, and where several columns fit one key.
+    No note mentions `other_columns`, which serve elsewhere. Raises `UserError` for a chosen column
+    that is not there, for one that is missing, and where several columns fit one key.
     """
-    numbers = {_key(key): _column_number(table, key, choice) for key, choice in columns.items() if choice is not None}
+    numbers = {
+        _key(key): _column_number(table, key, choice)
+        for key, choice in columns.items()
+        if choice is not None
+    }
     options = _options(table, numbers)
     for key, choice in columns.items():
         if choice is None:  # left out
@@ -70,12 +86,15 @@ def map_columns(
     _check_ambiguity(table, options, keys, columns)
     chosen = {key: options[key][0] for key in keys}
     for key, one in chosen.items():
-        if (quantity := one.role.quantity) in units:  # the user's unit goes before that in the header
+        # the user's unit goes before that in the header
+        if (quantity := one.role.quantity) in units:
             chosen[key] = replace(one, role=replace(one.role, unit=str(units[quantity])))
     for one in chosen.values():
         _check_unit(table, one)
     days = [one for one in options.get("day", []) if one.number != chosen["t"].number][:1]
-    return Mapped(kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days))
+    return Mapped(
+        kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days)
+    )
 
 
 def _check_ambiguity(
@@ -84,7 +103,8 @@ def _check_ambiguity(
     keys: Sequence[str],
     given: Mapping[str, Any],
 ) -> None:
-    """Raise `UserError` where several columns fit a key, with one setting that answers for all such keys at once.
+    """Raise `UserError` where several columns fit a key, with one setting that answers for all such
+    keys at once.
 
     It holds what was `given` already, so that no answer takes back the one before.
     """
@@ -95,12 +115,14 @@ def _check_ambiguity(
     names = [name.strip() for name in table.heading.names]
     firsts = {key: options[key][0] for key in several}
     answers = {
-        key: f"'{one.name}'" if names.count(one.name.strip()) == 1 else str(one.number) for key, one in firsts.items()
+        key: f"'{one.name}'" if names.count(one.name.strip()) == 1 else str(one.number)
+        for key, one in firsts.items()
     }
     answers |= {key: _answer(choice) for key, choice in given.items() if key not in answers}
     said = ", ".join(f"{key}: {answer}" for key, answer in answers.items())
     raise UserError(
-        f"{table.source}: {several[0]} could be any of the columns {listed}; say which, e.g. {DATA.columns}={{{said}}}"
+        f"{table.source}: {several[0]} could be any of the columns {listed}; say which, e.g."
+        f" {DATA.columns}={{{said}}}"
     )
 
 
@@ -121,15 +143,19 @@ def check_mapping(columns: Mapping[str, Any], units: Mapping[str, str]) -> None:
         _key(key)
     for quantity, unit in units.items():
         if quantity not in QUANTITIES:
-            raise UserError(f"{DATA.units} names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}")
+            raise UserError(
+                f"{DATA.units} names '{quantity}'{among(quantity, QUANTITIES, 'Quantities')}"
+            )
         if not is_unit(amount(str(unit))[1]):
             raise UserError(
-                f"{DATA.units}: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW, Mvar, Hz, s, ms, "
+                f"{DATA.units}: {quantity}={unit} is not a unit; one is e.g. kV, V, kA, A, MW, kW,"
+                " Mvar, Hz, s, ms, "
                 "deg, rad, pu"
             )
         if not fits(quantity, str(unit), exact=True):
             raise UserError(
-                f"{DATA.units}: {quantity}={unit} is no unit of {quantity}; one is {', '.join(OF[quantity])}"
+                f"{DATA.units}: {quantity}={unit} is no unit of {quantity}; one is"
+                f" {', '.join(OF[quantity])}"
             )
 
 
@@ -139,7 +165,10 @@ def _key(name: str) -> str:
     plain = str(name).lower()
     plain = "u" + plain[1:] if plain.startswith("v") else plain
     if plain not in spellings:
-        raise UserError(f"{DATA.columns} names '{name}'{among(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia, ib, ic")
+        raise UserError(
+            f"{DATA.columns} names '{name}'{among(str(name), CONTRACT, 'Keys')}, or ua, ub, uc, ia,"
+            " ib, ic"
+        )
     return spellings[plain]
 
 
@@ -149,21 +178,32 @@ def _column_number(table: TableFile, key: str, choice: Any) -> int:
     units = table.heading.units
     if isinstance(choice, int) or (str(choice).isdigit() and str(choice) not in names):
         if not 0 <= int(choice) < len(names):
-            raise UserError(f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted from 0")
+            raise UserError(
+                f"{DATA.columns}: {key}={choice}: {table.source} has {len(names)} columns, counted"
+                " from 0"
+            )
         return int(choice)
     wanted = _squeeze_name(str(choice))
     matches = [k for k, name in enumerate(names) if _squeeze_name(name) == wanted]
-    matches = matches or [k for k, name in enumerate(names) if _squeeze_name(name + units[k]) == wanted]
+    matches = matches or [
+        k for k, name in enumerate(names) if _squeeze_name(name + units[k]) == wanted
+    ]
     if not matches:
         roles = (role(name, unit) for name, unit in zip(names, units, strict=True))
-        fitting = [n for n, r in zip(names, roles, strict=True) if r is None or r.quantity == Role(key).quantity]
+        fitting = [
+            n
+            for n, r in zip(names, roles, strict=True)
+            if r is None or r.quantity == Role(key).quantity
+        ]
         raise UserError(
-            f"{DATA.columns}: {key}={choice}: {table.source} has no such column{nearest(str(choice), fitting) or '.'} "
+            f"{DATA.columns}: {key}={choice}: {table.source} has no such"
+            f" column{nearest(str(choice), fitting) or '.'} "
             f"Columns: {', '.join(names)}"
         )
     if len(matches) > 1:
         raise UserError(
-            f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times; give its number, "
+            f"{DATA.columns}: {key}={choice}: {table.source} has that column {len(matches)} times;"
+            " give its number, "
             f"one of {', '.join(map(str, matches))}"
         )
     return matches[0]
@@ -175,15 +215,23 @@ def _squeeze_name(name: str) -> str:
 
 
 def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[MappedColumn]]:
-    """{key: the columns that could be it}; the user's choice, and a name that is the key itself, excludes others."""
+    """{key: the columns that could be it}; the user's choice, and a name that is the key itself,
+    excludes others.
+    """
     heading, options = table.heading, {}
     names = _spell_out_names(heading.names)
     order = order_of(names, heading.units)
     for key, number in numbers.items():
         label = role(heading.names[number], heading.units[number], order)
         line = label.line if label and label.quantity == "U" else None
-        line = False if line is None and label and label.key[:1] == "U" and label.key[1:] in PHASES else line
-        options[key] = [MappedColumn(number, table.label(number), Role(key, heading.units[number], line))]
+        line = (
+            False
+            if line is None and label and label.key[:1] == "U" and label.key[1:] in PHASES
+            else line
+        )
+        options[key] = [
+            MappedColumn(number, table.label(number), Role(key, heading.units[number], line))
+        ]
     free = [k for k in range(len(heading.names)) if k not in numbers.values() and heading.names[k]]
     roles = {k: one for k in free if (one := role(names[k], heading.units[k], order))}
     exact = {key for key in CONTRACT if key in [heading.names[k] for k in free]}
@@ -201,13 +249,18 @@ def _options(table: TableFile, numbers: Mapping[str, int]) -> dict[str, list[Map
 
 
 def _spell_out_names(names: Sequence[str]) -> Sequence[str]:
-    """The names with those of a micro-PMU, L1MAG and C1ANG, as they are meant: voltage and current of a phase."""
-    parts = [re.fullmatch(r"([LC])([123])_?(MAG|ANG)", name.strip(), re.IGNORECASE) for name in names]
+    """The names with those of a micro-PMU, L1MAG and C1ANG, as they are meant: voltage and current
+    of a phase.
+    """
+    parts = [
+        re.fullmatch(r"([LC])([123])_?(MAG|ANG)", name.strip(), re.IGNORECASE) for name in names
+    ]
     if {match[1].upper() for match in parts if match} != {"L", "C"}:
         return names
     letters = {"L": "V", "C": "I"}
     return [
-        f"{letters[m[1].upper()]}{m[2]} {m[3].lower()}" if m else name for m, name in zip(parts, names, strict=True)
+        f"{letters[m[1].upper()]}{m[2]} {m[3].lower()}" if m else name
+        for m, name in zip(parts, names, strict=True)
     ]
 
 
@@ -218,26 +271,37 @@ def _resolve_numbered_roles(roles: Mapping[int, Role]) -> dict[str, str]:
         for ending in ("", "_angle"):
             numbered = [f"{letter}{n}{ending}" for n in (1, 2, 3)]
             if keys.issuperset(numbered):
-                phases |= {old: f"{letter}{p}{ending}" for old, p in zip(numbered, PHASES, strict=True)}
+                phases |= {
+                    old: f"{letter}{p}{ending}" for old, p in zip(numbered, PHASES, strict=True)
+                }
             elif letter in "PQ" and numbered[0] in keys:
                 phases[numbered[0]] = letter
     return phases | _of_one_load(keys)
 
 
 def _of_one_load(keys: Collection[str]) -> dict[str, str]:
-    """What U L1, P L1, Q L1 are where no L2 and L3 are beside them: the whole of a load called L1."""
+    """What U L1, P L1, Q L1 are where no L2 and L3 are beside them: the whole of a
+    load called L1.
+    """
     if not {"Pa", "Qa"} <= set(keys) or {"P", "Q", "Pb", "Pc", "Qb", "Qc"} & set(keys):
         return {}
     voltage = {"Ua": "U"} if not {"U", "U1", "Ub", "Uc"} & set(keys) else {}
     return {"Pa": "P", "Qa": "Q", **voltage}
 
 
-def _find_time_columns(table: TableFile, options: dict[str, list[MappedColumn]]) -> dict[str, list[MappedColumn]]:
-    """Time from a column of dates with times, or of whole seconds beside fractions, where there is no other.
+def _find_time_columns(
+    table: TableFile, options: dict[str, list[MappedColumn]]
+) -> dict[str, list[MappedColumn]]:
+    """Time from a column of dates with times, or of whole seconds beside fractions, where there is
+    no other.
 
     Of a date and a time, the time; fractions alone are none of a known second.
     """
-    days = [one for one in options.get("day", []) if any(is_time(row[one.number]) for row in table.sample[:1])]
+    days = [
+        one
+        for one in options.get("day", [])
+        if any(is_time(row[one.number]) for row in table.sample[:1])
+    ]
     seconds = options.pop("soc", [])
     if seconds and ("t" not in options or "frac" in options):
         options["t"] = seconds
@@ -256,8 +320,12 @@ def _first_day(table: TableFile, days: Sequence[MappedColumn]) -> dt.date | None
     return next((first_day([row[one.number] for row in table.sample]) for one in days), None)
 
 
-def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -> tuple[str, list[str]]:
-    """What the table holds, and the keys that make it up, t first; raises `UserError` for what is no such table."""
+def _kind(
+    table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]
+) -> tuple[str, list[str]]:
+    """What the table holds, and the keys that make it up, t first; raises `UserError` for what is
+    no such table.
+    """
     keys, wanted = set(options), set(chosen)
     kinds: dict[str, list[str]] = {}
     wave = _waveform(options)
@@ -279,7 +347,8 @@ def _kind(table: TableFile, options: Mapping[str, Any], chosen: Iterable[str]) -
                 named = ", ".join(options[key][0].label for key in wave)
                 raise UserError(
                     f"{table.source}: the columns {named} hold magnitudes without angles, and "
-                    "there are none of P and Q: the load's power does not follow from them; add P and Q, or the angles"
+                    "there are none of P and Q: the load's power does not follow from them; add P"
+                    " and Q, or the angles"
                 )
             return kind, ["t", *(key for key in ("frac",) if key in keys), *kinds[kind]]
     raise UserError(_describe_missing_columns(table, options, kinds))
@@ -292,7 +361,11 @@ def _has(keys: Iterable[str], letter: str) -> bool:
 def _set(keys: Iterable[str], letter: str, single: Sequence[str]) -> list[str]:
     """The keys that give one quantity: one column, or three phases, or three lines."""
     keys = set(keys)
-    for group in (*([one] for one in single), [letter + p for p in PHASES], [letter + p for p in LINES]):
+    for group in (
+        *([one] for one in single),
+        [letter + p for p in PHASES],
+        [letter + p for p in LINES],
+    ):
         if keys.issuperset(group):
             return [*group]
     return []
@@ -304,9 +377,16 @@ def _powers(options: Mapping[str, Any]) -> list[str]:
     return [*U, *P, *Q, *(key for key in ("f", "U2") if key in options)] if U and P and Q else []
 
 
-def _telling_current(table: TableFile, options: Mapping[str, list[MappedColumn]], powers: Sequence[str]) -> list[str]:
-    """The key of a current [kA] beside powers, which tells whether a voltage whose name does not is line to line."""
-    first, keys = options[powers[0]][0], [key for key in ("I", "Ia", "Ib", "Ic", "I1") if key in options]
+def _telling_current(
+    table: TableFile, options: Mapping[str, list[MappedColumn]], powers: Sequence[str]
+) -> list[str]:
+    """The key of a current [kA] beside powers, which tells whether a voltage whose name does not is
+    line to line.
+    """
+    first, keys = (
+        options[powers[0]][0],
+        [key for key in ("I", "Ia", "Ib", "Ic", "I1") if key in options],
+    )
     told = first.role.line is not None or first.name == first.role.key == "U" or not first.role.unit
     if told or not keys or len(options[keys[0]]) > 1:
         return []
@@ -324,10 +404,17 @@ def _some(keys: Iterable[str], letter: str) -> list[str]:
 
 
 def _phasors(options: Mapping[str, Any]) -> list[str]:
-    """Magnitudes and angles: of three phases where they are there, else of two, else of the positive sequence."""
+    """Magnitudes and angles: of three phases where they are there, else of two, else of the
+    positive sequence.
+    """
     result: list[str] = []
     for letter in "UI":
-        groups = [[letter + p for p in PHASES], [letter + p for p in LINES], [f"{letter}1"], [letter]]
+        groups = [
+            [letter + p for p in PHASES],
+            [letter + p for p in LINES],
+            [f"{letter}1"],
+            [letter],
+        ]
         marks = LINES if letter == "U" else PHASES  # of which two say the third
         groups += [[letter + p for p in marks if p != left] for left in marks]
         whole = [g for g in groups if all(k in options and f"{k}_angle" in options for k in g)]
@@ -338,40 +425,59 @@ def _phasors(options: Mapping[str, Any]) -> list[str]:
 
 
 def _waveform(options: Mapping[str, Any]) -> list[str]:
-    """Voltages and currents that may be waveforms: both, or those of one kind where no power stands beside them."""
-    U, I = (_set(options, letter, ()) or [k for k in (letter, letter + "a", letter + "1") if k in options][:1]
-            for letter in "UI")  # fmt: skip
+    """Voltages and currents that may be waveforms: both, or those of one kind where no power stands
+    beside them.
+    """
+    U, I = (
+        _set(options, letter, ())
+        or [k for k in (letter, letter + "a", letter + "1") if k in options][:1]
+        for letter in "UI"
+    )
     one_kind = len(U or I) == 3 and not _has(options, "P") and not _has(options, "Q")
     return [*U, *I] if (U and I) or one_kind else []
 
 
-def _oscillates(table: TableFile, options: Mapping[str, list[MappedColumn]], keys: Sequence[str]) -> bool:
-    """Whether a voltage among the columns takes both signs, as a waveform does and a magnitude does not.
+def _oscillates(
+    table: TableFile, options: Mapping[str, list[MappedColumn]], keys: Sequence[str]
+) -> bool:
+    """Whether a voltage among the columns takes both signs, as a waveform does and a magnitude does
+    not.
 
     Where there is no voltage, whether a current does.
     """
     letter = "U" if any(key[0] == "U" for key in keys) else "I"
     for key in (key for key in keys if key[0] == letter):
-        cells = [row[options[key][0].number] for row in table.sample if options[key][0].number < len(row)]
-        values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
+        cells = [
+            row[options[key][0].number] for row in table.sample if options[key][0].number < len(row)
+        ]
+        values = [
+            float(str(cell).replace(",", "."))
+            for cell in cells
+            if is_number(cell) or is_number(cell, ",")
+        ]
         if values and min(values) < 0 < max(values):
             return True
     return False
 
 
-def _describe_missing_columns(table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]) -> str:
+def _describe_missing_columns(
+    table: TableFile, options: Mapping[str, Any], groups: Mapping[str, Any]
+) -> str:
     """The sentence on what is missing."""
     names = [table.label(k) for k in range(len(table.heading.names)) if table.heading.names[k]]
     if not names:
         return (
-            f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by number, from 0: "
+            f"{table.source}: no line names the columns; add one, such as t,U,P,Q, or name them by"
+            " number, from 0: "
             f"{DATA.columns}={{t: 0, U: 1, P: 2, Q: 3}}"
         )
     listed = f"the header line names {', '.join(names)}"
     if groups and "t" in options:
         return (
-            f"{table.source}: what {DATA.columns} names makes no table of powers, phasors or waveforms with the "
-            f"others; {listed}; name all that are needed: {DATA.columns}={{t: ..., U: ..., P: ..., Q: ...}}"
+            f"{table.source}: what {DATA.columns} names makes no table of powers, phasors or"
+            " waveforms with the "
+            f"others; {listed}; name all that are needed: {DATA.columns}={{t: ..., U: ..., P: ...,"
+            f" Q: ...}}"
         )
     missing = [key for key in ("t",) if key not in options]
     if not groups:
@@ -380,25 +486,42 @@ def _describe_missing_columns(table: TableFile, options: Mapping[str, Any], grou
     meant = {key: name for key in missing if (name := _meant(table, options, key))}
     said = ", ".join(f"{key}: '{meant[key]}'" if key in meant else f"{key}: ..." for key in missing)
     which = f"if {', '.join(meant.values())} is meant, say so" if meant else "say which is which"
-    return f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}: {DATA.columns}={{{said}}}"
+    return (
+        f"{table.source}: column {', '.join(missing)} is missing; {listed}; {which}:"
+        f" {DATA.columns}={{{said}}}"
+    )
 
 
 def _meant(table: TableFile, options: Mapping[str, list[MappedColumn]], key: str) -> str:
-    """The one column that may be meant by a key that is missing: of its quantity by name, or that counts up as t does.
+    """The one column that may be meant by a key that is missing: of its quantity by name, or that
+    counts up as t does.
 
     "" where there is none or several: a name that only looks alike says nothing.
     """
     if key != "t":
-        alike = {c.number: c for k, several in options.items() if k[0] == key and "_" not in k for c in several}
+        alike = {
+            c.number: c
+            for k, several in options.items()
+            if k[0] == key and "_" not in k
+            for c in several
+        }
         return next(iter(alike.values())).name if len(alike) == 1 else ""
     taken = {c.number for several in options.values() for c in several}
-    free = [k for k, name in enumerate(table.heading.names) if name and k not in taken and _increases(table, k)]
+    free = [
+        k
+        for k, name in enumerate(table.heading.names)
+        if name and k not in taken and _increases(table, k)
+    ]
     return table.label(free[0]) if len(free) == 1 else ""
 
 
 def _increases(table: TableFile, number: int) -> bool:
     cells = [row[number] for row in table.sample if number < len(row)]
-    values = [float(str(cell).replace(",", ".")) for cell in cells if is_number(cell) or is_number(cell, ",")]
+    values = [
+        float(str(cell).replace(",", "."))
+        for cell in cells
+        if is_number(cell) or is_number(cell, ",")
+    ]
     return len(values) == len(cells) > 1 and all(a < b for a, b in itertools.pairwise(values))
 
 
@@ -407,18 +530,26 @@ def _check_unit(table: TableFile, one: MappedColumn) -> None:
     quantity = one.role.quantity
     if one.role.unit and is_unit(one.role.unit) and not fits(quantity, one.role.unit):
         raise UserError(
-            f"{table.source}: column {one.label} is read as {one.role.key}, of which {one.role.unit} is no unit; say "
+            f"{table.source}: column {one.label} is read as {one.role.key}, of which"
+            f" {one.role.unit} is no unit; say "
             f"another column, {DATA.columns}={{{one.role.key}: ...}}, or the unit, "
             f"{DATA.units}={{{quantity}: {OF.get(quantity, ('',))[0]}}}"
         )
 
 
 def _notes(
-    table: TableFile, chosen: Mapping[str, MappedColumn], days: Sequence[MappedColumn], other_columns: Collection[str]
+    table: TableFile,
+    chosen: Mapping[str, MappedColumn],
+    days: Sequence[MappedColumn],
+    other_columns: Collection[str],
 ) -> list[str]:
     """Notes on the role of each column, where names alone do not say it, and on unused columns."""
     notes, used = [], {one.number for one in (*chosen.values(), *days)}
     if any(key != one.name or table.heading.units[one.number] for key, one in chosen.items()):
         notes.append("columns: " + ", ".join(f"{key} = {one.label}" for key, one in chosen.items()))
-    spare = [name for k, name in enumerate(table.heading.names) if name and k not in used and name not in other_columns]
+    spare = [
+        name
+        for k, name in enumerate(table.heading.names)
+        if name and k not in used and name not in other_columns
+    ]
     return [*notes, f"columns not used: {', '.join(spare)}"] if spare else notes

@@ -1,7 +1,8 @@
 """The times of a table in seconds since its first row, and when that was.
 
-A column of times is a clock's, seconds or another unit, days as spreadsheets count them, seconds since 1970, or whole
-seconds with their fraction in a second column (SOC and FRACSEC of IEEE C37.118).
+A column of times is a clock's, seconds or another unit, days as spreadsheets count them, seconds
+since 1970, or whole seconds with their fraction in a second column (SOC and FRACSEC of IEEE
+C37.118).
 """
 
 import datetime as dt
@@ -18,12 +19,15 @@ from tractexp.filetypes.table import TableColumn, TableFile
 EPOCH = 1e6  # s: times beyond it are counted from the first
 LATEST = 2.6e9  # s since 1970, of a record: 2052
 EARLIEST = 3e8  # s since 1970, of a record: 1979
-SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}  # {unit of times: how many times larger than s they are at least}
+# {unit of times: how many times larger than s they are at least}
+SINCE_1970 = {"ms": 1.0, "us": 1e3, "ns": 1e6}
 ZERO_DAY = dt.datetime(1899, 12, 30)  # of spreadsheets
 SERIAL_DAYS = (20_000.0, 80_000.0)  # days of a spreadsheet: 1954 to 2119
-FASTEST = {"powers": 2e3, "phasors": 2e3, "waves": 1e6}  # Hz: what is sampled faster by its times has them in days
+# Hz: what is sampled faster by its times has them in days
+FASTEST = {"powers": 2e3, "phasors": 2e3, "waves": 1e6}
 SECONDS_A_DAY = 86400.0  # s
-COUNTED = 1 << 24  # a fraction of a second is counted in 24 bits, above which stands the quality of the clock
+# a fraction of a second is counted in 24 bits, above which stands the quality of the clock
+COUNTED = 1 << 24
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,8 @@ class TableTimes:
 def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]) -> TableTimes:
     """The times of a table, of which `cells` are the columns that were read.
 
-    Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds. Raises `UserError`
-    where the digits of times in days are too few.
+    Without a unit, numbers too large for seconds since 1970 are its milli-, micro- or nanoseconds.
+    Raises `UserError` where the digits of times in days are too few.
     """
     one = mapping.columns["t"]
     time = cells[one.number]
@@ -54,7 +58,9 @@ def times_of(table: TableFile, mapping: Mapped, cells: Mapping[int, TableColumn]
         said += [f"t counted from {start.isoformat()}, the first row"] if start is not None else []
         result = TableTimes(time.values, start, tuple(said))
     if "frac" in mapping.columns:
-        result = _with_fractions(table, mapping, result, cells[mapping.columns["frac"].number].values)
+        result = _with_fractions(
+            table, mapping, result, cells[mapping.columns["frac"].number].values
+        )
     if result.start is None and table.start is not None:
         result = replace(result, start=table.start + dt.timedelta(seconds=float(result.t[0])))
     return result
@@ -64,17 +70,26 @@ def _midnight(day: dt.date) -> dt.datetime:
     return dt.datetime.combine(day, dt.time())
 
 
-def _read_numeric_times(table: TableFile, values: np.ndarray, unit: str, fastest: float) -> TableTimes:
+def _read_numeric_times(
+    table: TableFile, values: np.ndarray, unit: str, fastest: float
+) -> TableTimes:
     """Times that are numbers."""
     first, steps = float(values[0]), len(values) - 1
     span = float(values[-1]) - first
     in_days = SERIAL_DAYS[0] <= first <= SERIAL_DAYS[1] and 0 < span * fastest < steps
     if not unit and in_days:
         return _of_days(table, values)
-    since = next((u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), "")
+    since = next(
+        (u for u, by in SINCE_1970.items() if by * LATEST < abs(first) <= 1e3 * by * LATEST), ""
+    )
     if not unit and since:
-        note = f"t is in {since} since 1970 by its size: counted from {first:.0f} {since}, the first row"
-        return TableTimes((values - first) * factor(since), _since_1970(first * factor(since)), (note,))
+        note = (
+            f"t is in {since} since 1970 by its size: counted from {first:.0f} {since}, the first"
+            " row"
+        )
+        return TableTimes(
+            (values - first) * factor(since), _since_1970(first * factor(since)), (note,)
+        )
     t = values * factor(unit)
     if abs(t[0]) > EPOCH:
         note = f"t counted from {t[0]:.6f} s, the first row"
@@ -96,26 +111,39 @@ def _of_days(table: TableFile, values: np.ndarray) -> TableTimes:
     if (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1
         raise UserError(
-            f"{table.source}: {table.place(i)}: times are days since 1899, as spreadsheets count them, of too few "
-            f"digits: {values[i]:.12g} follows {values[i - 1]:.12g}; ten decimals give 10 microseconds: show them in "
+            f"{table.source}: {table.place(i)}: times are days since 1899, as spreadsheets count"
+            " them, of too few "
+            f"digits: {values[i]:.12g} follows {values[i - 1]:.12g}; ten decimals give 10"
+            " microseconds: show them in "
             "the sheet, or the time as hh:mm:ss.000, and save again"
         )
     start = ZERO_DAY + dt.timedelta(days=float(values[0]))
-    return TableTimes(t, start, (f"t is in days since 1899 by its size: counted from {start.isoformat()}",))
+    return TableTimes(
+        t, start, (f"t is in days since 1899 by its size: counted from {start.isoformat()}",)
+    )
 
 
-def _with_fractions(table: TableFile, mapping: Mapped, whole: TableTimes, fractions: np.ndarray) -> TableTimes:
+def _with_fractions(
+    table: TableFile, mapping: Mapped, whole: TableTimes, fractions: np.ndarray
+) -> TableTimes:
     """Whole seconds with the fractions of another column."""
     label = mapping.columns["frac"].label
     if (whole.t != np.round(whole.t)).any():
-        return replace(whole, notes=(*whole.notes, f"{label} not used: the times have fractions of seconds"))
+        return replace(
+            whole, notes=(*whole.notes, f"{label} not used: the times have fractions of seconds")
+        )
     by, said = _unit_of(mapping.columns["frac"].role.unit, whole.t, fractions)
-    if by > 0 and fractions.max(initial=0.0) >= COUNTED and (fractions == np.round(fractions)).all():
+    if (
+        by > 0
+        and fractions.max(initial=0.0) >= COUNTED
+        and (fractions == np.round(fractions)).all()
+    ):
         fractions = np.mod(fractions, COUNTED)
         by, said = _unit_of("", whole.t, fractions)
     if not by > 0 or fractions.min(initial=0.0) < 0 or fractions.max(initial=0.0) * by >= 1 + 1e-9:
         raise UserError(
-            f"{table.source}: {label} holds no fractions of the seconds beside it: up to {fractions.max():g}; leave "
+            f"{table.source}: {label} holds no fractions of the seconds beside it: up to"
+            f" {fractions.max():g}; leave "
             f"it out, {DATA.columns}={{frac: null}}, or say its unit in its heading: ms, us or ns"
         )
     t = whole.t + fractions * by
@@ -126,7 +154,9 @@ def _with_fractions(table: TableFile, mapping: Mapped, whole: TableTimes, fracti
 
 
 def _unit_of(unit: str, seconds: np.ndarray, fractions: np.ndarray) -> tuple[float, str]:
-    """(seconds that one of the fractions is, what says so): their unit, or by how much they fall in a new second."""
+    """(seconds that one of the fractions is, what says so): their unit, or by how much they fall in
+    a new second.
+    """
     if unit:
         return factor(unit), f"which are in {unit}"
     most = float(fractions.max(initial=0.0))

@@ -1,4 +1,6 @@
-"""PQDIF files (IEEE 1159.3) as a recording of their waveforms, or as a table of their logs of RMS values and powers."""
+"""PQDIF files (IEEE 1159.3) as a recording of their waveforms, or as a table of their logs of RMS
+values and powers.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,26 +21,41 @@ from tractexp.filetypes.pqdif_channels import (
     SeriesDefinition,
     read_observations,
     seconds,
-)  # fmt: skip
+)
 from tractexp.filetypes.pqdif_records import SIGNATURE, tag
 from tractexp.filetypes.remarks import Remarks
 from tractexp.filetypes.table import Rows
 from tractexp.recording.recording import Channel, Recording
 
 ZERO = datetime(1899, 12, 30)
-UNITS = {6: "V", 7: "A", 8: "VA", 9: "W", 10: "var", 15: "Hz", 17: "deg", 19: "%", 20: "pu"}  # of the standard
+# of the standard
+UNITS = {6: "V", 7: "A", 8: "VA", 9: "W", 10: "var", 15: "Hz", 17: "deg", 19: "%", 20: "pu"}
 QUANTITIES = {"V": "voltage", "A": "current", "Hz": "frequency", "deg": "angle"}
 PHASES = {1: "A", 2: "B", 3: "C", 4: "N", 5: "AB", 6: "BC", 7: "CA", 8: "N", 9: "N"}
-MEANS = {10: "1", 11: "2", 12: "0", 13: "", 14: " LN", 15: " LL"}  # in names of columns: sequences, total, means
+# in names of columns: sequences, total, means
+MEANS = {10: "1", 11: "2", 12: "0", 13: "", 14: " LN", 15: " LL"}
 LETTERS = {"V": "U", "A": "I", "W": "P", "var": "Q", "Hz": "f"}
-VALUE, AVERAGE = tag("67f6af97-f753-11cf-9d89-0080c72e70a3"), tag("67f6af9a-f753-11cf-9d89-0080c72e70a3")
+VALUE, AVERAGE = (
+    tag("67f6af97-f753-11cf-9d89-0080c72e70a3"),
+    tag("67f6af9a-f753-11cf-9d89-0080c72e70a3"),
+)
 INSTANT = tag("67f6af9b-f753-11cf-9d89-0080c72e70a3")
 ANGLES = (tag("3d786f9d-f76e-11cf-9d89-0080c72e70a3"), tag("dc762342-3c56-11d2-ae44-0060083a2628"))
-# what a logged value is of its quantity: none said, RMS, P, Q, frequency; positive and negative sequence; fundamental
-PLAIN = (b"", *(tag(f"a6b31a{n}-b451-11d1-ae17-0060083a2628") for n in ("df", "e5", "e1", "e4")),
-         tag("07ef68af-9ff5-11d2-b30b-006008b37183"))  # fmt: skip
-SEQUENCES = {tag("a6b31aea-b451-11d1-ae17-0060083a2628"): 10, tag("d71a4b91-3c92-11d4-9f2c-002078e0b723"): 11}
-FUNDAMENTAL = (tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"), tag("672d0310-7810-11d4-a4b3-444553540000"))
+# what a logged value is of its quantity: none said, RMS, P, Q, frequency; positive and negative
+# sequence; fundamental
+PLAIN = (
+    b"",
+    *(tag(f"a6b31a{n}-b451-11d1-ae17-0060083a2628") for n in ("df", "e5", "e1", "e4")),
+    tag("07ef68af-9ff5-11d2-b30b-006008b37183"),
+)
+SEQUENCES = {
+    tag("a6b31aea-b451-11d1-ae17-0060083a2628"): 10,
+    tag("d71a4b91-3c92-11d4-9f2c-002078e0b723"): 11,
+}
+FUNDAMENTAL = (
+    tag("1cdda475-1ebb-42d8-8087-d01b0b5cfa97"),
+    tag("672d0310-7810-11d4-a4b3-444553540000"),
+)
 FEWEST_WAVE_SAMPLES = 4  # samples of a waveform
 LARGEST_TIME_DIFFERENCE = 1e-6  # s: times that are the same to the resolution of a moment
 LOG_GAP_STEPS = 1.5  # usual steps: after a longer one a log is another one
@@ -59,7 +76,9 @@ def recognizes(path: Path | str) -> bool:
 
 def holds_waveforms(path: Path, encoding: str | None = None) -> bool:
     """Whether waveforms are in the file; raises `UserError` for what is no such file."""
-    return bool(read_observations(path, encoding, [WAVEFORM], Remarks(str(path)), most=1).observations)
+    return bool(
+        read_observations(path, encoding, [WAVEFORM], Remarks(str(path)), most=1).observations
+    )
 
 
 def load(path: Path, encoding: str | None = None) -> Recording:
@@ -73,7 +92,8 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     stretches = _fullest(_waves(content, channels, remarks), remarks)
     if not stretches:
         raise UserError(
-            f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read as a table: "
+            f"{path}: there are no waveforms in this PQDIF file; logs of voltage, P and Q are read"
+            " as a table: "
             f"data=csv data.path={path}"
         )
     segments, evened = _segments(str(path), stretches)
@@ -83,7 +103,14 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     return Recording(
         source=str(path),
         channels=[
-            Channel(d.name, evened[k], unit, QUANTITIES.get(unit, ""), PHASES.get(d.phase, ""), d.circuit)
+            Channel(
+                d.name,
+                evened[k],
+                unit,
+                QUANTITIES.get(unit, ""),
+                PHASES.get(d.phase, ""),
+                d.circuit,
+            )
             for k, (d, unit) in ((k, channels[k]) for k in evened)
         ],
         segments=segments,
@@ -96,20 +123,32 @@ def load(path: Path, encoding: str | None = None) -> Recording:
     )
 
 
-def _waves(content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks) -> list[Stretch]:
-    """The waveforms of each observation by the times of their samples; `channels` learns definition and unit."""
+def _waves(
+    content: Observed, channels: dict[int, tuple[ChannelDefinition, str]], remarks: Remarks
+) -> list[Stretch]:
+    """The waveforms of each observation by the times of their samples; `channels` learns definition
+    and unit.
+    """
     stretches: dict[tuple[float, ...], Stretch] = {}
     for each in content.observations:
-        begin, own = seconds(each.start, content.observations[0].start), dict[tuple[float, ...], Stretch]()
+        begin, own = (
+            seconds(each.start, content.observations[0].start),
+            dict[tuple[float, ...], Stretch](),
+        )
         for one in each.instances:
             sampled = ((d, v) for d, v in one.series if d.value in (VALUE, INSTANT))
             definition, values = next(sampled, (None, None))
             if definition is None or values is None or len(one.t) < FEWEST_WAVE_SAMPLES:
                 continue
             if not (np.isfinite(one.t).all() and (np.diff(one.t) > 0).all()):
-                raise UserError(f"{remarks.where}: {one.channel.name}: its times do not increase: the file is damaged")
+                raise UserError(
+                    f"{remarks.where}: {one.channel.name}: its times do not increase: the file is"
+                    " damaged"
+                )
             channels[one.channel.number] = (one.channel, UNITS.get(definition.unit, ""))
-            own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[one.channel.number] = values
+            own.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[
+                one.channel.number
+            ] = values
         for stretch in _merge_rates([*own.values()], remarks):
             stretches.setdefault(_key(0.0, stretch.t), stretch).columns.update(stretch.columns)
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
@@ -121,17 +160,29 @@ def _key(begin: float, t: np.ndarray) -> tuple[float, ...]:
 
 
 def _merge_rates(stretches: Sequence[Stretch], remarks: Remarks) -> Sequence[Stretch]:
-    """One stretch of channels that one observation samples at several rates: all at the times of the slowest."""
-    first, last = (f(each.t[k] for each in stretches) if stretches else 0.0 for f, k in ((max, 0), (min, -1)))
-    slowest = min(stretches, key=lambda each: (len(each.t) - 1) / (each.t[-1] - each.t[0]), default=None)
+    """One stretch of channels that one observation samples at several rates: all at the times of
+    the slowest.
+    """
+    first, last = (
+        f(each.t[k] for each in stretches) if stretches else 0.0 for f, k in ((max, 0), (min, -1))
+    )
+    slowest = min(
+        stretches, key=lambda each: (len(each.t) - 1) / (each.t[-1] - each.t[0]), default=None
+    )
     if slowest is None or len(stretches) == 1:
         return stretches
-    t = slowest.t[(slowest.t >= first - LARGEST_TIME_DIFFERENCE) & (slowest.t <= last + LARGEST_TIME_DIFFERENCE)]
+    t = slowest.t[
+        (slowest.t >= first - LARGEST_TIME_DIFFERENCE)
+        & (slowest.t <= last + LARGEST_TIME_DIFFERENCE)
+    ]
     if len(t) < FEWEST_WAVE_SAMPLES:
         return stretches
     from scipy.interpolate import CubicSpline
 
-    remarks.add(f"channels of one observation are sampled at {len(stretches)} rates: all are taken at the lowest")
+    remarks.add(
+        f"channels of one observation are sampled at {len(stretches)} rates: all are taken at the"
+        " lowest"
+    )
     columns = {k: CubicSpline(each.t, v)(t) for each in stretches for k, v in each.columns.items()}
     return [Stretch(t, columns)]
 
@@ -144,12 +195,18 @@ def _fullest(stretches: Sequence[Stretch], remarks: Remarks) -> list[Stretch]:
     full = max(sets, key=lambda one: (len(one), sets.count(one)))
     if len(sets) > sets.count(full):
         count = len(sets) - sets.count(full)
-        remarks.add(f"{count} of {len(sets)} observations hold other channels, or fewer, and are not read")
+        remarks.add(
+            f"{count} of {len(sets)} observations hold other channels, or fewer, and are not read"
+        )
     return [each for each, own in zip(stretches, sets, strict=True) if own == full]
 
 
-def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.Segment], dict[int, np.ndarray]]:
-    """Segments of even sampling, and the values (N,) of each channel in them; times begin with the first sample."""
+def _segments(
+    where: str, stretches: Sequence[Stretch]
+) -> tuple[list[timeline.Segment], dict[int, np.ndarray]]:
+    """Segments of even sampling, and the values (N,) of each channel in them; times begin with the
+    first sample.
+    """
     segments: list[timeline.Segment] = []
     parts: dict[int, list[np.ndarray]] = {k: [] for k in stretches[0].columns}
     first = 0
@@ -158,12 +215,15 @@ def _segments(where: str, stretches: Sequence[Stretch]) -> tuple[list[timeline.S
         resolution = float(np.spacing(np.float32(np.abs(t - t[0]).max())))
         runs = timeline.from_stamps(t, resolution, where)
         segments += [
-            timeline.Segment(first + s.first, first + s.stop, s.rate, s.start) for s in timeline.laid_out(runs)
+            timeline.Segment(first + s.first, first + s.stop, s.rate, s.start)
+            for s in timeline.laid_out(runs)
         ]
         for k, values in each.columns.items():
             parts[k].append(timeline.resample_evenly(values, runs, None))
         first += len(next(iter(parts.values()))[-1])
-    return segments, {k: each[0] if len(each) == 1 else np.concatenate(each) for k, each in parts.items()}
+    return segments, {
+        k: each[0] if len(each) == 1 else np.concatenate(each) for k, each in parts.items()
+    }
 
 
 def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime | None:
@@ -177,8 +237,8 @@ def _moment(start: tuple[int, float], more: float, remarks: Remarks) -> datetime
 def table(path: Path, encoding: str | None = None) -> Rows:
     """The logs of RMS values, powers and phasors, those of the times that most have.
 
-    Columns are named by what they are (UA, P, U1 angle), with the circuit where there are several. Raises `UserError`
-    for a file without logs.
+    Columns are named by what they are (UA, P, U1 angle), with the circuit where there are several.
+    Raises `UserError` for a file without logs.
     """
     remarks = Remarks(str(path))
     content = read_observations(path, encoding, [LOG, PHASOR], remarks)
@@ -186,7 +246,8 @@ def table(path: Path, encoding: str | None = None) -> Rows:
     stretches = _logs(content, names)
     if not stretches:
         raise UserError(
-            f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms are read by "
+            f"{path}: there are no logs of RMS values or powers in this PQDIF file; its waveforms"
+            " are read by "
             f"data=pqdif data.path={path}"
         )
     fullest = _fullest(stretches, remarks)
@@ -196,7 +257,9 @@ def table(path: Path, encoding: str | None = None) -> Rows:
 
 
 def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]:
-    """The logs of each observation by their times; `names` learns what each column is called, and its unit."""
+    """The logs of each observation by their times; `names` learns what each column is called, and
+    its unit.
+    """
     stretches: dict[tuple[float, ...], Stretch] = {}
     circuits = {i.channel.circuit for o in content.observations for i in o.instances}
     numbers: dict[tuple[int, int], int] = {}
@@ -209,14 +272,22 @@ def _logs(content: Observed, names: dict[int, tuple[str, str]]) -> list[Stretch]
                 if not name or len(one.t) < 2:
                     continue
                 number = numbers.setdefault((one.channel.number, k), len(numbers))
-                name = f"{one.channel.circuit} {name}" if len(circuits) > 1 and one.channel.circuit else name
+                name = (
+                    f"{one.channel.circuit} {name}"
+                    if len(circuits) > 1 and one.channel.circuit
+                    else name
+                )
                 names[number] = (name, UNITS[definition.unit])
-                stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[number] = column
+                stretches.setdefault(_key(begin, one.t), Stretch(begin + one.t, {})).columns[
+                    number
+                ] = column
     return sorted(stretches.values(), key=lambda stretch: stretch.t[0])
 
 
 def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value: bool) -> str:
-    """What a logged series is called, by quantity and phase; "" for a least or greatest value, and other quantities."""
+    """What a logged series is called, by quantity and phase; "" for a least or greatest value, and
+    other quantities.
+    """
     unit = UNITS.get(definition.unit, "")
     phase = SEQUENCES.get(definition.characteristic, channel.phase)
     mark = PHASES.get(phase, MEANS.get(phase, ""))
@@ -231,18 +302,27 @@ def _column(channel: ChannelDefinition, definition: SeriesDefinition, has_value:
     return f"{letter}{mark}" if definition.characteristic in (*PLAIN, *SEQUENCES) else ""
 
 
-def _longest(stretches: Sequence[Stretch], remarks: Remarks) -> tuple[np.ndarray, dict[int, np.ndarray]]:
-    """The longest of the logs that follow one another without a gap: times (N,), and values (N,) by column."""
+def _longest(
+    stretches: Sequence[Stretch], remarks: Remarks
+) -> tuple[np.ndarray, dict[int, np.ndarray]]:
+    """The longest of the logs that follow one another without a gap: times (N,), and values (N,) by
+    column.
+    """
     runs: list[list[Stretch]] = []
     for each in stretches:
         before = runs[-1][-1].t if runs else each.t
-        joined = runs and 0 < each.t[0] - before[-1] <= LOG_GAP_STEPS * float(np.median(np.diff(before)))
+        joined = runs and 0 < each.t[0] - before[-1] <= LOG_GAP_STEPS * float(
+            np.median(np.diff(before))
+        )
         if joined:
             runs[-1].append(each)
         else:
             runs.append([each])
     run = max(runs, key=lambda one: sum(len(each.t) for each in one))
     if len(runs) > 1:
-        remarks.add(f"{len(runs)} logs with gaps between them: the longest is read, from {run[0].t[0]:.3f} s")
+        remarks.add(
+            f"{len(runs)} logs with gaps between them: the longest is read, from {run[0].t[0]:.3f}"
+            " s"
+        )
     t = np.concatenate([each.t for each in run])
     return t, {k: np.concatenate([each.columns[k] for each in run]) for k in run[0].columns}

@@ -1,9 +1,12 @@
-"""The logical structure of a PQDIF file: what was observed, channel by channel, each a few series of values.
+"""The logical structure of a PQDIF file: what was observed, channel by channel, each a few series
+of values.
 
-A data source defines channels and their series; monitor settings give transformer ratios; an observation holds
-instances of channels, whose series are stored as they are, scaled, as counts of equal steps, or shared with another.
+A data source defines channels and their series; monitor settings give transformer ratios; an
+observation holds instances of channels, whose series are stored as they are, scaled, as counts of
+equal steps, or shared with another.
 
-Source: IEEE Std 1159.3-2019 (and -2003), clause on the logical structure; the GUIDs are the standard's.
+Source: IEEE Std 1159.3-2019 (and -2003), clause on the logical structure; the GUIDs are the
+standard's.
 """
 
 import math
@@ -19,17 +22,35 @@ from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.pqdif_records import Collection, records, tag
 from tractexp.filetypes.remarks import Remarks
 
-SOURCE, OBSERVATION = tag("89738619-f1c3-11cf-9d89-0080c72e70a3"), tag("8973861a-f1c3-11cf-9d89-0080c72e70a3")
+SOURCE, OBSERVATION = (
+    tag("89738619-f1c3-11cf-9d89-0080c72e70a3"),
+    tag("8973861a-f1c3-11cf-9d89-0080c72e70a3"),
+)
 SETTINGS = tag("b48d858c-f5f5-11cf-9d89-0080c72e70a3")
 # of a data source
-SOURCE_NAME, CHANNELS = tag("b48d8587-f5f5-11cf-9d89-0080c72e70a3"), tag("b48d858d-f5f5-11cf-9d89-0080c72e70a3")
-CHANNEL, NUMBER = tag("b48d858e-f5f5-11cf-9d89-0080c72e70a3"), tag("b48d858f-f5f5-11cf-9d89-0080c72e70a3")
-NAME, PHASE = tag("b48d8590-f5f5-11cf-9d89-0080c72e70a3"), tag("b48d8591-f5f5-11cf-9d89-0080c72e70a3")
-GROUP, KIND = tag("b48d8594-f5f5-11cf-9d89-0080c72e70a3"), tag("b48d8592-f5f5-11cf-9d89-0080c72e70a3")
+SOURCE_NAME, CHANNELS = (
+    tag("b48d8587-f5f5-11cf-9d89-0080c72e70a3"),
+    tag("b48d858d-f5f5-11cf-9d89-0080c72e70a3"),
+)
+CHANNEL, NUMBER = (
+    tag("b48d858e-f5f5-11cf-9d89-0080c72e70a3"),
+    tag("b48d858f-f5f5-11cf-9d89-0080c72e70a3"),
+)
+NAME, PHASE = (
+    tag("b48d8590-f5f5-11cf-9d89-0080c72e70a3"),
+    tag("b48d8591-f5f5-11cf-9d89-0080c72e70a3"),
+)
+GROUP, KIND = (
+    tag("b48d8594-f5f5-11cf-9d89-0080c72e70a3"),
+    tag("b48d8592-f5f5-11cf-9d89-0080c72e70a3"),
+)
 SERIES_DEFINITIONS = tag("b48d8598-f5f5-11cf-9d89-0080c72e70a3")
 SERIES_DEFINITION = tag("b48d859a-f5f5-11cf-9d89-0080c72e70a3")
 QUANTITY, QUANTITIES = tag("c690e872-f755-11cf-9d89-0080c72e70a3"), {1: "U", 2: "I", 3: "P"}
-UNIT, VALUE = tag("b48d859b-f5f5-11cf-9d89-0080c72e70a3"), tag("b48d859c-f5f5-11cf-9d89-0080c72e70a3")
+UNIT, VALUE = (
+    tag("b48d859b-f5f5-11cf-9d89-0080c72e70a3"),
+    tag("b48d859c-f5f5-11cf-9d89-0080c72e70a3"),
+)
 CHARACTERISTIC = tag("3d786f9e-f76e-11cf-9d89-0080c72e70a3")
 STORAGE = tag("b48d85a1-f5f5-11cf-9d89-0080c72e70a3")
 # of monitor settings
@@ -39,7 +60,9 @@ FREQUENCY = tag("0fa118c3-cb4a-11d2-b30b-fe25cb9a1760")
 PRIMARY, SECONDARY = (tag(f"62f2818{digit}-f9c4-11cf-9d89-0080c72e70a3") for digit in "ab")
 # of an observation
 START, TRIGGERED = (tag(f"3d786f8{digit}-f76e-11cf-9d89-0080c72e70a3") for digit in "ce")
-INSTANCES, INSTANCE, SERIES, ONE_SERIES = (tag(f"3d786f9{n}-f76e-11cf-9d89-0080c72e70a3") for n in range(1, 5))
+INSTANCES, INSTANCE, SERIES, ONE_SERIES = (
+    tag(f"3d786f9{n}-f76e-11cf-9d89-0080c72e70a3") for n in range(1, 5)
+)
 SCALE, OFFSET, VALUES = (tag(f"3d786f9{n}-f76e-11cf-9d89-0080c72e70a3") for n in (6, 7, 9))
 SHARED_CHANNEL = tag("8973861f-f1c3-11cf-9d89-0080c72e70a3")
 SHARED_SERIES = tag("89738620-f1c3-11cf-9d89-0080c72e70a3")
@@ -49,14 +72,17 @@ TIME = tag("c690e862-f755-11cf-9d89-0080c72e70a3")
 SCALED, STEPPED = 2, 4  # bits of how a series is stored
 MOMENTS, SECONDS, CYCLES = 1, 2, 3  # units of times
 DAY_SECONDS = 86400.0  # s
-USUAL_FREQUENCY = 60.0  # Hz, where the file does not say it: most who write PQDIF are in North America
+# Hz, where the file does not say it: most who write PQDIF are in North America
+USUAL_FREQUENCY = 60.0
 MOST_UNPACKED_VALUES = 30_000_000  # values that are unpacked: a few bytes may stand for many
 MOST_STEPPED = 1_000_000  # of which one series of equal steps has, where no other one is as long
 
 
 @dataclass(frozen=True)
 class SeriesDefinition:
-    """What a series of a channel is: what its values are of the quantity, its unit (a number of the standard)."""
+    """What a series of a channel is: what its values are of the quantity, its unit (a number of the
+    standard).
+    """
 
     value: bytes
     unit: int
@@ -79,7 +105,9 @@ class ChannelDefinition:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """What an observation holds of a channel: times (N,) [s] since `Observation.start`, and series with N values."""
+    """What an observation holds of a channel: times (N,) [s] since `Observation.start`, and series
+    with N values.
+    """
 
     channel: ChannelDefinition
     t: np.ndarray
@@ -101,9 +129,14 @@ def seconds(moment: tuple[int, float], since: tuple[int, float]) -> float:
 
 
 def read_observations(
-    path: Path, encoding: str | None, kinds: Sequence[bytes], remarks: Remarks, most: float = math.inf
+    path: Path,
+    encoding: str | None,
+    kinds: Sequence[bytes],
+    remarks: Remarks,
+    most: float = math.inf,
 ) -> "Observed":
-    """The channels of some kinds, as far as they have times, of the first `most` observations that have any.
+    """The channels of some kinds, as far as they have times, of the first `most` observations that
+    have any.
 
     Raises `UserError` for what is no PQDIF file, and for a damaged one, with the record.
     """
@@ -122,7 +155,8 @@ def read_observations(
 
 
 class Observed:
-    """The content of a file: `observations`, the `station`, and the nominal `frequency` [Hz], 0 where none is said.
+    """The content of a file: `observations`, the `station`, and the nominal `frequency` [Hz], 0
+    where none is said.
 
     While the records are read, an observation belongs to the source and the settings before it.
     """
@@ -140,14 +174,20 @@ class Observed:
         for each in channels.collections(CHANNEL) if channels else ():
             listed = each.collection(SERIES_DEFINITIONS)
             series = [
-                SeriesDefinition(one.identifier(VALUE), int(one.number(UNIT)), one.identifier(CHARACTERISTIC),
-                                 int(one.number(STORAGE)))
+                SeriesDefinition(
+                    one.identifier(VALUE),
+                    int(one.number(UNIT)),
+                    one.identifier(CHARACTERISTIC),
+                    int(one.number(STORAGE)),
+                )
                 for one in (listed.collections(SERIES_DEFINITION) if listed else ())
-            ]  # fmt: skip
+            ]
             circuit = " ".join(each.texts(GROUP)) or (name if name != self.station else "")
             phase, kind = int(each.number(PHASE)), each.identifier(KIND)
             quantity = QUANTITIES.get(int(each.number(QUANTITY)), "")
-            definition = ChannelDefinition(self.count, each.text(NAME), phase, circuit, quantity, kind, tuple(series))
+            definition = ChannelDefinition(
+                self.count, each.text(NAME), phase, circuit, quantity, kind, tuple(series)
+            )
             self.definitions.append(definition)
             self.count += 1
 
@@ -164,16 +204,22 @@ class Observed:
     def observation(self, body: Collection) -> None:
         start, listed = body.moment(START), body.collection(INSTANCES)
         if start is None or listed is None:
-            self.remarks.add(f"{_record(body)}: an observation without start or channels is not read")
+            self.remarks.add(
+                f"{_record(body)}: an observation without start or channels is not read"
+            )
             return
         every = [_Stored(each) for each in listed.collections(INSTANCE)]
         times: dict[tuple[int, SeriesDefinition], np.ndarray | None] = {}
         instances = []
         for one in every:
             if not 0 <= one.number < len(self.definitions):
-                raise body.body.damaged(f"channel {one.number} is observed, and {len(self.definitions)} are defined")
+                raise body.body.damaged(
+                    f"channel {one.number} is observed, and {len(self.definitions)} are defined"
+                )
             channel = self.definitions[one.number]
-            if channel.kind in self.kinds and (instance := self._instance(channel, one.owners(every), start, times)):
+            if channel.kind in self.kinds and (
+                instance := self._instance(channel, one.owners(every), start, times)
+            ):
                 instances.append(instance)
         if instances:
             self.observations.append(Observation(start, body.moment(TRIGGERED), tuple(instances)))
@@ -185,7 +231,9 @@ class Observed:
         start: tuple[int, float],
         times: dict[tuple[int, SeriesDefinition], np.ndarray | None],
     ) -> Instance | None:
-        """One channel of an observation; None where it has no times. `times` are those of the channels before."""
+        """One channel of an observation; None where it has no times. `times` are those of the
+        channels before.
+        """
         pairs = [*zip(channel.series, stored, strict=False)]
         longest = max((one.length for d, one in pairs if not d.storage & STEPPED), default=0)
         clock = next(((d, one) for d, one in pairs if d.value == TIME), None)
@@ -200,7 +248,12 @@ class Observed:
         for definition, one in pairs:
             values = None if definition.value == TIME else self._values(definition, one, longest)
             if values is not None and len(values) == len(t):
-                series.append((definition, values * self.ratios.get(channel.number - self.definitions[0].number, 1.0)))
+                series.append(
+                    (
+                        definition,
+                        values * self.ratios.get(channel.number - self.definitions[0].number, 1.0),
+                    )
+                )
             elif values is not None:
                 counts = f"{len(values)} values at {len(t)} times"
                 self.remarks.add(f"{_record(one.own)}: {channel.name} has {counts}: not read")
@@ -209,12 +262,16 @@ class Observed:
     def _times(
         self, definition: SeriesDefinition, one: "_Series", start: tuple[int, float], longest: int
     ) -> np.ndarray | None:
-        """Times (N,) [s] since the start of the observation; None where they are in no unit of time."""
+        """Times (N,) [s] since the start of the observation; None where they are in no unit of
+        time.
+        """
         raw = one.raw
         if raw is not None and raw.dtype.names:
             self._take(one, len(raw))
             with np.errstate(all="ignore"):
-                return DAY_SECONDS * (raw["day"].astype(float) - start[0]) + raw["second"] - start[1]
+                return (
+                    DAY_SECONDS * (raw["day"].astype(float) - start[0]) + raw["second"] - start[1]
+                )
         values = self._values(definition, one, longest)
         if values is None or definition.unit not in (SECONDS, CYCLES):
             return None
@@ -224,14 +281,18 @@ class Observed:
         self.remarks.add(f"times are in cycles, taken of {nominal:g} Hz")
         return values / nominal
 
-    def _values(self, definition: SeriesDefinition, one: "_Series", longest: int) -> np.ndarray | None:
+    def _values(
+        self, definition: SeriesDefinition, one: "_Series", longest: int
+    ) -> np.ndarray | None:
         """The values (N,) of a series in its unit; None where they are no real numbers."""
         raw = one.raw
         if raw is None or raw.dtype.kind not in "uif":
             return None
         with np.errstate(all="ignore"):
             if definition.storage & STEPPED:
-                values = self._stepped(one, raw.astype(float) if len(raw) <= longest + MOST_STEPPED else raw, longest)
+                values = self._stepped(
+                    one, raw.astype(float) if len(raw) <= longest + MOST_STEPPED else raw, longest
+                )
             else:
                 self._take(one, len(raw))
                 values = raw.astype(float)
@@ -246,9 +307,13 @@ class Observed:
         runs = int(raw[0]) if len(raw) and 0 <= raw[0] <= len(raw) / 2 else -1
         counts, steps = raw[1 : 1 + 2 * max(runs, 0) : 2], raw[2 : 2 + 2 * max(runs, 0) : 2]
         if runs < 0 or len(steps) < runs or not np.isfinite(raw).all() or (counts < 0).any():
-            raise one.own.body.damaged("a series of equal steps does not say how many there are of each")
+            raise one.own.body.damaged(
+                "a series of equal steps does not say how many there are of each"
+            )
         if (total := float(counts.sum())) > max(longest, MOST_STEPPED):
-            raise one.own.body.damaged(f"a series of equal steps has {total:.0f} of them, for {longest} values")
+            raise one.own.body.damaged(
+                f"a series of equal steps has {total:.0f} of them, for {longest} values"
+            )
         self._take(one, total)
         rises = np.repeat(steps, counts.astype(int))
         return np.concatenate([[0.0], np.cumsum(rises)[:-1]]) if len(rises) else rises
@@ -257,7 +322,8 @@ class Observed:
         self.room -= count
         if self.room < 0:
             raise UserError(
-                f"{one.own.body.where}: the file's series stand for more than {MOST_UNPACKED_VALUES:,} values; give a part of it, or "
+                f"{one.own.body.where}: the file's series stand for more than"
+                f" {MOST_UNPACKED_VALUES:,} values; give a part of it, or "
                 "the event that is meant, exported by the recorder's software"
             )
 
@@ -295,7 +361,10 @@ class _Stored:
         """Each series with the one whose values it has."""
         pairs = []
         for own in self.series:
-            channel, series = int(own.number(SHARED_CHANNEL, -1)), int(own.number(SHARED_SERIES, -1))
+            channel, series = (
+                int(own.number(SHARED_CHANNEL, -1)),
+                int(own.number(SHARED_SERIES, -1)),
+            )
             shared = 0 <= channel < len(every) and 0 <= series < len(every[channel].series)
             pairs.append(_Series(own, every[channel].series[series] if shared else own))
         return pairs

@@ -1,7 +1,9 @@
-"""The physical structure of a PQDIF file: records one after another, each a tree of tagged elements.
+"""The physical structure of a PQDIF file: records one after another, each a tree of tagged
+elements.
 
-A record has a header of 64 bytes, with the place of the next one, and a body, compressed or not, that begins with a
-collection: a count, and for each element its tag (a GUID), its kind, its type, and where in the body it lies.
+A record has a header of 64 bytes, with the place of the next one, and a body, compressed or not,
+that begins with a collection: a count, and for each element its tag (a GUID), its kind, its type,
+and where in the body it lies.
 
 Source: IEEE Std 1159.3-2019 (and -2003), clause on the physical structure.
 """
@@ -27,15 +29,28 @@ HEADER, ENTRY = struct.Struct("<16s16siiiI"), struct.Struct("<16sBBBxii")
 HEADER_BYTES = 64
 LARGEST = 256 * 2**20  # bytes of all bodies together, decompressed
 MOST_RECORDS = 100_000
-MOST_ELEMENTS = 200_000  # of one record: compressed zeros may announce millions, each of which takes memory
+# of one record: compressed zeros may announce millions, each of which takes memory
+MOST_ELEMENTS = 200_000
 LONGEST_TEXT = 400  # letters of a text that are read
 BYTE, COUNT = np.dtype("u1"), np.dtype("<i4")
 COLLECTION, SCALAR, VECTOR = 1, 2, 3  # kinds of elements
 MOMENT = np.dtype([("day", "<u4"), ("second", "<f8")])  # since 30 December 1899
 TYPES = {
-    1: "<u1", 2: "<u2", 3: "<u4", 10: "S1", 20: "<i1", 21: "<i2", 22: "<i4", 30: "<u1", 31: "<u2", 32: "<u4",
-    40: "<f4", 41: "<f8", 50: MOMENT, 60: "V16",
-}  # fmt: skip
+    1: "<u1",
+    2: "<u2",
+    3: "<u4",
+    10: "S1",
+    20: "<i1",
+    21: "<i2",
+    22: "<i4",
+    30: "<u1",
+    31: "<u2",
+    32: "<u4",
+    40: "<f4",
+    41: "<f8",
+    50: MOMENT,
+    60: "V16",
+}
 ZLIB, PER_RECORD = 1, 2  # of the container's compression: the algorithm, the style
 
 
@@ -50,7 +65,9 @@ STYLE, ALGORITHM = (tag(f"8973861{digit}-f1c3-11cf-9d89-0080c72e70a3") for digit
 
 @dataclass(eq=False)
 class Body:
-    """The bytes of a record's body; `where` names file and record, `entries` counts the elements that were read."""
+    """The bytes of a record's body; `where` names file and record, `entries` counts the elements
+    that were read.
+    """
 
     data: bytes
     where: str
@@ -58,24 +75,36 @@ class Body:
     entries: int = 0
 
     def part(self, at: int, count: int, dtype: np.dtype = BYTE) -> np.ndarray:
-        """A view of `count` values from a byte on. Raises `UserError` where the body has none there."""
+        """A view of `count` values from a byte on. Raises `UserError` where the body has none
+        there.
+        """
         if at < 0 or count < 0 or at + count * dtype.itemsize > len(self.data):
-            raise self.damaged(f"an element of {count} values lies at byte {at} of a body of {len(self.data)}")
+            raise self.damaged(
+                f"an element of {count} values lies at byte {at} of a body of {len(self.data)}"
+            )
         return np.frombuffer(self.data, dtype, count, at) if count else np.empty(0, dtype)
 
     def damaged(self, why: str) -> UserError:
-        return UserError(f"{self.where}: {why}: the file is damaged; get it from the recorder again")
+        return UserError(
+            f"{self.where}: {why}: the file is damaged; get it from the recorder again"
+        )
 
 
 class Collection:
-    """The elements of a collection by their tags; what is not there, or of another kind, is None or empty."""
+    """The elements of a collection by their tags; what is not there, or of another kind, is None or
+    empty.
+    """
 
     def __init__(self, body: Body, at: int) -> None:
-        """Raises `UserError` for what is no collection, and where more elements are read than the body can hold."""
+        """Raises `UserError` for what is no collection, and where more elements are read than the
+        body can hold.
+        """
         count = int(body.part(at, 1, COUNT)[0])
         body.entries += max(count, 0)
         if count < 0 or body.entries * ENTRY.size > len(body.data) or body.entries > MOST_ELEMENTS:
-            raise body.damaged(f"a collection at byte {at} has {count} elements, more than fit into the record")
+            raise body.damaged(
+                f"a collection at byte {at} has {count} elements, more than fit into the record"
+            )
         self.body = body
         self.entries = list(ENTRY.iter_unpack(body.part(at + 4, count * ENTRY.size).tobytes()))
         self.at = at
@@ -101,7 +130,11 @@ class Collection:
 
     def texts(self, name: bytes) -> list[str]:
         """The texts of one tag, without what follows their end."""
-        texts = [v[:LONGEST_TEXT].tobytes().partition(b"\0")[0] for v in self.vectors(name) if v.dtype.kind == "S"]
+        texts = [
+            v[:LONGEST_TEXT].tobytes().partition(b"\0")[0]
+            for v in self.vectors(name)
+            if v.dtype.kind == "S"
+        ]
         return [decode(each, self.body.where, self.body.encoding)[0].strip() for each in texts]
 
     def text(self, name: bytes) -> str:
@@ -113,7 +146,8 @@ class Collection:
             if each != name or kind != SCALAR or type_ not in TYPES:
                 continue
             dtype = np.dtype(TYPES[type_])
-            own = self.at + 4 + ENTRY.size * k + 20  # a value of up to eight bytes stands in place of the link
+            # a value of up to eight bytes stands in place of the link
+            own = self.at + 4 + ENTRY.size * k + 20
             inside = embedded and dtype.itemsize <= 8
             return self.body.part(own if inside else link, 1, dtype)[0]
         return None
@@ -128,7 +162,11 @@ class Collection:
     def identifier(self, name: bytes) -> bytes:
         """A scalar that is a GUID; b"" where there is none."""
         value = self.scalar(name)
-        return b"" if value is None or value.dtype.kind != "V" or value.dtype.names else value.tobytes()
+        return (
+            b""
+            if value is None or value.dtype.kind != "V" or value.dtype.names
+            else value.tobytes()
+        )
 
     def moment(self, name: bytes) -> tuple[int, float] | None:
         """A scalar that is a time: the day since 30 December 1899, and the second of it."""
@@ -138,34 +176,47 @@ class Collection:
         return int(value["day"]), float(value["second"])
 
 
-def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tuple[bytes, Collection]]:
-    """(tag, body's collection) of each record after the container. Raises `UserError` for what is no PQDIF file.
+def records(
+    path: Path, encoding: str | None, remarks: Remarks
+) -> Iterator[tuple[bytes, Collection]]:
+    """(tag, body's collection) of each record after the container. Raises `UserError` for what is
+    no PQDIF file.
 
     Remarks tell what no link between the records reaches.
     """
     data = files.read(path)
     if not data.startswith(SIGNATURE):
-        raise UserError(f"{path}: this is no PQDIF file: it does not begin with the signature of a PQDIF record")
+        raise UserError(
+            f"{path}: this is no PQDIF file: it does not begin with the signature of a PQDIF record"
+        )
     at, count, compressed, room, following = 0, 0, False, LARGEST, 0
     reached: dict[int, int] = {}
     while count < MOST_RECORDS:
         count += 1
         where = f"{path}: record {count}"
         if at + HEADER_BYTES > len(data):
-            remarks.add(f"the file ends before record {count}: it is not whole; what comes before is read")
+            remarks.add(
+                f"the file ends before record {count}: it is not whole; what comes before is read"
+            )
             return
         signature, kind, header, size, following, checksum = HEADER.unpack_from(data, at)
         if signature != SIGNATURE or header < HEADER_BYTES or size < 0:
-            raise UserError(f"{where}: byte {at} is no header of a record: the file is damaged; get it again")
+            raise UserError(
+                f"{where}: byte {at} is no header of a record: the file is damaged; get it again"
+            )
         content = data[at + header : at + header + size]
         if len(content) < size:
-            remarks.add(f"the file ends within record {count}: it is not whole; what comes before is read")
+            remarks.add(
+                f"the file ends within record {count}: it is not whole; what comes before is read"
+            )
             return
         reached[at] = at + header + size
         body = _decompress_body(content, room, where) if compressed else content
         room -= len(body)
         if checksum and checksum not in _checksums(content, body):
-            remarks.add(f"record {count}: the checksum does not fit: it was altered, or damaged on its way")
+            remarks.add(
+                f"record {count}: the checksum does not fit: it was altered, or damaged on its way"
+            )
         if size:
             collection = Collection(Body(body, where, encoding), 0)
             if kind == CONTAINER:
@@ -176,21 +227,29 @@ def records(path: Path, encoding: str | None, remarks: Remarks) -> Iterator[tupl
             break
         at = following
     if following > len(data):
-        remarks.add(f"the file ends before record {count + 1}: it is not whole; what comes before is read")
+        remarks.add(
+            f"the file ends before record {count + 1}: it is not whole; what comes before is read"
+        )
     elif following > 0 and following in reached:
-        remarks.add(f"record {count} links back to byte {following}, a record that was read: a link is damaged")
+        remarks.add(
+            f"record {count} links back to byte {following}, a record that was read: a link is"
+            " damaged"
+        )
     _tell_unreached(data, reached, remarks)
 
 
 def _checksums(content: bytes, body: bytes) -> Iterator[int]:
-    """What writers take for the checksum of a record: Adler-32 or CRC-32, of its body compressed or not."""
+    """What writers take for the checksum of a record: Adler-32 or CRC-32, of its body compressed or
+    not.
+    """
     for data in (content, body):
         yield zlib.adler32(data)
         yield zlib.crc32(data)
 
 
 def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -> None:
-    """Remark on bytes that belong to no record that was read; `reached` {first byte of a record: its end}.
+    """Remark on bytes that belong to no record that was read; `reached` {first byte of a record:
+    its end}.
 
     Zeros fill a file up. Other bytes are records that a damaged link, or a deleted one, leaves out.
     """
@@ -200,7 +259,8 @@ def _tell_unreached(data: bytes, reached: Mapping[int, int], remarks: Remarks) -
             found = between.count(SIGNATURE)
             what = count_noun(found, "record") if found else f"{len(between)} bytes"
             remarks.add(
-                f"no link leads to {what} from byte {end} on: they are not read; where the recorder did not delete "
+                f"no link leads to {what} from byte {end} on: they are not read; where the recorder"
+                " did not delete "
                 "them, a link is damaged: get the file again"
             )
         end = max(end, stop)
@@ -213,8 +273,10 @@ def _compression(container: Collection, where: str) -> bool:
         return False
     if (style, algorithm) != (PER_RECORD, ZLIB):
         raise UserError(
-            f"{where}: compression style {style:g}, algorithm {algorithm:g}; read are {PER_RECORD} (each record) with "
-            f"{ZLIB} (zlib), and no compression: save the file as PQDIF 1.5 with the recorder's software"
+            f"{where}: compression style {style:g}, algorithm {algorithm:g}; read are {PER_RECORD}"
+            " (each record) with "
+            f"{ZLIB} (zlib), and no compression: save the file as PQDIF 1.5 with the recorder's"
+            " software"
         )
     return True
 
@@ -224,11 +286,16 @@ def _decompress_body(content: bytes, room: int, where: str) -> bytes:
     try:
         body = inflate.decompress(content, room + 1)
     except zlib.error as error:
-        raise UserError(f"{where}: its compressed body is damaged; get the file from the recorder again") from error
+        raise UserError(
+            f"{where}: its compressed body is damaged; get the file from the recorder again"
+        ) from error
     if len(body) > room:
         raise UserError(
-            f"{where}: the file's records hold more than {LARGEST / 1e6:.0f} MB decompressed; give a part of it"
+            f"{where}: the file's records hold more than {LARGEST / 1e6:.0f} MB decompressed; give"
+            " a part of it"
         )
     if not inflate.eof:
-        raise UserError(f"{where}: its compressed body ends too early; get the file from the recorder again")
+        raise UserError(
+            f"{where}: its compressed body ends too early; get the file from the recorder again"
+        )
     return body

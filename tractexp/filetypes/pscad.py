@@ -1,6 +1,8 @@
-"""Results of PSCAD/EMTDC: `.out` files of a title and columns of numbers, named by the `.inf` file of their case.
+"""Results of PSCAD/EMTDC: `.out` files of a title and columns of numbers, named by the `.inf` file
+of their case.
 
-A file has the time and at most ten channels; a case of more has `case_01.out`, `case_02.out` and so on.
+A file has the time and at most ten channels; a case of more has `case_01.out`, `case_02.out` and so
+on.
 
 Source: PSCAD's manual, EMTDC output files.
 """
@@ -28,30 +30,46 @@ class Results(TableFile):
     """The channels of a case, from all of its files, beside one time."""
 
     def __init__(self, source: str, parts: list[TextTable], names: list[tuple[str, str]]) -> None:
-        """`names` are those of the channels with their units. Raises `UserError` where they are not as many."""
+        """`names` are those of the channels with their units. Raises `UserError` where they are not
+        as many.
+        """
         self.source, self.parts = source, parts
         self.columns = [(part, k) for part in parts for k in range(1, part.width)]
         if len(names) != len(self.columns):
             raise UserError(
-                f"{source}: its .inf file names {len(names)} channels, and the .out files have {len(self.columns)}; "
+                f"{source}: its .inf file names {len(names)} channels, and the .out files have"
+                f" {len(self.columns)}; "
                 "keep those of one run in a folder"
             )
-        self.heading = TableHeading(("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0)
+        self.heading = TableHeading(
+            ("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0
+        )
         rows = zip(*(part.sample for part in parts), strict=False)
         self.sample = [[row[0][0], *(cell for cells in row for cell in cells[1:])] for row in rows]
-        self.notes = (*parts[0].notes, f"channels named by the .inf file, of {len(parts)} .out file(s)")
+        self.notes = (
+            *parts[0].notes,
+            f"channels named by the .inf file, of {len(parts)} .out file(s)",
+        )
 
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
         cells: dict[int, TableColumn] = {}
         for part in self.parts:
             first = part is self.parts[0]  # whose time is that of all
-            own = {k: kind for k, kind in wanted.items() if (self.columns[k - 1][0] is part if k else first)}
-            columns = part.read({0: "time", **{self.columns[k - 1][1]: kind for k, kind in own.items() if k}})
+            own = {
+                k: kind
+                for k, kind in wanted.items()
+                if (self.columns[k - 1][0] is part if k else first)
+            }
+            columns = part.read(
+                {0: "time", **{self.columns[k - 1][1]: kind for k, kind in own.items() if k}}
+            )
             cells |= {k: columns[self.columns[k - 1][1] if k else 0] for k in own}
         lengths = {len(one.values) for one in cells.values()}
         if len(lengths) > 1:
             counts = " and ".join(map(str, sorted(lengths)))
-            raise UserError(f"{self.source}: its .out files have {counts} rows: they are not of one run")
+            raise UserError(
+                f"{self.source}: its .out files have {counts} rows: they are not of one run"
+            )
         return cells
 
     def place(self, row: int) -> str:
@@ -59,7 +77,9 @@ class Results(TableFile):
 
 
 def table(path: Path, form: TableForm) -> Results:
-    """The results that a `.out` file is part of; raises `UserError` where no `.inf` file names its channels."""
+    """The results that a `.out` file is part of; raises `UserError` where no `.inf` file names its
+    channels.
+    """
     files.check_there(path)
     number = _NUMBERED.fullmatch(path.stem)
     case = number[1] if number else path.stem
@@ -67,15 +87,23 @@ def table(path: Path, form: TableForm) -> Results:
     names = next((each for each in beside if each.name.lower() == f"{case}.inf".lower()), None)
     if names is None:
         raise UserError(
-            f"{path} is a simulator's output without names: PSCAD writes them to {case}.inf beside it, which is not "
+            f"{path} is a simulator's output without names: PSCAD writes them to {case}.inf beside"
+            " it, which is not "
             "there; export that of another simulator as .csv"
         )
     parts = [
-        each for each in beside
+        each
+        for each in beside
         if each.suffix.lower() == ENDING
-        and (each == path if number is None else (m := _NUMBERED.fullmatch(each.stem)) is not None and m[1] == case)
-    ]  # fmt: skip
-    return Results(str(path), [_columns(each, form) for each in parts], _names(names, form.encoding))
+        and (
+            each == path
+            if number is None
+            else (m := _NUMBERED.fullmatch(each.stem)) is not None and m[1] == case
+        )
+    ]
+    return Results(
+        str(path), [_columns(each, form) for each in parts], _names(names, form.encoding)
+    )
 
 
 def _columns(path: Path, form: TableForm) -> TextTable:
@@ -90,11 +118,18 @@ def _names(path: Path, encoding: str | None) -> list[tuple[str, str]]:
     every: dict[int, tuple[str, str]] = {}
     for match in _CHANNEL.finditer(text):
         fields = dict(_FIELD.findall(match[2]))
-        every[int(match[1])] = (_name(fields.get("Desc", "").strip()), fields.get("Units", "").strip())
+        every[int(match[1])] = (
+            _name(fields.get("Desc", "").strip()),
+            fields.get("Units", "").strip(),
+        )
     return [every[number] for number in sorted(every)]
 
 
 def _name(text: str) -> str:
     """A channel's name; an element of a vector by its phase: Va of Vabc:1."""
     match = _PHASE.fullmatch(text)
-    return text if match is None else f"{match[1] or match[3] or ''}{'abc'[int(match[2] or match[4]) - 1]}"
+    return (
+        text
+        if match is None
+        else f"{match[1] or match[3] or ''}{'abc'[int(match[2] or match[4]) - 1]}"
+    )

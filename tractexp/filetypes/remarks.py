@@ -2,7 +2,9 @@
 
 
 class Remarks:
-    """Notes about one file, in the order in which they came up; the same words about several lines are one note."""
+    """Notes about one file, in the order in which they came up; the same words about several lines
+    are one note.
+    """
 
     def __init__(self, where: str) -> None:
         self.where = where
@@ -14,7 +16,9 @@ class Remarks:
 
     def notes(self) -> tuple[str, ...]:
         """One sentence for each remark, with its lines."""
-        return tuple(f"{self.where}{_places(lines)}: {words}" for words, lines in self._lines.items())
+        return tuple(
+            f"{self.where}{_places(lines)}: {words}" for words, lines in self._lines.items()
+        )
 
 
 def _places(lines: list[int]) -> str:

@@ -1,4 +1,6 @@
-"""The JSON beside a table: its name, where it is from, its base and units, and what its columns are."""
+"""The JSON beside a table: its name, where it is from, its base and units, and what its columns
+are.
+"""
 
 import json
 from collections.abc import Mapping
@@ -14,7 +16,9 @@ from tractexp.record.window import Window
 
 @dataclass(frozen=True)
 class Sidecar:
-    """What `name.json` beside `name.csv` says; each key is optional, and other keys are the user's own."""
+    """What `name.json` beside `name.csv` says; each key is optional, and other keys are the user's
+    own.
+    """
 
     name: str | None = None
     notes: tuple[str, ...] = ()
@@ -28,7 +32,9 @@ class Sidecar:
 
 
 def read_sidecar(path: str) -> Sidecar:
-    """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is no JSON."""
+    """The sidecar of a table, an empty one where there is none; raises `UserError` for one that is
+    no JSON.
+    """
     own = locate_file(path)
     if own.suffix.lower() == ".json" or not files.there(own):
         return Sidecar()
@@ -74,9 +80,14 @@ def _base(file: Any, content: Any) -> Base | None:
     numbers = {key: content[key] for key in ("voltage", "power", "frequency") if key in content}
     for key, value in numbers.items():
         low, high = SIZES[key]
-        if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        if (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not low <= value <= high
+        ):
             raise UserError(
-                f"{file}: base.{key} = {json.dumps(value):.60} must be a number from {low:g} to {high:g} (kV, MVA, Hz)"
+                f"{file}: base.{key} = {json.dumps(value):.60} must be a number from {low:g} to"
+                f" {high:g} (kV, MVA, Hz)"
             )
     origin = LOAD if content.get("origin") == LOAD else DECLARATION  # as task=convert writes it
     return Base(**{key: float(value) for key, value in numbers.items()}, origin=origin)

@@ -1,4 +1,6 @@
-"""Tables of any shape: text, Parquet, Excel. What columns they have, and the numbers in those that are wanted."""
+"""Tables of any shape: text, Parquet, Excel. What columns they have, and the numbers in those that
+are wanted.
+"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
@@ -22,12 +24,18 @@ from tractexp.filetypes.workbook import BadWorkbook, Workbook
 SPREADSHEETS = (b"PK\x03\x04", b"\xd0\xcf\x11\xe0")  # how .xlsx, .ods and .xls begin
 PARQUET = b"PAR1"
 ENDINGS = (".csv", ".txt", ".tsv", ".parquet", ".pq", ".xlsx", ".xls", ".xlsb", ".ods", ".out")
-MOST_TABLE_VALUES = 200_000_000  # values of a table: a few bytes of a Parquet file may stand for millions
+# values of a table: a few bytes of a Parquet file may stand for millions
+MOST_TABLE_VALUES = 200_000_000
 FOREIGN = {  # how files begin that are no table, whatever they are called
-    b"%PDF": "a PDF file", b"\x89PNG": "a picture", b"\x1f\x8b": "compressed; unpack it first", b"{": "JSON",
-    b"\x89HDF": "an HDF5 file", b"SQLite": "a database", b"<": "XML or HTML; save the table as CSV",
+    b"%PDF": "a PDF file",
+    b"\x89PNG": "a picture",
+    b"\x1f\x8b": "compressed; unpack it first",
+    b"{": "JSON",
+    b"\x89HDF": "an HDF5 file",
+    b"SQLite": "a database",
+    b"<": "XML or HTML; save the table as CSV",
     b"MATLAB": "a MATLAB file",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True)
@@ -47,13 +55,16 @@ class TableForm:
 
 @dataclass(frozen=True, eq=False)
 class TableColumn:
-    """The values (N,) of one column; of times, s since the first, with its date where the cells have one."""
+    """The values (N,) of one column; of times, s since the first, with its date where the cells
+    have one.
+    """
 
     values: np.ndarray
     start: datetime | None = None
     clock: bool = False  # times of day or dates, not seconds
     begin: float = 0.0  # of a clock's times: the second of the day of the first
-    remarks: tuple[tuple[int, str], ...] = ()  # (row from 0, words) of what was mended in a clock's times
+    # (row from 0, words) of what was mended in a clock's times
+    remarks: tuple[tuple[int, str], ...] = ()
 
 
 class TableFile(ABC):
@@ -68,7 +79,8 @@ class TableFile(ABC):
 
     @abstractmethod
     def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
-        """Columns by number; `wanted` says of each "time", "number" or "gaps" (a number that may be missing).
+        """Columns by number; `wanted` says of each "time", "number" or "gaps" (a number that may be
+        missing).
 
         Raises `UserError` naming the place and the cell.
         """
@@ -80,7 +92,9 @@ class TableFile(ABC):
     def numbers(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """The columns (N,) of some names; raises `UserError` for one that is not there."""
         if missing := [name for name in names if name not in self.heading.names]:
-            raise UserError(f"{self.source}: its sidecar names a column '{missing[0]}', which is not there")
+            raise UserError(
+                f"{self.source}: its sidecar names a column '{missing[0]}', which is not there"
+            )
         wanted = {name: self.heading.names.index(name) for name in names}
         cells = self.read(dict.fromkeys(wanted.values(), "gaps")) if wanted else {}
         return {name: cells[number].values for name, number in wanted.items()}
@@ -95,7 +109,9 @@ class TableFile(ABC):
 
 @dataclass(eq=False)
 class Rows(TableFile):
-    """A table whose cells are at hand as Python's objects: a sheet, or columns of a Parquet file."""
+    """A table whose cells are at hand as Python's objects: a sheet, or columns of a
+    Parquet file.
+    """
 
     source: str
     heading: TableHeading
@@ -106,11 +122,27 @@ class Rows(TableFile):
     notes: tuple[str, ...] = field(default=())
 
     @classmethod
-    def of(cls, path: Path, columns: Sequence[tuple[str, str, np.ndarray]], first: int, notes: tuple[str, ...]) -> Self:
-        """A table of an instrument's samples, (name, unit, values) each column, the first one numbered `first`."""
+    def of(
+        cls,
+        path: Path,
+        columns: Sequence[tuple[str, str, np.ndarray]],
+        first: int,
+        notes: tuple[str, ...],
+    ) -> Self:
+        """A table of an instrument's samples, (name, unit, values) each column, the first one
+        numbered `first`.
+        """
         names, units, cells = zip(*columns, strict=True)
         sample = [list(row) for row in zip(*(c[:200].tolist() for c in cells), strict=True)]
-        return cls(str(path), TableHeading(names, units, 0, 0), cells.__getitem__, sample, first, "sample", notes)
+        return cls(
+            str(path),
+            TableHeading(names, units, 0, 0),
+            cells.__getitem__,
+            sample,
+            first,
+            "sample",
+            notes,
+        )
 
     def place(self, row: int) -> str:
         return f"{self.word} {self.first + row}"
@@ -119,7 +151,9 @@ class Rows(TableFile):
         columns = {}
         for number, kind in wanted.items():
             try:
-                columns[number] = column(self.columns(number), kind, ".", find_group_mark(self.sample, "."))
+                columns[number] = column(
+                    self.columns(number), kind, ".", find_group_mark(self.sample, ".")
+                )
             except BadCell as bad:
                 raise self.refuse(bad.row, number, bad.why) from None
         return columns
@@ -136,7 +170,8 @@ def column(cells: Sequence[Any], kind: str, decimal: str, group: str = "") -> Ta
 
 
 def instrument_of(path: Path | str) -> ModuleType | None:
-    """The module of the instrument whose file it is, by its beginning or ending; None for another file.
+    """The module of the instrument whose file it is, by its beginning or ending; None for another
+    file.
 
     It has `holds_waveforms`, and `table` for what else the instrument was set to record.
     """
@@ -146,7 +181,8 @@ def instrument_of(path: Path | str) -> ModuleType | None:
 
 
 def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
-    """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no table.
+    """Open a table by what the file holds, whatever its ending; raises `UserError` for what is no
+    table.
 
     Of a text not `whole` only the beginning is read: enough to know its columns.
     """
@@ -171,13 +207,22 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
 
 
 def content(path: str, limit: int | None = None) -> bytes:
-    """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole lines to a limit."""
+    """The bytes of a file, or of one inside an installed package (`pkg://package/file.csv`); whole
+    lines to a limit.
+    """
     file = locate_file(path)
     folder = file.parent
     if not files.there(file):
         if file.is_dir():
-            raise UserError(f"{path} is a folder, not a file; give a file in it, or task=survey data.path={path}")
-        names = [item.name for item in folder.iterdir() if not item.is_dir()] if folder.is_dir() else None
+            raise UserError(
+                f"{path} is a folder, not a file; give a file in it, or task=survey"
+                f" data.path={path}"
+            )
+        names = (
+            [item.name for item in folder.iterdir() if not item.is_dir()]
+            if folder.is_dir()
+            else None
+        )
         hint = "; that folder does not exist" if names is None else nearest(file.name, names)
         raise UserError(f"{path}: there is no such file in {folder}{hint}")
     data = files.read(file, limit)
@@ -191,12 +236,17 @@ def _parquet(path: str, data: bytes) -> TableFile:
     try:
         file = parquet.ParquetFile(pyarrow.BufferReader(data))
         if (values := file.metadata.num_rows * file.metadata.num_columns) > MOST_TABLE_VALUES:
-            raise UserError(f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be read; give a part of it")
+            raise UserError(
+                f"{path}: {values:,} values are more than the {MOST_TABLE_VALUES:,} that can be"
+                " read; give a part of it"
+            )
         parsed = file.read()
         names = [str(name) for name in parsed.column_names]
         columns = [_arrow(parsed.column(k)) for k in range(len(names))]
     except (pyarrow.ArrowException, OSError, ValueError) as error:
-        raise UserError(f"{path}: not a whole Parquet file; write it again, or give the table as CSV") from error
+        raise UserError(
+            f"{path}: not a whole Parquet file; write it again, or give the table as CSV"
+        ) from error
     parted = [split_unit(name) for name in names]
     head = TableHeading(tuple(name for name, _ in parted), tuple(unit for _, unit in parted), 0, 0)
     sample = [list(row) for row in zip(*(c[:200] for c in columns), strict=False)]
@@ -242,7 +292,11 @@ def _sheet_of(path: str, book: Workbook, form: TableForm) -> TableFile:
             refused.append(error)
             continue
         others = [other for other in names if other != name]
-        rows.notes = (f"sheet '{name}' read, not {', '.join(others)} (data.sheet=NAME chooses)",) if others else ()
+        rows.notes = (
+            (f"sheet '{name}' read, not {', '.join(others)} (data.sheet=NAME chooses)",)
+            if others
+            else ()
+        )
         return rows
     raise refused[0] if refused else UserError(f"{path}: the workbook has no sheets")
 
@@ -252,7 +306,9 @@ def _sheet_name(path: str, names: Sequence[str], sheet: str | int) -> str:
         return str(sheet)
     if str(sheet).isdigit() and 1 <= int(sheet) <= len(names):
         return names[int(sheet) - 1]
-    raise UserError(f"{DATA.sheet}={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}")
+    raise UserError(
+        f"{DATA.sheet}={sheet}: {path} has no such sheet{among(sheet, names, 'Sheets')}"
+    )
 
 
 def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
@@ -265,15 +321,20 @@ def _rows_of(path: str, book: Workbook, name: str, form: TableForm) -> Rows:
     source = f"{path}: sheet '{name}'"
     filled = [i for i, row in enumerate(rows) if any(cell not in ("", None) for cell in row)]
     if not filled:
-        raise UserError(f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q")
+        raise UserError(
+            f"{source} is empty; it must have a line naming the columns, such as t, U, P, Q"
+        )
     header = None if form.header is None else int(np.searchsorted(filled, form.header - 1))
     head = heading([_trim_row(rows[i]) for i in filled[:200]], source, header)
     body = filled[head.first :]
     last = body[-1] + 1
     return Rows(
-        source, head, lambda number: [rows[i][number] for i in range(body[0], last)],
-        [rows[i] for i in body[:200]], first=body[0] + 1,
-    )  # fmt: skip
+        source,
+        head,
+        lambda number: [rows[i][number] for i in range(body[0], last)],
+        [rows[i] for i in body[:200]],
+        first=body[0] + 1,
+    )
 
 
 def _trim_row(row: Sequence[Any]) -> list[Any]:

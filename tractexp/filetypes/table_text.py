@@ -1,7 +1,8 @@
-"""Tables written as text: encoding, delimiter, decimal mark and heading are detected; NumPy reads the numbers.
+"""Tables written as text: encoding, delimiter, decimal mark and heading are detected; NumPy reads
+the numbers.
 
-Where NumPy's reader refuses (times of day, words for gaps, quoted cells, a bad cell), the same rows are read cell by
-cell, which is slower and names the place.
+Where NumPy's reader refuses (times of day, words for gaps, quoted cells, a bad cell), the same rows
+are read cell by cell, which is slower and names the place.
 """
 
 import csv
@@ -28,7 +29,8 @@ LONGEST = 1 << 20  # bytes of a line
 LINE_END = b"\n"
 FEWEST_WHOLE = 3  # rows that a file keeps where its last line is left out
 BLOCK = 20_000  # rows read cell by cell at a time
-DELIMITERS = (";", "\t", "|", ",", " ")  # a comma may be a decimal mark, a space stand within a name: they come last
+# a comma may be a decimal mark, a space stand within a name: they come last
+DELIMITERS = (";", "\t", "|", ",", " ")
 HEADER_MARK = re.compile(r"^\s*(%|//|!)+")  # before the names, as in a comment of another language
 REMARK = re.compile(r"(^|\s)#(?!(N/?A|NV|VALUE!|NUM!|DIV/0!|REF!)\b).*", re.IGNORECASE)
 
@@ -36,15 +38,23 @@ REMARK = re.compile(r"(^|\s)#(?!(N/?A|NV|VALUE!|NUM!|DIV/0!|REF!)\b).*", re.IGNO
 class TextTable(TableFile):
     """A text file with rows of cells."""
 
-    def __init__(self, source: str, data: bytes, form: TableForm, notes: Sequence[str] = ()) -> None:
+    def __init__(
+        self, source: str, data: bytes, form: TableForm, notes: Sequence[str] = ()
+    ) -> None:
         """`data` is UTF-8. Raises `UserError` where it holds no table."""
         self.source, self.data = source, data
         lines = _lines(data[:HEAD], whole=len(data) <= HEAD)
         if not lines:
-            raise UserError(f"{source}: the file is empty; it must start with a line naming the columns t,U,P,Q")
+            raise UserError(
+                f"{source}: the file is empty; it must start with a line naming the columns t,U,P,Q"
+            )
         self.delimiter = _delimiter([text for _, text in lines])
         rows = [_cells(text, self.delimiter) for _, text in lines]
-        header = None if form.header is None else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
+        header = (
+            None
+            if form.header is None
+            else next((k for k, (n, _) in enumerate(lines) if n >= form.header), 0)
+        )
         self.heading = self._heading(rows, header)
         self.sample = rows[self.heading.first :]
         self.decimal = form.decimal or _decimal(self.sample)
@@ -52,13 +62,17 @@ class TextTable(TableFile):
         self.line = lines[self.heading.first][0]  # of the first row of values, from 1
         self.width = len(self.sample[0])
         self._lines: np.ndarray | None = None  # of the rows, where they were read cell by cell
-        grouped = [f"digits are taken as grouped by '{self.group}', decimals marked by '{self.decimal}'"]
+        grouped = [
+            f"digits are taken as grouped by '{self.group}', decimals marked by '{self.decimal}'"
+        ]
         self.notes = (*notes, *(grouped if self.group else []))
         self._drop_cut_line()
         self._check_width()
 
     def _heading(self, rows: Sequence[Sequence[str]], header: int | None) -> TableHeading:
-        """The heading; the last remark above the values where names stand in a comment, as NumPy writes them."""
+        """The heading; the last remark above the values where names stand in a comment, as NumPy
+        writes them.
+        """
         result = heading(rows, self.source, header)
         if result.line is not None or result.first:
             return result
@@ -74,31 +88,45 @@ class TextTable(TableFile):
         """Refuse rows of more cells than names, for cells and names cannot be matched."""
         named = len([name for name in self.heading.names if name])
         spare = [cell for cell in self.sample[0][len(self.heading.names) :] if cell]
-        split = self.width > named + 1 and self.width >= 1.5 * named  # at decimal commas, as it seems
+        # at decimal commas, as it seems
+        split = self.width > named + 1 and self.width >= 1.5 * named
         if self.heading.line is not None and (spare or split):
             raise UserError(
-                f"{self.source}: line {self.line} has {self.width} cells where the header line names {named} columns"
-                + ("; if the decimal mark is a comma, save the file with another delimiter, such as a semicolon"
-                   if self.delimiter == "," else "")
-            )  # fmt: skip
+                f"{self.source}: line {self.line} has {self.width} cells where the header line"
+                f" names {named} columns"
+                + (
+                    "; if the decimal mark is a comma, save the file with another delimiter, such"
+                    " as a semicolon"
+                    if self.delimiter == ","
+                    else ""
+                )
+            )
 
     def _drop_cut_line(self) -> None:
-        """Note a last line that may be cut within its last number, half of which would be read as the value.
+        """Note a last line that may be cut within its last number, half of which would be read as
+        the value.
 
-        It is whole where the file ends with a line end, or where its last cell has as many decimals as all others; it
-        is left out where that has fewer than any other.
+        It is whole where the file ends with a line end, or where its last cell has as many decimals
+        as all others; it is left out where that has fewer than any other.
         """
         head, line_end, last = self.data.rpartition(b"\n")
         rows = head.count(b"\n") + 1 - self.line
         if not line_end or not last.strip() or rows < FEWEST_WHOLE:
             return
-        before = head[-HEAD:].split(b"\n")[-SAMPLE:] if rows >= SAMPLE else head.split(b"\n")[self.line - 1 :]
+        before = (
+            head[-HEAD:].split(b"\n")[-SAMPLE:]
+            if rows >= SAMPLE
+            else head.split(b"\n")[self.line - 1 :]
+        )
         cells = [_cells(text.decode(errors="replace"), self.delimiter) for text in (last, *before)]
         counts = [_decimals(row[-1], self.decimal) for row in cells if len(row) == len(cells[0])]
         shorter = len(counts) > 1 and counts[0] < min(counts[1:])
         if len({*counts}) == 1 and counts[0] > 0:
             return
-        said = f"line {self.data.count(LINE_END) + 1}, the last one, has no line end and may be cut short"
+        said = (
+            f"line {self.data.count(LINE_END) + 1}, the last one, has no line end and may be cut"
+            " short"
+        )
         self.notes += (f"{said}: it is not used" if shorter else said,)
         self.data = head + line_end if shorter else self.data
 
@@ -154,7 +182,8 @@ class TextTable(TableFile):
         self._lines, lines, rows = None, np.empty(0, int), self._rows(max(wanted))
         while block := list(itertools.islice(rows, BLOCK)):
             before, lines = len(lines), np.append(lines, [line for line, _ in block])
-            bad: list[tuple[int, int, str]] = []  # of all columns alike, so that the first bad line is refused
+            # of all columns alike, so that the first bad line is refused
+            bad: list[tuple[int, int, str]] = []
             for number, kind in wanted.items():
                 cells = [row[number] for _, row in block]
                 if number in clock:
@@ -177,7 +206,9 @@ class TextTable(TableFile):
         return columns
 
     def _rows(self, last: int) -> Iterator[tuple[int, list[str]]]:
-        """The rows of cells with their lines; a last row that is cut short is skipped, with a note."""
+        """The rows of cells with their lines; a last row that is cut short is skipped,
+        with a note.
+        """
         short: tuple[int, int] | None = None
         for line, row in _parse_rows(self._body(), self.delimiter, self.source, self.line):
             if short is not None:
@@ -193,7 +224,8 @@ class TextTable(TableFile):
 
     def _ragged(self, line: int, cells: int) -> UserError:
         return UserError(
-            f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have {self.width}; a "
+            f"{self.source}: line {line} has {count_noun(cells, 'cell')} where the others have"
+            f" {self.width}; a "
             "gap in P or Q is written nan"
         )
 
@@ -206,12 +238,18 @@ def open_text(path: str, data: bytes, form: TableForm) -> TextTable:
     del text
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     if (nul := data.find(0)) >= 0:
-        raise UserError(f"{path}: byte {nul + 1} is zero: this is no text; give a table as CSV, Parquet or Excel")
+        raise UserError(
+            f"{path}: byte {nul + 1} is zero: this is no text; give a table as CSV, Parquet or"
+            " Excel"
+        )
     breaks = np.flatnonzero(np.frombuffer(data, dtype=np.uint8) == ord("\n"))
     lengths = np.diff(breaks, prepend=-1, append=len(data))
     if len(data) and lengths.max() > LONGEST:
         i = int(lengths.argmax())
-        raise UserError(f"{path}: line {i + 1} has {lengths[i]:,} characters; a row of a table has at most {LONGEST:,}")
+        raise UserError(
+            f"{path}: line {i + 1} has {lengths[i]:,} characters; a row of a table has at most"
+            f" {LONGEST:,}"
+        )
     return TextTable(path, data, form, [] if plain else [f"read as {codec} text"])
 
 
@@ -233,7 +271,9 @@ def _lines(head: bytes, whole: bool) -> list[tuple[int, str]]:
 
 
 def _delimiter(lines: Sequence[str]) -> str:
-    """What parts the cells: the mark that cuts most of the last lines into equally many values, two or more."""
+    """What parts the cells: the mark that cuts most of the last lines into equally many values, two
+    or more.
+    """
     tail = lines[len(lines) // 2 :][-50:]
 
     def alike(mark: str) -> tuple[float, int]:
@@ -248,7 +288,9 @@ def _delimiter(lines: Sequence[str]) -> str:
 
 
 def _decimals(cell: str, mark: str) -> int:
-    """How many characters stand behind a number's decimal mark, with its exponent; 0 where there is none."""
+    """How many characters stand behind a number's decimal mark, with its exponent; 0 where there is
+    none.
+    """
     return len(cell.strip().partition(mark)[2])
 
 
@@ -259,8 +301,12 @@ def _is_value(cell: str) -> bool:
 def _decimal(sample: Sequence[Sequence[str]]) -> str:
     """The decimal mark: a comma where more cells have one than a point."""
     cells = [cell for row in sample for cell in row]
-    commas = sum((is_number(cell, ",") and "," in cell) or group_mark(cell, ",") == "." for cell in cells)
-    points = sum((is_number(cell) and "." in cell) or group_mark(cell, ".") == "," for cell in cells)
+    commas = sum(
+        (is_number(cell, ",") and "," in cell) or group_mark(cell, ",") == "." for cell in cells
+    )
+    points = sum(
+        (is_number(cell) and "." in cell) or group_mark(cell, ".") == "," for cell in cells
+    )
     return "," if commas > points else "."
 
 
@@ -271,12 +317,17 @@ def _cells(line: str, delimiter: str) -> list[str]:
     if '"' not in line:
         return [cell.strip() for cell in line.split(delimiter)]
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])]
+        return [
+            cell.strip()
+            for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+        ]
     except csv.Error:
         return [cell.strip().strip('"') for cell in line.split(delimiter)]
 
 
-def _parse_rows(body: bytes, delimiter: str, source: str, begin: int) -> Iterator[tuple[int, list[str]]]:
+def _parse_rows(
+    body: bytes, delimiter: str, source: str, begin: int
+) -> Iterator[tuple[int, list[str]]]:
     """The rows of values with their lines, without blank lines and remarks."""
     text = io.TextIOWrapper(io.BytesIO(body), "utf-8")
     lines: Any = (REMARK.sub("", line) if "#" in line else line for line in text)
@@ -290,4 +341,6 @@ def _parse_rows(body: bytes, delimiter: str, source: str, begin: int) -> Iterato
                 yield begin + reader.line_num - 1, row
     except csv.Error as error:
         line = begin + reader.line_num - 1
-        raise UserError(f"{source}: line {line}: the cells cannot be separated; is a quote not closed?") from error
+        raise UserError(
+            f"{source}: line {line}: the cells cannot be separated; is a quote not closed?"
+        ) from error

@@ -10,7 +10,14 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.files import locate_file
 from tractexp.filetypes.columns import PER_UNIT, factor
-from tractexp.filetypes.mapping import LINES, PHASES, Mapped, MappedColumn, check_mapping, map_columns
+from tractexp.filetypes.mapping import (
+    LINES,
+    PHASES,
+    Mapped,
+    MappedColumn,
+    check_mapping,
+    map_columns,
+)
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
@@ -18,7 +25,8 @@ from tractexp.record.phasor import sequences
 from tractexp.recording.nominal_voltage import is_between_phases, off_nominal
 from tractexp.recording.snapshot import OTHER_FREQUENCY, nearest_nominal
 
-FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)  # the positive sequence of line voltages over that of phase voltages
+# the positive sequence of line voltages over that of phase voltages
+FORWARD = np.sqrt(3) * np.exp(1j * np.pi / 6)
 VOLTS = 1000.0  # a voltage without a unit that is above it is in V
 NEAR_ONE = (0.3, 3.0)  # and within these it is per unit
 LEAST_LIVE_VOLTAGE = 0.5  # of the median voltage: at less the frequency is noise
@@ -28,10 +36,14 @@ AGREES = 0.05  # of the apparent power, within which it is the product of voltag
 
 @dataclass(frozen=True, kw_only=True)
 class Tabular:
-    """The settings of readers of tables; what is not set is detected, and a note says how it was read."""
+    """The settings of readers of tables; what is not set is detected, and a note says how it was
+    read.
+    """
 
-    columns: dict[str, Any] = field(default_factory=dict)  # {U: name of a column, or its number from 0}
-    units: dict[str, str] = field(default_factory=dict)  # {U: kV, P: MW, t: ms} where the header does not have them
+    # {U: name of a column, or its number from 0}
+    columns: dict[str, Any] = field(default_factory=dict)
+    # {U: kV, P: MW, t: ms} where the header does not have them
+    units: dict[str, str] = field(default_factory=dict)
     decimal: str = ""  # decimal mark, "." or ","
     header: int | None = None  # line of the columns' names, from 1
     sheet: Any = None  # of a workbook, by name or number from 1
@@ -47,26 +59,36 @@ class Tabular:
         return TableForm(self.decimal, self.header, self.sheet, self.encoding)
 
     def table_of(self, path: str, sidecar: Sidecar) -> tuple[TableFile, Mapped]:
-        """A table and what its columns are; raises `UserError` for what is no table, or ambiguous."""
+        """A table and what its columns are; raises `UserError` for what is no table,
+        or ambiguous.
+        """
         table = open_table(path, self._form)
         columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
         return table, map_columns(table, columns, units, sidecar.more)
 
 
 def kind_of(path: str) -> str:
-    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is ambiguous."""
+    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is
+    ambiguous.
+    """
     try:
         sidecar, instrument = read_sidecar(path), instrument_of(locate_file(path))
-        if sidecar.recording is not None or (instrument and instrument.holds_waveforms(locate_file(path))):
+        if sidecar.recording is not None or (
+            instrument and instrument.holds_waveforms(locate_file(path))
+        ):
             return "waves"
-        return map_columns(open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units).kind
+        return map_columns(
+            open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units
+        ).kind
     except UserError:
         return "powers"  # whose reader says what is wrong
 
 
 @dataclass(frozen=True, eq=False)
 class Powers:
-    """Columns (N,) by the names of a record; U, P, Q, U2 in kV (line to line), MW, Mvar where `absolute` says so."""
+    """Columns (N,) by the names of a record; U, P, Q, U2 in kV (line to line), MW, Mvar where
+    `absolute` says so.
+    """
 
     columns: dict[str, np.ndarray]
     absolute: dict[str, bool | None]  # of U and of P; None where no unit says
@@ -75,11 +97,13 @@ class Powers:
     start: datetime | None = None  # the moment of t = 0, where the file says it
 
 
-def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool) -> Powers:
+def powers(
+    table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kilovolts: bool
+) -> Powers:
     """What a table of powers or of phasors holds.
 
-    `reverse` negates P and Q; `kilovolts` says that a voltage without a unit is in kV. Raises `UserError` for cells
-    that are no numbers, and for ambiguous units.
+    `reverse` negates P and Q; `kilovolts` says that a voltage without a unit is in kV. Raises
+    `UserError` for cells that are no numbers, and for ambiguous units.
     """
     if mapping.kind == "phasors":
         result = _of_phasors(table, mapping, nominal)
@@ -87,7 +111,8 @@ def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kil
         result = _of_powers(table, mapping, kilovolts)
     else:
         raise UserError(
-            f"{table.source} holds waveforms ({', '.join(c.label for c in mapping.columns.values())}), not powers; "
+            f"{table.source} holds waveforms"
+            f" ({', '.join(c.label for c in mapping.columns.values())}), not powers; "
             f"read it as such: data=waveforms data.path={table.source}"
         )
     if reverse:
@@ -96,23 +121,33 @@ def powers(table: TableFile, mapping: Mapped, nominal: float, reverse: bool, kil
 
 
 def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColumn | None) -> Powers:
-    """The same with the nominal frequency that f shows, and without an f that is none; both with a note."""
+    """The same with the nominal frequency that f shows, and without an f that is none; both with a
+    note.
+    """
     if "f" not in result.columns or source is None:
         return replace(result, frequency=declared)
     columns, U = {**result.columns}, result.columns["U"]
-    f = columns["f"] if source.role.unit.strip().lower() not in PER_UNIT else columns["f"] * declared
+    f = (
+        columns["f"]
+        if source.role.unit.strip().lower() not in PER_UNIT
+        else columns["f"] * declared
+    )
     alive = LEAST_LIVE_VOLTAGE * np.nanmedian(U) < U
     level = float(np.median(f[alive])) if alive.any() else declared
     if level < SLOWEST:
         del columns["f"]
         note = (
-            f"{source.label} is about {level:.3g}, a deviation from the nominal frequency or per unit of it: not used"
+            f"{source.label} is about {level:.3g}, a deviation from the nominal frequency or per"
+            " unit of it: not used"
         )
         return replace(result, columns=columns, notes=(*result.notes, note), frequency=declared)
     columns["f"], nominal = f, nearest_nominal(level)
     if nominal is None or abs(nominal / declared - 1) < OTHER_FREQUENCY:
         return replace(result, columns=columns, frequency=declared)
-    note = f"f is {level:.5g} Hz: {nominal:.3g} Hz is taken for nominal, where {declared:g} Hz stands in the settings"
+    note = (
+        f"f is {level:.5g} Hz: {nominal:.3g} Hz is taken for nominal, where {declared:g} Hz stands"
+        " in the settings"
+    )
     return replace(result, columns=columns, notes=(*result.notes, note), frequency=nominal)
 
 
@@ -122,10 +157,14 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     columns, notes = {"t": values["t"]}, [*mapping.notes, *said]
     for letter in "UPQ":
         keys = [key for key in values if key[0] == letter and key != "U2"]
-        columns[letter] = values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
+        columns[letter] = (
+            values[keys[0]] if len(keys) == 1 else np.add.reduce([values[key] for key in keys])
+        )
         if len(keys) > 1:
             columns[letter] = columns[letter] / (len(keys) if letter == "U" else 1)
-            notes.append(f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}")
+            notes.append(
+                f"{letter} is the {'mean' if letter == 'U' else 'sum'} of {', '.join(keys)}"
+            )
     columns |= {key: values[key] for key in ("f", "U2") if key in values}
     first = next(key for key in mapping.columns if key[0] == "U" and key != "U2")
     power = next(key for key in mapping.columns if key[0] == "P")
@@ -137,19 +176,26 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
 
 
 def _check_power_units(table: TableFile, mapping: Mapped) -> None:
-    """Raise `UserError` where some columns of P and Q have a unit and others none: it could be a thousand times off."""
+    """Raise `UserError` where some columns of P and Q have a unit and others none: it could be a
+    thousand times off.
+    """
     ours = {key: one for key, one in mapping.columns.items() if key[0] in "PQ"}
     bare = [one for one in ours.values() if not one.role.unit.strip()]
     if bare and len(bare) < len(ours):
         units = ", ".join(f"{letter}: {unit}" for letter, unit in (("P", "MW"), ("Q", "Mvar")))
         raise UserError(
-            f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one; say them, e.g. "
+            f"{table.source}: {bare[0].label} has no unit, and other columns of P and Q have one;"
+            " say them, e.g. "
             f"{DATA.units}={{{units}}}"
         )
 
 
-def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str, current: np.ndarray | None) -> list[str]:
-    """Make phase voltages line-to-line ones; what was taken for what, and why where the name does not say it."""
+def _to_lines(
+    columns: dict[str, np.ndarray], line: bool | None, key: str, current: np.ndarray | None
+) -> list[str]:
+    """Make phase voltages line-to-line ones; what was taken for what, and why where the name does
+    not say it.
+    """
     if line:
         return []
     level, why = float(np.nanmedian(columns["U"])), ""
@@ -157,7 +203,10 @@ def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str, curre
     if product is not None:
         line, why = product, ", for P and Q are the product of it and the current then"
     elif line is None and key[1:] in PHASES and is_between_phases(level):
-        line, why = True, f", for {level:.4g} kV is near a nominal voltage, and times sqrt(3) near none"
+        line, why = (
+            True,
+            f", for {level:.4g} kV is near a nominal voltage, and times sqrt(3) near none",
+        )
     elif line is None:
         line = key[1:] not in PHASES
     if line:
@@ -168,7 +217,9 @@ def _to_lines(columns: dict[str, np.ndarray], line: bool | None, key: str, curre
 
 
 def _by_power(columns: Mapping[str, np.ndarray], current: np.ndarray) -> bool | None:
-    """Whether a voltage is line to line by S = sqrt(3) U I, where that or S = 3 U I holds; else None."""
+    """Whether a voltage is line to line by S = sqrt(3) U I, where that or S = 3 U I holds; else
+    None.
+    """
     size = np.hypot(columns["P"], columns["Q"])
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = size / (np.abs(columns["U"]) * np.abs(current))
@@ -182,17 +233,25 @@ def _absolute(mapping: Mapped, key: str) -> bool | None:
     return None if not unit else unit not in PER_UNIT
 
 
-def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], datetime | None, tuple[str, ...]]:
-    """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; the moment of t = 0, and notes on the times."""
+def _read(
+    table: TableFile, mapping: Mapped
+) -> tuple[dict[str, np.ndarray], datetime | None, tuple[str, ...]]:
+    """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; the moment of t = 0, and
+    notes on the times.
+    """
     kinds = {"t": "time", **{key: "gaps" for key in mapping.columns if key[0] in "PQ"}}
     if mapping.kind == "powers":
         kinds |= {key: "gaps" for key in mapping.columns if key[0] == "I"}
-    cells = table.read({one.number: kinds.get(key, "number") for key, one in mapping.columns.items()})
+    cells = table.read(
+        {one.number: kinds.get(key, "number") for key, one in mapping.columns.items()}
+    )
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
         key: values[key] * by
         for key, one in mapping.columns.items()
-        if not key.endswith("_angle") and key not in ("t", "frac") and (by := factor(one.role.unit)) != 1
+        if not key.endswith("_angle")
+        and key not in ("t", "frac")
+        and (by := factor(one.role.unit)) != 1
     }
     values.pop("frac", None)
     read = times_of(table, mapping, cells)
@@ -203,9 +262,15 @@ def _read(table: TableFile, mapping: Mapped) -> tuple[dict[str, np.ndarray], dat
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     values, start, note = _read(table, mapping)
     values, absolute = _in_units(table, mapping, values)
-    keys = {letter: [k for k in values if k[0] == letter and not k.endswith("_angle")] for letter in "UI"}
+    keys = {
+        letter: [k for k in values if k[0] == letter and not k.endswith("_angle")]
+        for letter in "UI"
+    }
     scale, angle_notes = _radians(table, mapping, values)
-    V, I = (np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]]) for letter in "UI")
+    V, I = (
+        np.array([values[k] * np.exp(1j * scale * values[f"{k}_angle"]) for k in keys[letter]])
+        for letter in "UI"
+    )
     V, turned = _forward(V, [mapping.columns[k] for k in keys["U"]])
     (V1, V2), (I1, _) = _sequences(V, keys["U"]), _sequences(I, keys["I"])
     V1, sort = _to_ground(mapping.columns[keys["U"][0]], V1) if absolute else (V1, [])
@@ -219,7 +284,9 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     source = "U, P, Q from phasors" + (", positive sequence" if V2 is not None else "")
     notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
     if "f" in values:
-        columns["f"] = values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
+        columns["f"] = (
+            values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
+        )
     else:
         columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
@@ -227,18 +294,24 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
 
 
 def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
-    """Phasors (K, N) of line voltages as AB, BC, CA; a note where all are named the other way, as V1 - V2 is."""
+    """Phasors (K, N) of line voltages as AB, BC, CA; a note where all are named the other way, as
+    V1 - V2 is.
+    """
     backward = np.array([one.role.backward for one in sources])
     if not backward.any():
         return V, []
     names = ", ".join(one.label for one in sources)
     if backward.all():
-        return V, [f"{names} taken as V1 - V2 and so on (where U21 is V2 - V1, the power is the opposite)"]
+        return V, [
+            f"{names} taken as V1 - V2 and so on (where U21 is V2 - V1, the power is the opposite)"
+        ]
     return np.where(backward, -1, 1)[:, None] * V, []
 
 
 def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]:
-    """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does not say it."""
+    """The phasors (N,) of one voltage, to ground, and what they were taken for where its name does
+    not say it.
+    """
     level = float(np.nanmedian(np.abs(V)))
     if one.role.key[1:] in PHASES and one.role.line is None and is_between_phases(level):
         why = f"{level:.4g} kV is near a nominal voltage, and times sqrt(3) near none"
@@ -249,9 +322,17 @@ def _to_ground(one: MappedColumn, V: np.ndarray) -> tuple[np.ndarray, list[str]]
         return V / np.sqrt(3), []
     line = off_nominal(level) <= off_nominal(np.sqrt(3) * level)
     if line:
-        why = f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than {np.sqrt(3) * level:.4g} kV"
-        return V / np.sqrt(3), [f"{one.label} {why} (data.columns={{U1: ..., U1_angle: ...}} says phase to ground)"]
-    why = f"taken as phase to ground: times sqrt(3) it is {np.sqrt(3) * level:.4g} kV, nearer to a nominal voltage"
+        why = (
+            f"taken as line to line: {level:.4g} kV is nearer to a nominal voltage than"
+            f" {np.sqrt(3) * level:.4g} kV"
+        )
+        return V / np.sqrt(3), [
+            f"{one.label} {why} (data.columns={{U1: ..., U1_angle: ...}} says phase to ground)"
+        ]
+    why = (
+        f"taken as phase to ground: times sqrt(3) it is {np.sqrt(3) * level:.4g} kV, nearer to a"
+        " nominal voltage"
+    )
     return V, [f"{one.label} {why} (a name with LL says line to line)"]
 
 
@@ -260,10 +341,15 @@ def _in_units(
 ) -> tuple[dict[str, np.ndarray], bool]:
     """(magnitudes in kV and kA or per unit, whether they are in kV and kA).
 
-    Without units they are in V and A where a voltage can be nothing else, per unit where it is near one. Raises
-    `UserError` where neither is so, and where one has a unit and another none, or one per unit.
+    Without units they are in V and A where a voltage can be nothing else, per unit where it is near
+    one. Raises `UserError` where neither is so, and where one has a unit and another none, or one
+    per unit.
     """
-    sizes = {key: one for key, one in mapping.columns.items() if key[0] in "UI" and not key.endswith("_angle")}
+    sizes = {
+        key: one
+        for key, one in mapping.columns.items()
+        if key[0] in "UI" and not key.endswith("_angle")
+    }
     stated = {_absolute(mapping, key) for key in sizes}
     level = float(np.nanmedian(np.abs(values[next(key for key in sizes if key[0] == "U")])))
     if stated == {None} and level > VOLTS:
@@ -271,13 +357,24 @@ def _in_units(
     if stated == {None} and NEAR_ONE[0] < level < NEAR_ONE[1]:
         return {**values}, False
     if len(stated) > 1 or None in stated:
-        odd = next((one for key, one in sizes.items() if _absolute(mapping, key) is None), next(iter(sizes.values())))
-        what = "is per unit and others are not" if odd.role.unit else f"has no unit, and its voltage is {level:.4g}"
-        raise UserError(f"{table.source}: {odd.label} {what}: say the units, e.g. {DATA.units}={{U: kV, I: A}}")
+        odd = next(
+            (one for key, one in sizes.items() if _absolute(mapping, key) is None),
+            next(iter(sizes.values())),
+        )
+        what = (
+            "is per unit and others are not"
+            if odd.role.unit
+            else f"has no unit, and its voltage is {level:.4g}"
+        )
+        raise UserError(
+            f"{table.source}: {odd.label} {what}: say the units, e.g. {DATA.units}={{U: kV, I: A}}"
+        )
     return {**values}, bool(stated.pop())
 
 
-def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]) -> tuple[float, list[str]]:
+def _radians(
+    table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
+) -> tuple[float, list[str]]:
     """The factor from the unit of the angles to rad, and a note where the values decided it."""
     angles = {key: one for key, one in mapping.columns.items() if key.endswith("_angle")}
     unit = next((one.role.unit for one in angles.values() if one.role.unit), "")
@@ -292,17 +389,22 @@ def _radians(table: TableFile, mapping: Mapped, values: Mapping[str, np.ndarray]
         if abs(apart - 2 * np.pi / 3) < 0.3:
             return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(
-        f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit degrees and rad: "
+        f"{table.source}: {next(iter(angles.values())).label} has no unit, and its values suit"
+        " degrees and rad: "
         f"say {DATA.units}={{angle: deg}} or {DATA.units}={{angle: rad}}"
     )
 
 
 def _sequences(X: np.ndarray, keys: list[str]) -> tuple[np.ndarray, np.ndarray | None]:
-    """Positive and negative sequence (N,) of phasors of three or two phases or lines; of one (1, N), it and None."""
+    """Positive and negative sequence (N,) of phasors of three or two phases or lines; of one (1,
+    N), it and None.
+    """
     if len(X) == 1:
         return X[0], None
     marks = LINES if keys[0][1:] in LINES else PHASES
-    three = [X[keys.index(k)] if (k := keys[0][0] + mark) in keys else -X.sum(axis=0) for mark in marks]
+    three = [
+        X[keys.index(k)] if (k := keys[0][0] + mark) in keys else -X.sum(axis=0) for mark in marks
+    ]
     positive, negative = sequences(np.array(three))
     if marks == LINES:
         return positive / FORWARD, negative / FORWARD.conjugate()

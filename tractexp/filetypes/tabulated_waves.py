@@ -22,31 +22,42 @@ SEGMENT_GAP_STEPS = 1.5  # usual steps: a longer one parts two segments
 def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
     """The waveforms of a table: every column of numbers is a channel; gaps in time part segments.
 
-    Raises `UserError` for a table of something else, and for times that are not even within a segment.
+    Raises `UserError` for a table of something else, and for times that are not even within a
+    segment.
     """
     if mapping.kind != "waves":
         raise UserError(
-            f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv data.path={table.source}"
+            f"{table.source} holds {mapping.kind}, not waveforms; read it as such: data=csv"
+            f" data.path={table.source}"
         )
     times = {mapping.columns[key].number for key in ("t", "frac") if key in mapping.columns}
     named = [k for k, name in enumerate(table.heading.names) if name and k not in times]
     numbers = {k: "number" for k in named if all(_numbers_of(table, k))}
-    others = [one.number for one in mapping.columns.values() if one.number not in (*numbers, *times)]
+    others = [
+        one.number for one in mapping.columns.values() if one.number not in (*numbers, *times)
+    ]
     _refuse_other_rates(table, others)
-    cells = table.read({**dict.fromkeys(times, "number"), mapping.columns["t"].number: "time", **numbers})
+    cells = table.read(
+        {**dict.fromkeys(times, "number"), mapping.columns["t"].number: "time", **numbers}
+    )
     for k in numbers:
         wild = ~(np.abs(cells[k].values) <= HUGE)
         if wild.any():
             i = int(np.argmax(wild))
             raise table.refuse(
-                i, k, f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or correct it"
+                i,
+                k,
+                f"{cells[k].values[i]:g} is not a value up to {HUGE:g}; leave the row out, or"
+                " correct it",
             )
     read = times_of(table, mapping, cells)
     segments, odd = _segments(table, read.t)
     named = {one.number: key for key, one in mapping.columns.items()}
     channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
     notes = [*table.notes, *read.notes, *odd]
-    return in_units(Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {})
+    return in_units(
+        Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {}
+    )
 
 
 def _numbers_of(table: TableFile, number: int) -> list[bool]:
@@ -61,19 +72,25 @@ def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:
         there = _numbers_of(table, number)
         if any(there):
             raise UserError(
-                f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its first {len(there)}"
-                " rows only; voltage and current of one record are sampled at the same times: keep the rows that have"
+                f"{table.source}: column {table.label(number)} has a number in {sum(there)} of its"
+                f" first {len(there)}"
+                " rows only; voltage and current of one record are sampled at the same times: keep"
+                " the rows that have"
                 " all of them, or interpolate what was sampled more slowly"
             )
 
 
-def _channel(table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str) -> Channel:
+def _channel(
+    table: TableFile, mapping: Mapped, number: int, values: np.ndarray, key: str
+) -> Channel:
     """A column as a channel; its key says what it measures, else its name."""
     name, unit = table.label(number), table.heading.units[number]
     meaning = role(name, unit)
     key = key or (meaning.key if meaning else "")
     unit = mapping.columns[key].role.unit if key in mapping.columns else unit
-    quantity = {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
+    quantity = (
+        {"U": "voltage", "I": "current"}.get(key[:1], "") if not key.endswith("_angle") else "angle"
+    )
     phase = key[1:].upper() if key[1:] in (*PHASES, *LINES) else ""
     phase = phase[::-1] if meaning and meaning.backward else phase
     return Channel(name, values, unit, quantity, phase)
@@ -88,10 +105,12 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
     if len(t) < 3 or (steps <= 0).any():
         i = int(np.argmax(steps <= 0)) + 1 if len(t) > 2 else 0
         raise UserError(
-            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after {t[i - 1]:.9g} s; give "
+            f"{table.source}: {table.place(i)}: time does not increase: t = {t[i]:.9g} s after"
+            f" {t[i - 1]:.9g} s; give "
             f"the unit of time ({DATA.units}={{t: ms}}), or more digits"
-            if len(t) > 2 else f"{table.source}: only {len(t)} rows; waveforms need more"
-        )  # fmt: skip
+            if len(t) > 2
+            else f"{table.source}: only {len(t)} rows; waveforms need more"
+        )
     usual = float(np.median(steps))
     breaks = [0, *(np.flatnonzero(steps > SEGMENT_GAP_STEPS * usual) + 1).tolist(), len(t)]
     segments, widest = [], 0.0
@@ -104,14 +123,20 @@ def _segments(table: TableFile, t: np.ndarray) -> tuple[list[Segment], list[str]
         if off.max() > 0.5:
             i = first + int(off.argmax())
             raise UserError(
-                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is {off.max():.2g} steps "
+                f"{table.source}: {table.place(i)}: sampling is not uniform: t = {t[i]:.9g} s is"
+                f" {off.max():.2g} steps "
                 "off the uniform grid; waveforms must be sampled evenly"
             )
         widest = max(widest, float(off.max()))
         segments.append(Segment(first, stop, 1 / step, float(t[first] - t[0])))
-    notes = [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"] if widest > LARGEST_JITTER else []
+    notes = (
+        [f"times up to {100 * widest:.2g} % of a step off a uniform grid: taken as even"]
+        if widest > LARGEST_JITTER
+        else []
+    )
     if len(segments) > 1:
         notes.append(
-            f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is read by itself"
+            f"{len(segments) - 1} gaps in time, the first at {table.place(breaks[1])}: each part is"
+            " read by itself"
         )
     return segments, notes

@@ -9,7 +9,8 @@ MARKS = {b"\xef\xbb\xbf": "utf-8-sig", b"\xff\xfe": "utf-16", b"\xfe\xff": "utf-
 
 
 def decode(content: bytes, where: str, encoding: str | None = None) -> tuple[str, str]:
-    """The text and its encoding: `encoding`, or else the one of `ENCODINGS` whose letters make words.
+    """The text and its encoding: `encoding`, or else the one of `ENCODINGS` whose letters make
+    words.
 
     Raises `UserError` where `encoding` is none or does not fit.
     """
@@ -19,10 +20,14 @@ def decode(content: bytes, where: str, encoding: str | None = None) -> tuple[str
         return content.decode(codec), codec
     except LookupError as error:
         names = ", ".join(ENCODINGS)
-        raise UserError(f"{DATA.encoding}={encoding}: there is no such text encoding; try {names}") from error
+        raise UserError(
+            f"{DATA.encoding}={encoding}: there is no such text encoding; try {names}"
+        ) from error
     except (UnicodeError, ValueError) as error:
         if encoding:
-            raise UserError(f"{where}: not {encoding} text; leave {DATA.encoding} out to have it detected") from error
+            raise UserError(
+                f"{where}: not {encoding} text; leave {DATA.encoding} out to have it detected"
+            ) from error
         return content.decode("latin-1"), "latin-1"
 
 
@@ -36,8 +41,11 @@ def _guess(content: bytes) -> str:
     try:
         content.decode("gbk")
         pairs = re.findall(rb"[\x81-\xfe][\x40-\xfe]", content)
-        # GB 2312 keeps the characters in daily use below 0xD8; a pair of small Cyrillic letters lies above
-        rare = sum(pair[0] >= 0xD8 or pair[0] in range(0xAA, 0xB0) or pair[1] < 0xA1 for pair in pairs)
+        # GB 2312 keeps the characters in daily use below 0xD8; a pair of small Cyrillic letters
+        # lies above
+        rare = sum(
+            pair[0] >= 0xD8 or pair[0] in range(0xAA, 0xB0) or pair[1] < 0xA1 for pair in pairs
+        )
         if rare <= 0.2 * len(pairs):
             return "gbk"
     except UnicodeDecodeError:
@@ -53,5 +61,7 @@ def _guess(content: bytes) -> str:
 
 
 def lines(text: str) -> list[str]:
-    """The lines of a text, whichever of the three line ends it uses; what follows Ctrl-Z at its end is cut off."""
+    """The lines of a text, whichever of the three line ends it uses; what follows Ctrl-Z at its end
+    is cut off.
+    """
     return [line.strip(" \t\0\x1a") for line in re.split(r"\r\n|\n|\r", text.lstrip("\ufeff"))]

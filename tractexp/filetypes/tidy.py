@@ -1,10 +1,13 @@
-"""Recordings and records as tidy tables: a column for each quantity, a row for each sample, and a sidecar in JSON.
+"""Recordings and records as tidy tables: a column for each quantity, a row for each sample, and a
+sidecar in JSON.
 
-    dip.csv  t,U,P,Q,f            dip.json  {"name": ..., "base": {...}, "units": {...}, "source": ..., "notes": [...]}
-    rec.csv  t,UA,UB,UC,IA,...    rec.json  {"recording": {"channels": [{"name": "UA", "phase": "A", "ratio": ...}]}}
+    dip.csv   t,U,P,Q,f
+    dip.json  {"name": ..., "base": {...}, "units": {...}, "source": ..., "notes": [...]}
+    rec.csv   t,UA,UB,UC,IA,...
+    rec.json  {"recording": {"channels": [{"name": "UA", "phase": "A", "ratio": ...}]}}
 
-The values of a channel are as recorded, gain and offset applied, in the unit of the file; `ratio` takes them to the
-primary side. Reading them back gives the same raw numbers, bit by bit.
+The values of a channel are as recorded, gain and offset applied, in the unit of the file; `ratio`
+takes them to the primary side. Reading them back gives the same raw numbers, bit by bit.
 """
 
 import csv
@@ -27,7 +30,9 @@ UNITS = {"t": "s", "U": "pu", "P": "pu", "Q": "pu", "f": "Hz"}  # as data.units;
 
 
 def write_record(record: Record, path: Path) -> list[Path]:
-    """Write a record as a table, by the ending of `path`, and its sidecar; raises `UserError` where it cannot."""
+    """Write a record as a table, by the ending of `path`, and its sidecar; raises `UserError` where
+    it cannot.
+    """
     content = {
         "name": record.name,
         "source": record.source,
@@ -38,16 +43,25 @@ def write_record(record: Record, path: Path) -> list[Path]:
         "window": record.window and record.window.to_dict(),
         "more": list(record.more),
     }
-    return [_written({**record.channels, **record.more}, path), files.write_json(path.with_suffix(".json"), content)]
+    return [
+        _written({**record.channels, **record.more}, path),
+        files.write_json(path.with_suffix(".json"), content),
+    ]
 
 
 def write_recording(recording: Recording, path: Path) -> list[Path]:
-    """Write a recording as a table, by the ending of `path`, and its sidecar; raises `UserError` where it cannot."""
+    """Write a recording as a table, by the ending of `path`, and its sidecar; raises `UserError`
+    where it cannot.
+    """
     t = np.full(recording.samples, np.nan)
     for segment in recording.segments:
         t[segment.first : segment.stop] = segment.t
     named = unique(["t", *(c.name.strip() for c in (*recording.channels, *recording.status))])
-    values = [t, *map(_read_raw_values, recording.channels), *(s.values() for s in recording.status)]
+    values = [
+        t,
+        *map(_read_raw_values, recording.channels),
+        *(s.values() for s in recording.status),
+    ]
     table = _written(dict(zip(named, values, strict=True)), path)
     content = {"source": recording.source, "recording": _content(recording)}
     return [table, files.write_json(path.with_suffix(".json"), content)]
@@ -66,14 +80,18 @@ def unique(names: Sequence[str]) -> list[str]:
 
 
 def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
-    """The recording of a table that `write_recording` wrote, from its sidecar; raises `UserError` where they differ."""
+    """The recording of a table that `write_recording` wrote, from its sidecar; raises `UserError`
+    where they differ.
+    """
     table = open_table(path, TableForm())
     try:
         channels, status = content["channels"], content["status"]
         if len(table.heading.names) != 1 + len(channels) + len(status):
             raise UserError(
-                f"{path}: has {len(table.heading.names)} columns where its sidecar names t, {len(channels)} "
-                f"channels and {len(status)} status channels; convert the recording again, or remove the sidecar"
+                f"{path}: has {len(table.heading.names)} columns where its sidecar names t,"
+                f" {len(channels)} "
+                f"channels and {len(status)} status channels; convert the recording again, or"
+                " remove the sidecar"
             )
         cells = table.read({k: "gaps" for k in range(1, len(table.heading.names))})
         segments = [Segment(**one) for one in content["segments"]]
@@ -93,23 +111,32 @@ def restore_recording(path: str, content: Mapping[str, Any]) -> Recording:
             ],
             list(content["notes"]),
             {key: _extra(value) for key, value in content["extra"].items()},
-        )  # fmt: skip
+        )
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise UserError(f"{path}: its sidecar is not as task=convert writes it; remove it, or convert again") from error
+        raise UserError(
+            f"{path}: its sidecar is not as task=convert writes it; remove it, or convert again"
+        ) from error
 
 
 def _check_segments(path: str, segments: Sequence[Segment], rows: int) -> None:
     """Raise `UserError` where segments are not those of a table with so many rows."""
     edges = [0]
     for one in segments:
-        if not (edges[-1] <= one.first < one.stop <= rows and 0 < one.rate < np.inf and np.isfinite(one.start)):
+        if not (
+            edges[-1] <= one.first < one.stop <= rows
+            and 0 < one.rate < np.inf
+            and np.isfinite(one.start)
+        ):
             raise UserError(
-                f"{path}: has {rows} rows, and its sidecar of samples {one.first} to {one.stop} at {one.rate} Hz; "
+                f"{path}: has {rows} rows, and its sidecar of samples {one.first} to {one.stop} at"
+                f" {one.rate} Hz; "
                 "convert the recording again, or remove the sidecar"
             )
         edges.append(one.stop)
     if len(edges) == 1:
-        raise UserError(f"{path}: its sidecar names no segment of samples; convert the recording again")
+        raise UserError(
+            f"{path}: its sidecar names no segment of samples; convert the recording again"
+        )
 
 
 def _extra(value: Any) -> Any:
@@ -119,12 +146,17 @@ def _extra(value: Any) -> Any:
 
 
 def recording_of(record: Record) -> Recording:
-    """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that know no other."""
+    """A record as a recording of magnitudes in kV (line to line), MW, Mvar and Hz, for formats that
+    know no other.
+    """
     base = record.base
     quantities = {
-        "U": ("kV", "voltage"), "P": ("MW", "power"), "Q": ("Mvar", "reactive_power"), "f": ("Hz", "frequency"),
+        "U": ("kV", "voltage"),
+        "P": ("MW", "power"),
+        "Q": ("Mvar", "reactive_power"),
+        "f": ("Hz", "frequency"),
         "U2": ("kV", "voltage"),
-    }  # fmt: skip
+    }
     channels = [
         Channel(name, values, *quantities[name], form="value")
         for name, values in base.absolute(record.channels).items()
@@ -135,7 +167,9 @@ def recording_of(record: Record) -> Recording:
 
 
 def _read_raw_values(channel: Channel) -> np.ndarray:
-    """The values (N,) of a channel as recorded: those of its converter, gain and offset applied; nan for none."""
+    """The values (N,) of a channel as recorded: those of its converter, gain and offset applied;
+    nan for none.
+    """
     if channel.gain == 1 and channel.offset == 0 and channel.missing is None:
         return np.asarray(channel.raw)
     return channel.recorded()
@@ -143,7 +177,19 @@ def _read_raw_values(channel: Channel) -> np.ndarray:
 
 def _content(recording: Recording) -> dict[str, Any]:
     """A recording without its samples, for the sidecar."""
-    fields = ("name", "unit", "quantity", "phase", "circuit", "gain", "offset", "ratio", "skew", "missing", "form")
+    fields = (
+        "name",
+        "unit",
+        "quantity",
+        "phase",
+        "circuit",
+        "gain",
+        "offset",
+        "ratio",
+        "skew",
+        "missing",
+        "form",
+    )
     return {
         "channels": [
             {name: getattr(c, name) for name in fields}
@@ -151,7 +197,8 @@ def _content(recording: Recording) -> dict[str, Any]:
             for c in recording.channels
         ],
         "status": [
-            {"name": s.name, "phase": s.phase, "circuit": s.circuit, "normal": s.normal} for s in recording.status
+            {"name": s.name, "phase": s.phase, "circuit": s.circuit, "normal": s.normal}
+            for s in recording.status
         ],
         "segments": [asdict(segment) for segment in recording.segments],
         "frequency": recording.frequency,
@@ -161,17 +208,23 @@ def _content(recording: Recording) -> dict[str, Any]:
         "trigger": recording.trigger,
         "notes": list(recording.notes),
         "extra": {
-            key: {"array": value.tolist(), "type": value.dtype.str} if isinstance(value, np.ndarray) else value
+            key: {"array": value.tolist(), "type": value.dtype.str}
+            if isinstance(value, np.ndarray)
+            else value
             for key, value in recording.extra.items()
         },
-    }  # fmt: skip
+    }
 
 
 def _channel(content: Mapping[str, Any], values: np.ndarray) -> Channel:
     """A channel with the raw numbers that its converter gave."""
     fields = dict(content)
     kind, limits = np.dtype(fields.pop("raw")), fields.pop("limits")
-    raw = values if fields["gain"] == 1 and fields["offset"] == 0 else (values - fields["offset"]) / fields["gain"]
+    raw = (
+        values
+        if fields["gain"] == 1 and fields["offset"] == 0
+        else (values - fields["offset"]) / fields["gain"]
+    )
     if kind.kind in "iu":
         missing = fields["missing"]
         raw = np.where(np.isnan(raw), 0 if missing is None else missing, np.rint(raw))

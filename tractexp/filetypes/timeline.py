@@ -1,4 +1,6 @@
-"""When samples were taken: segments of one rate, from declared rates or time stamps, evened where they are uneven."""
+"""When samples were taken: segments of one rate, from declared rates or time stamps, evened where
+they are uneven.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,15 +11,20 @@ import numpy as np
 from tractexp.errors import UserError
 from tractexp.recording.recording import Segment
 
-LARGEST_RATE_DIFFERENCE = 0.02  # rates closer than this belong to one waveform whose sampling follows the network's frequency
-LARGEST_UNEVENNESS = 0.002  # of a step: the departure from even steps that is not worth an interpolation
-LARGEST_STEP_RATIO = 1.5  # a step longer or shorter than its neighbour by this factor starts another segment
+# rates closer than this belong to one waveform whose sampling follows the network's frequency
+LARGEST_RATE_DIFFERENCE = 0.02
+# of a step: the departure from even steps that is not worth an interpolation
+LARGEST_UNEVENNESS = 0.002
+# a step longer or shorter than its neighbour by this factor starts another segment
+LARGEST_STEP_RATIO = 1.5
 MOST_SEGMENTS = 1000  # segments: more are no segments but stamps without order
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """Samples first to stop of the file, at times `t` (M,) [s] where they are not even, else None."""
+    """Samples first to stop of the file, at times `t` (M,) [s] where they are not
+    even, else None.
+    """
 
     segment: Segment
     first: int
@@ -43,7 +50,9 @@ def from_rates(rates: Sequence[tuple[float, int]], t: np.ndarray | None = None) 
     start = 0.0
     for group in groups:
         start += 1 / group[0][0] if stretches else 0.0
-        stretches.append(_build_declared_stretch(group, start if t is None else float(t[group[0][1]])))
+        stretches.append(
+            _build_declared_stretch(group, start if t is None else float(t[group[0][1]]))
+        )
         last = stretches[-1].segment
         start = last.start + (last.stop - last.first - 1) / last.rate
     return stretches
@@ -56,23 +65,38 @@ def _build_declared_stretch(group: list[tuple[float, int, int]], start: float) -
     steps = np.concatenate([np.full(b - a, 1 / rate) for rate, a, b in group])[1:]
     t = start + np.concatenate([[0.0], np.cumsum(steps)])
     rate = (stop - first - 1) / float(t[-1] - t[0])
-    return Stretch(Segment(first, stop, rate, start), first, stop, None if _evenness(t, rate) <= LARGEST_UNEVENNESS else t)
+    return Stretch(
+        Segment(first, stop, rate, start),
+        first,
+        stop,
+        None if _evenness(t, rate) <= LARGEST_UNEVENNESS else t,
+    )
 
 
 def from_stamps(t: np.ndarray, unit: float, where: str) -> list[Stretch]:
-    """From times (N,) [s] of every sample, exact to `unit` [s]; raises `UserError` where they do not increase."""
+    """From times (N,) [s] of every sample, exact to `unit` [s]; raises `UserError` where they do
+    not increase.
+    """
     steps = np.diff(t)
     if not len(steps):
         raise UserError(f"{where}: one sample alone has no sampling rate; give a longer record")
     if steps.min() <= 0 or not np.isfinite(steps).all():
         i = int(np.argmax(~(steps > 0)))
         raise UserError(
-            f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the sample before, and "
-            "the sampling rate is declared as 0, so that the time stamps must be valid; write the rate into the .cfg"
+            f"{where}: sample {i + 2}: its time stamp {t[i + 1]:g} s is not after {t[i]:g} s of the"
+            " sample before, and "
+            "the sampling rate is declared as 0, so that the time stamps must be valid; write the"
+            " rate into the .cfg"
         )
-    stretches = [_build_stamped_stretch(t, unit, first, stop) for first, stop in _runs(steps, unit, where) if stop - first > 1]
+    stretches = [
+        _build_stamped_stretch(t, unit, first, stop)
+        for first, stop in _runs(steps, unit, where)
+        if stop - first > 1
+    ]
     if not stretches:
-        raise UserError(f"{where}: time stamps without order: no two steps between samples are alike")
+        raise UserError(
+            f"{where}: time stamps without order: no two steps between samples are alike"
+        )
     return stretches
 
 
@@ -83,7 +107,8 @@ def _runs(steps: np.ndarray, unit: float, where: str) -> list[tuple[int, int]]:
     if len(breaks) > 2 * MOST_SEGMENTS:
         i = int(breaks[0])
         raise UserError(
-            f"{where}: sample {i + 1}: time stamps without order: a step of {steps[i]:g} s follows one of "
+            f"{where}: sample {i + 1}: time stamps without order: a step of {steps[i]:g} s follows"
+            " one of "
             f"{steps[i - 1]:g} s, and {len(breaks) - 1} more are like it"
         )
     edges = [0, *breaks.tolist(), len(steps)]
@@ -108,7 +133,8 @@ def _build_stamped_stretch(t: np.ndarray, unit: float, first: int, stop: int) ->
     own = t[first:stop]
     length = float(own[-1] - own[0])
     rate = (len(own) - 1) / length
-    if abs(round(rate) - rate) <= rate * unit / length:  # a whole number, to the resolution of the stamps
+    # a whole number, to the resolution of the stamps
+    if abs(round(rate) - rate) <= rate * unit / length:
         rate = float(round(rate))
     worst = _evenness(own, rate)
     uneven = worst > LARGEST_UNEVENNESS + 1.01 * unit * rate
@@ -121,7 +147,9 @@ def _evenness(t: np.ndarray, rate: float) -> float:
 
 
 def laid_out(stretches: Sequence[Stretch]) -> list[Segment]:
-    """The segments after `evened`: numbered from 0 without what lies between them where anything is interpolated."""
+    """The segments after `evened`: numbered from 0 without what lies between them where anything is
+    interpolated.
+    """
     if all(s.t is None for s in stretches):
         return [s.segment for s in stretches]
     segments, first = [], 0
@@ -132,11 +160,15 @@ def laid_out(stretches: Sequence[Stretch]) -> list[Segment]:
     return segments
 
 
-def resample_evenly(raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None) -> np.ndarray:
+def resample_evenly(
+    raw: np.ndarray, stretches: Sequence[Stretch], missing: float | None
+) -> np.ndarray:
     """Values (N,) at even times, by cubic splines; those of even stretches as they are."""
     if all(s.t is None for s in stretches):
         return raw
-    return np.concatenate([_interpolate_stretch(raw[s.first : s.stop], s, missing) for s in stretches])
+    return np.concatenate(
+        [_interpolate_stretch(raw[s.first : s.stop], s, missing) for s in stretches]
+    )
 
 
 def nearest(raw: np.ndarray, stretches: Sequence[Stretch]) -> np.ndarray:
@@ -169,6 +201,8 @@ def _interpolate_stretch(raw: np.ndarray, s: Stretch, missing: float | None) -> 
         return values
     if lacking.any():
         values[lacking] = np.interp(s.t[lacking], s.t[~lacking], values[~lacking])
-    even = CubicSpline(s.t, values)(_even(s)) if len(values) > 3 else np.interp(_even(s), s.t, values)
+    even = (
+        CubicSpline(s.t, values)(_even(s)) if len(values) > 3 else np.interp(_even(s), s.t, values)
+    )
     even[lacking[_closest(s.t, _even(s))]] = np.nan
     return even

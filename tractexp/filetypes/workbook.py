@@ -1,8 +1,9 @@
 """The sheets of a workbook, read in a process of its own that may die.
 
-A file of a few hundred bytes may have one cell in the last row and column: what reads it asks the system for the whole
-rectangle, and ends the process where there is no such memory. So that process is another one, whose memory is limited
-before it opens the file. It runs this file as a script, and needs no other of this package.
+A file of a few hundred bytes may have one cell in the last row and column: what reads it asks the
+system for the whole rectangle, and ends the process where there is no such memory. So that process
+is another one, whose memory is limited before it opens the file. It runs this file as a script, and
+needs no other of this package.
 """
 
 import contextlib
@@ -13,15 +14,20 @@ import sys
 from collections.abc import Callable
 from typing import Any, Self
 
-ROOM, PER_BYTE = 2 << 30, 40  # bytes of memory that a workbook may take, and more for each byte of its file
+# bytes of memory that a workbook may take, and more for each byte of its file
+ROOM, PER_BYTE = 2 << 30, 40
 
 
 class BadWorkbook(Exception):
-    """The file is no workbook, or a sheet of it is none; the message is empty, or says that its reader died."""
+    """The file is no workbook, or a sheet of it is none; the message is empty, or says that its
+    reader died.
+    """
 
 
 class Workbook:
-    """An open workbook: the `names` of its sheets, and their rows on demand. Use it in a `with` statement."""
+    """An open workbook: the `names` of its sheets, and their rows on demand. Use it in a `with`
+    statement.
+    """
 
     def __init__(self, data: bytes) -> None:
         """Raises `BadWorkbook` for what is none."""
@@ -46,7 +52,9 @@ class Workbook:
             self._reader.communicate()
 
     def rows(self, name: str) -> list[list[Any]]:
-        """The cells of a sheet, from its first row and column on. Raises `BadWorkbook` where it cannot be read."""
+        """The cells of a sheet, from its first row and column on. Raises `BadWorkbook` where it
+        cannot be read.
+        """
         return self._answer(name)
 
     def _answer(self, question: object) -> Any:
@@ -59,8 +67,10 @@ class Workbook:
             answer = pickle.load(stdout)
         except (EOFError, OSError, pickle.UnpicklingError):
             raise BadWorkbook(
-                f"it takes more than {ROOM >> 30} GB of memory to read, or its reader fails: a cell far from the "
-                "table, such as one in the last row, counts as all the cells between; save the workbook without it"
+                f"it takes more than {ROOM >> 30} GB of memory to read, or its reader fails: a cell"
+                " far from the "
+                "table, such as one in the last row, counts as all the cells between; save the"
+                " workbook without it"
             ) from None
         if answer is None:
             raise BadWorkbook
@@ -68,7 +78,9 @@ class Workbook:
 
 
 def _serve(limit: int) -> None:
-    """Answer what `Workbook` asks: the names of the sheets of a file, then the rows of each; None for what is none."""
+    """Answer what `Workbook` asks: the names of the sheets of a file, then the rows of each; None
+    for what is none.
+    """
     with contextlib.suppress(ImportError):  # a system that knows no such limits
         import resource
 
@@ -81,11 +93,18 @@ def _serve(limit: int) -> None:
         with contextlib.suppress(python_calamine.CalamineError, OSError, ValueError):
             return read(question)
 
-    book: Any = tried(lambda data: python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)), _question())
+    book: Any = tried(
+        lambda data: python_calamine.CalamineWorkbook.from_filelike(io.BytesIO(data)), _question()
+    )
     _give(book and list(book.sheet_names))
     with contextlib.suppress(EOFError):
         while True:
-            _give(tried(lambda name: book.get_sheet_by_name(name).to_python(skip_empty_area=False), _question()))
+            _give(
+                tried(
+                    lambda name: book.get_sheet_by_name(name).to_python(skip_empty_area=False),
+                    _question(),
+                )
+            )
 
 
 def _question() -> Any:

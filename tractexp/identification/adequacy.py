@@ -1,11 +1,13 @@
-"""Does the model describe the load? What an estimate leaves, against what noise alone leaves, and the grade for it.
+"""Does the model describe the load? What an estimate leaves, against what noise alone leaves, and
+the grade for it.
 
-Draws of the estimated noise go through the same whitening and projection as the residual; windows, steps, pulses,
-oscillations and, of several events, parameters of their own tell how much louder the residual is. Under a right model
-least squares and the likelihood agree, too: a last test asks whether the likelihood gives up more of Eq. (8) than it
-would on the draws (Hausman 1978), which it does where it takes a model's error for slow noise. A model is
-*adequate* where chance may leave as much. Where it may not, the size of the model's error grades it: an effect is
-missing, or the model is the wrong one.
+Draws of the estimated noise go through the same whitening and projection as the residual; windows,
+steps, pulses, oscillations and, of several events, parameters of their own tell how much louder the
+residual is. Under a right model least squares and the likelihood agree, too: a last test asks
+whether the likelihood gives up more of Eq. (8) than it would on the draws (Hausman 1978), which it
+does where it takes a model's error for slow noise. A model is *adequate* where chance may leave as
+much. Where it may not, the size of the model's error grades it: an effect is missing, or the model
+is the wrong one.
 """
 
 from collections.abc import Sequence
@@ -26,12 +28,14 @@ from tractexp.inference.sandwich import off_walls
 from tractexp.inference.separable import Sensitivities, SeparableBasis
 
 FIT_DRAWS = 199
-# p of what a fit leaves, below which it leaves something. Chosen on calibration seeds:
-# where nothing is missing one set in fifty has a smaller one, with an effect of four detection limits nearly all have.
+# p of what a fit leaves, below which it leaves something. Chosen on calibration seeds: where
+# nothing is missing one set in fifty has a smaller one, with an effect of four detection limits
+# nearly all have.
 ADEQUATE_P = 0.001
 JUDGEMENT_SEED = 20201  # of the draws: the judgement of one record is always the same
 ACCEPTED = 0.05  # Eq. (20): a load model is acceptable below 5 %
-WRONG = 0.2  # of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
+# of the response: a model that leaves a fifth of it does not describe the load. A word for a size.
+WRONG = 0.2
 APART = "least squares apart from the likelihood"
 
 
@@ -45,10 +49,11 @@ class Grade(StrEnum):
 
 @dataclass(frozen=True)
 class Surprise:
-    """How often noise alone leaves as much as the estimate does: `p` by the most surprised test, corrected for all.
+    """How often noise alone leaves as much as the estimate does: `p` by the most surprised test,
+    corrected for all.
 
-    `ratio` is the loudest stretch of the whitened residual over what noise leaves there. None: not judged, for too few
-    samples are quiet.
+    `ratio` is the loudest stretch of the whitened residual over what noise leaves there. None: not
+    judged, for too few samples are quiet.
     """
 
     p: float | None
@@ -76,10 +81,14 @@ class Adequacy:
 
 
 def surprise(
-    observed: Observed, likelihood: Likelihood, unit: np.ndarray, squares: Likelihood | None = None,
+    observed: Observed,
+    likelihood: Likelihood,
+    unit: np.ndarray,
+    squares: Likelihood | None = None,
     least: float = np.inf,
-) -> Surprise:  # fmt: skip
-    """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too little quiet.
+) -> Surprise:
+    """How surprising what the fit at coordinates (D,) leaves is; not judged where there is too
+    little quiet.
 
     `least` is the least sum of squares, over those of `squares`, Eq. (8).
     """
@@ -96,7 +105,9 @@ def surprise(
     basis, split = J.basis(), of_each_event(J, steady)
 
     def left(rest: np.ndarray) -> dict[str, np.ndarray]:
-        by_test = goodness_of_fit.statistics(rest.reshape(len(rest), observed.drive.channels, -1), observed.problem)
+        by_test = goodness_of_fit.statistics(
+            rest.reshape(len(rest), observed.drive.channels, -1), observed.problem
+        )
         return by_test | ({PER_EVENT: split.energy(rest)} if observed.drive.events > 1 else {})
 
     excess = squares and Excess.of(squares, unit, J, least)
@@ -105,27 +116,36 @@ def surprise(
     together = max(1, MOST_NUMBERS // len(rows))
     for some in np.split(drawn, range(together, FIT_DRAWS, together)):
         white = likelihood.whiten(some)
-        parts.append(left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {}))
+        parts.append(
+            left(basis.without(white)) | ({APART: excess.of_draws(white, some)} if excess else {})
+        )
     by_test = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    values, draws = ({name: rows[part] for name, rows in by_test.items()} for part in (slice(1), slice(1, None)))
+    values, draws = (
+        {name: rows[part] for name, rows in by_test.items()} for part in (slice(1), slice(1, None))
+    )
     fit = GoodnessOfFit(compare_with_draws(values, draws))
     ratio, where = loudest_stretch(own.reshape(observed.drive.channels, -1), observed.problem)
     return Surprise(fit.p, fit.most_significant_test, ratio, where)
 
 
 def of_each_event(J: Sensitivities, steady: np.ndarray) -> SeparableBasis:
-    """What `steady` shared coordinates (k,) of their own for each event could change beside the event's own."""
+    """What `steady` shared coordinates (k,) of their own for each event could change beside the
+    event's own.
+    """
     shared = J.without_own.T
     columns = np.concatenate([shared[~steady], shared[steady]])
-    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(goodness_of_fit.LEAST_DISTINCT_SHARE, 1e-9)
+    return replace(J, columns=columns, k=int(np.count_nonzero(~steady))).basis(
+        goodness_of_fit.LEAST_DISTINCT_SHARE, 1e-9
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Excess:
-    """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and of draws of noise.
+    """What the likelihood leaves of Eq. (8) over what least squares leave: `of_records` (1,), and
+    of draws of noise.
 
-    `J` are whitened sensitivities to the coordinates inside, `inside` and `plain` those of Eq. (8) to the same and to
-    all; `squares` is what least squares reach.
+    `J` are whitened sensitivities to the coordinates inside, `inside` and `plain` those of Eq. (8)
+    to the same and to all; `squares` is what least squares reach.
     """
 
     of_records: np.ndarray
@@ -154,7 +174,9 @@ class Excess:
 
 
 def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
-    """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges, for Eq. (8)."""
+    """By how much draws (b, C, N) would have P0 and Q0 of each event wrong, (b, 2 E), in ranges,
+    for Eq. (8).
+    """
     problem = plain.problem
     wrong = np.zeros((len(drawn), problem.drive.events, 2))
     for e, steady in enumerate(problem.steady):
@@ -163,7 +185,9 @@ def _means(plain: Likelihood, drawn: np.ndarray) -> np.ndarray:
 
 
 def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator) -> np.ndarray:
-    """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet samples."""
+    """By how much each draw (DRAWS,) would have estimated its own noise wrongly, from so few quiet
+    samples.
+    """
     worth = max(likelihood.noise.worth(sum(p.stop - p.start for p in observed.problem.quiet)), 4.0)
     return np.sqrt(rng.chisquare(2 * worth, FIT_DRAWS) / (2 * worth))
 
@@ -171,15 +195,20 @@ def _level(likelihood: Likelihood, observed: Observed, rng: np.random.Generator)
 def _linear(likelihood: Likelihood) -> np.ndarray:
     """Which of the free parameters are no threshold or time of an effect, (free,).
 
-    A relay's instants in an event hang on the noise of the voltage where it crosses the level, which no draw has.
+    A relay's instants in an event hang on the noise of the voltage where it crosses the level,
+    which no draw has.
     """
     problem = likelihood.problem
-    beside = {p.name for effect in problem.model.effects for p in effect.parameters if p.null is None}
+    beside = {
+        p.name for effect in problem.model.effects for p in effect.parameters if p.null is None
+    }
     return np.array([name.partition("[")[0] not in beside for name in problem.space.names])
 
 
 def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]:
-    """The loudest window of the whitened residual (2, N): how many times the noise, and where it is."""
+    """The loudest window of the whitened residual (2, N): how many times the noise, and where it
+    is.
+    """
     windows = goodness_of_fit.residual_windows(problem)
     row = problem.drive.spoken.index
     level = [float(np.sqrt(np.mean(channels[row(c.channel), c.part] ** 2))) for c in windows]
@@ -190,7 +219,10 @@ def loudest_stretch(channels: np.ndarray, problem: Problem) -> tuple[float, str]
 
 
 def grade_errors(
-    surprise: Surprise, fitted: ModelError, held_out: ModelError | None = None, active_bounds: Sequence[str] = ()
+    surprise: Surprise,
+    fitted: ModelError,
+    held_out: ModelError | None = None,
+    active_bounds: Sequence[str] = (),
 ) -> Adequacy:
     """The grade of an estimate that leaves this of the fitted and of held-out events.
 
@@ -201,14 +233,21 @@ def grade_errors(
     sure = max(e.interval[0] if noise else e.value for e in errors)
     held = "".join(f"; a bound holds {bound}" for bound in active_bounds)
     if sure >= WRONG:
-        size = f"it leaves {fitted}" + (f", and of the held-out dips {held_out}" if held_out else "")
-        return Adequacy(Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p)
+        size = f"it leaves {fitted}" + (
+            f", and of the held-out dips {held_out}" if held_out else ""
+        )
+        return Adequacy(
+            Grade.WRONG_MODEL, f"this model does not describe this load: {size}{held}", surprise.p
+        )
     size = f"within {fitted}" + (f", the held-out dips within {held_out}" if held_out else "")
     said = f"the model describes this load {size}"
     if noise:
         return Adequacy(Grade.ADEQUATE, f"{said}: noise alone leaves as much{held}", surprise.p)
     if surprise.p is None:
-        why = "too few samples before and after the dips are quiet to tell whether an effect is missing"
+        why = (
+            "too few samples before and after the dips are quiet to tell whether an effect is"
+            " missing"
+        )
     else:
         why = "an effect is missing"
         if surprise.ratio is not None and surprise.loudest != APART:

@@ -24,13 +24,18 @@ from tractexp.provenance import build_again_command
 from tractexp.record.change import runs
 
 
-def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = "") -> list[str]:
-    """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the choice of data that
-    holds further events of the load, where one is known.
+def advise(
+    uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = (), data: str = ""
+) -> list[str]:
+    """Sentences, the most pressing first. `odd` events do not fit with the rest; `data` is the
+    choice of data that holds further events of the load, where one is known.
 
     Of a model that does not describe the load nothing is said that would only hold if it did.
     """
-    better = [f"{why}: {build_again_command('domain=waves')}" for why in better_domain(uncertainty.likelihood.problem)]
+    better = [
+        f"{why}: {build_again_command('domain=waves')}"
+        for why in better_domain(uncertainty.likelihood.problem)
+    ]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
     search = build_again_command("task=discrepancy", *[f"data={data}"] * bool(data))
     if adequacy.grade is Grade.WRONG_MODEL:
@@ -44,11 +49,20 @@ def advise(uncertainty: Uncertainty, adequacy: Adequacy, odd: Sequence[str] = ()
         if verdict.word == BOUND
     ]
     for direction in uncertainty.information.unseen:
-        tied = [n for n, share in zip(uncertainty.names, direction, strict=True) if abs(share) > SHARE]
+        tied = [
+            n for n, share in zip(uncertainty.names, direction, strict=True) if abs(share) > SHARE
+        ]
         if len(tied) > 1:
-            sentences.append(f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them apart")
+            sentences.append(
+                f"fix one of {', '.join(tied)} by model.fixed: no record of this kind can tell them"
+                " apart"
+            )
         else:
-            why = HELD if tied[0] in uncertainty.information.held else "the record does not change with it"
+            why = (
+                HELD
+                if tied[0] in uncertainty.information.held
+                else "the record does not change with it"
+            )
             sentences.append(f"fix {tied[0]} by model.fixed: {why}")
     sentences += _deeper(uncertainty)
     return (
@@ -78,7 +92,8 @@ def _deeper(uncertainty: Uncertainty) -> list[str]:
         return []
     named = ", ".join(poor)
     without_figures = (
-        f"for {named}: record a dip of another depth and fit it together, or fix what stays open by model.fixed"
+        f"for {named}: record a dip of another depth and fit it together, or fix what stays open by"
+        " model.fixed"
     )
     if problem.per_event:
         return [without_figures]
@@ -90,29 +105,48 @@ def _deeper(uncertainty: Uncertainty) -> list[str]:
         return [without_figures]
     others = "these" if len(problem.events) > 1 else "this one"
     together = f"for {1000 * shape.duration:.0f} ms, fitted together with {others},"
-    return [_further(uncertainty, uncertainty.names.index(name), forecasts, together) for name in poor]
+    return [
+        _further(uncertainty, uncertainty.names.index(name), forecasts, together) for name in poor
+    ]
 
 
 def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], together: str) -> str:
-    """The depths of a further dip with which the interval of parameter `j` is narrow enough, in a sentence.
+    """The depths of a further dip with which the interval of parameter `j` is narrow enough, in a
+    sentence.
 
-    They need not be all beyond one: a dip as deep as those recorded repeats them, a shallower one may tell more.
+    They need not be all beyond one: a dip as deep as those recorded repeats them, a shallower one
+    may tell more.
     """
     name, low, high = uncertainty.names[j], uncertainty.lower[j], uncertainty.upper[j]
     goal, bounds = _goal(uncertainty, j)
     half = np.array([f.half[j] for f in forecasts])
     width = lambda x: format_half_width(uncertainty.values[j], x, low, high)  # noqa: E731
-    reached = f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, " if bounds else ""
+    reached = (
+        f"; its interval now reaches its bound {' and '.join(f'{b:g}' for b in bounds)}, "
+        if bounds
+        else ""
+    )
     if (half <= goal).any():
         enough = half <= goal
-        which = "any further dip" if enough.all() else f"a further dip of {_spans(forecasts, enough)}"
-        still = f"{reached}and if it does so then, ask whether model.bounds.{name} is right" if reached else ""
+        which = (
+            "any further dip" if enough.all() else f"a further dip of {_spans(forecasts, enough)}"
+        )
+        still = (
+            f"{reached}and if it does so then, ask whether model.bounds.{name} is right"
+            if reached
+            else ""
+        )
         return f"for {name}: {which} {together} would give {width(goal)} or better{still}"
     best = int(half.argmin())
-    leaves = f"would give {width(half[best])}" if half[best] < (high - low) / 2 else "would leave it open too"
+    leaves = (
+        f"would give {width(half[best])}"
+        if half[best] < (high - low) / 2
+        else "would leave it open too"
+    )
     bound = f"{reached}so ask whether model.bounds.{name} is right" if reached else ""
     return (
-        f"for {name}: no single further dip {together} will do; the best, of {100 * forecasts[best].shape.depth:.3g} %,"
+        f"for {name}: no single further dip {together} will do; the best, of"
+        f" {100 * forecasts[best].shape.depth:.3g} %,"
         f" {leaves}; record several, or fix it or what it trades against by model.fixed{bound}"
     )
 
@@ -120,12 +154,20 @@ def _further(uncertainty: Uncertainty, j: int, forecasts: Sequence[Forecast], to
 def _goal(uncertainty: Uncertainty, j: int) -> tuple[float, list[float]]:
     """Half an interval that is narrow enough, and the bounds that the present one reaches.
 
-    Where it reaches one, half of what is inside the bounds is asked for. Where curvature calls it narrow enough
-    already, it is the profile that does not, and half of what curvature says is asked for.
+    Where it reaches one, half of what is inside the bounds is asked for. Where curvature calls it
+    narrow enough already, it is the profile that does not, and half of what curvature says is asked
+    for.
     """
     low, high = uncertainty.lower[j], uncertainty.upper[j]
-    (a, b), enough = uncertainty.intervals[j], IDENTIFIED_SHARE * size(uncertainty.values[j], low, high)
-    bounds = [bound for end, bound in ((a, low), (b, high)) if abs(end - bound) < BOUND_DISTANCE * (high - low)]
+    (a, b), enough = (
+        uncertainty.intervals[j],
+        IDENTIFIED_SHARE * size(uncertainty.values[j], low, high),
+    )
+    bounds = [
+        bound
+        for end, bound in ((a, low), (b, high))
+        if abs(end - bound) < BOUND_DISTANCE * (high - low)
+    ]
     asked = [
         enough,
         *([(b - a) / 4] if bounds else []),

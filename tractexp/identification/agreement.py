@@ -21,19 +21,25 @@ SUSPECTS = 4  # events that are fitted by themselves, and the others without the
 
 @dataclass(frozen=True, eq=False)
 class EventAgreement:
-    """What each of several events adds. `gains` {event: {name: width of the interval without it over with it}}."""
+    """What each of several events adds. `gains` {event: {name: width of the interval without it
+    over with it}}.
+    """
 
     gains: dict[str, dict[str, float]]
     odd: list[str]
     notes: list[str]
 
     def fields(self) -> dict[str, Any]:
-        """What `result.json` gains; None where a parameter is not identifiable without the event."""
+        """What `result.json` gains; None where a parameter is not identifiable
+        without the event.
+        """
         return {"gains": files.plain(self.gains), "odd_events": self.odd}
 
 
 def compare_events(uncertainty: Uncertainty) -> EventAgreement:
-    """Each event's share in the precision, and the events that do not fit with the rest (deviance test)."""
+    """Each event's share in the precision, and the events that do not fit with the rest (deviance
+    test).
+    """
     likelihood, width = uncertainty.likelihood, uncertainty.upper - uncertainty.lower
     _, J = uncertainty.sensitivities
     own = J.without_own
@@ -45,7 +51,8 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
     together = errors(whole)
     gains: dict[str, dict[str, float]] = {}
     for event, triangle in zip(likelihood.problem.events, others, strict=True):
-        with np.errstate(invalid="ignore"):  # what is not identifiable with the event is not without it either
+        # what is not identifiable with the event is not without it either
+        with np.errstate(invalid="ignore"):
             ratio = errors(triangle) / together
         gains[event.record.name] = dict(zip(uncertainty.names, ratio.tolist(), strict=True))
     odd, notes = find_disagreeing_events(uncertainty)
@@ -53,7 +60,9 @@ def compare_events(uncertainty: Uncertainty) -> EventAgreement:
 
 
 def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-    """Triangles (k, k) with the products of all rows (R_e, k) but those of each, and of all rows."""
+    """Triangles (k, k) with the products of all rows (R_e, k) but those of each, and
+    of all rows.
+    """
     joined = lambda above, below: np.linalg.qr(np.concatenate([above, below])).R  # noqa: E731
     nothing = rows[0][:0]
     before = list(itertools.accumulate(rows, joined, initial=nothing))
@@ -62,11 +71,13 @@ def without_each(rows: Sequence[np.ndarray]) -> tuple[list[np.ndarray], np.ndarr
 
 
 def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[str]]:
-    """Events that separate parameters fit much better than shared ones do, the worst first, one at a time.
+    """Events that separate parameters fit much better than shared ones do, the worst first, one at
+    a time.
 
-    Compares the deviance of all events fitted together with that of the rest plus that of the event alone; the
-    difference is chi-squared with as many degrees of freedom as there are identifiable parameters. Fits are made
-    without and of the `SUSPECTS` events alone for which it is largest where the model is linear.
+    Compares the deviance of all events fitted together with that of the rest plus that of the event
+    alone; the difference is chi-squared with as many degrees of freedom as there are identifiable
+    parameters. Fits are made without and of the `SUSPECTS` events alone for which it is largest
+    where the model is linear.
     """
     from scipy.special import chdtri
 
@@ -76,7 +87,10 @@ def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[s
     name = lambda e: likelihood.problem.events[e].record.name  # noqa: E731
     linear = _linear(*uncertainty.sensitivities)
     while len(left) > 1:
-        suspects = [left[k] for k in np.argsort(-_excess([linear[e] for e in left]), kind="stable")[:SUSPECTS]]
+        suspects = [
+            left[k]
+            for k in np.argsort(-_excess([linear[e] for e in left]), kind="stable")[:SUSPECTS]
+        ]
         groups = [left, *([o for o in left if o != e] for e in suspects), *([e] for e in suspects)]
         deviance = _deviances(likelihood, uncertainty.unit, groups)
         n = len(suspects)
@@ -85,7 +99,9 @@ def find_disagreeing_events(uncertainty: Uncertainty) -> tuple[list[str], list[s
         limit = float(chdtri(freedom, DISAGREES / len(left)))
         if excess[worst] <= limit:
             break
-        measured = f"deviance higher by {excess[worst]:.3g} where {limit:.3g} is the limit of chance"
+        measured = (
+            f"deviance higher by {excess[worst]:.3g} where {limit:.3g} is the limit of chance"
+        )
         if len(left) == 2:
             odd += [name(e) for e in left if name(e) not in odd]
             notes.append(f"{name(left[0])} and {name(left[1])} do not fit together: {measured}")
@@ -103,22 +119,32 @@ def _linear(rows: np.ndarray, J: Sensitivities) -> list[np.ndarray]:
 
 
 def _excess(linear: Sequence[np.ndarray]) -> np.ndarray:
-    """By how much the deviance of all events is above that of all but each and of each, (E,), in a linear model.
+    """By how much the deviance of all events is above that of all but each and of each, (E,), in a
+    linear model.
 
     The last number of a triangle is the root of the deviance that is left.
     """
     others, whole = without_each(linear)
     alone = [np.linalg.qr(rows).R for rows in linear]
-    least = [np.array([triangle[-1, -1] ** 2 for triangle in triangles]) for triangles in (others, alone)]
+    least = [
+        np.array([triangle[-1, -1] ** 2 for triangle in triangles]) for triangles in (others, alone)
+    ]
     return whole[-1, -1] ** 2 - least[0] - least[1]
 
 
-def _deviances(likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]) -> np.ndarray:
-    """What the best fits to groups of events alone leave, from coordinates (D,), as many at once as memory allows."""
+def _deviances(
+    likelihood: Likelihood, unit: np.ndarray, groups: Sequence[Sequence[int]]
+) -> np.ndarray:
+    """What the best fits to groups of events alone leave, from coordinates (D,), as many at once as
+    memory allows.
+    """
     together = max(1, MOST_NUMBERS // (2 * likelihood.problem.drive.measured.size))
     parts = [groups[k : k + together] for k in range(0, len(groups), together)]
     start = np.tile(unit, (together, 1))
-    ends = [descend(only(likelihood, part), start[: len(part)], apart=likelihood.apart) for part in parts]
+    ends = [
+        descend(only(likelihood, part), start[: len(part)], apart=likelihood.apart)
+        for part in parts
+    ]
     return np.concatenate([descent.deviance for descent in ends])
 
 

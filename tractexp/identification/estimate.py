@@ -1,14 +1,17 @@
-"""The estimate: least squares, polished by the likelihood of the noise where nothing but noise is left.
+"""The estimate: least squares, polished by the likelihood of the noise where nothing but noise is
+left.
 
-What a model leaves of a real record is mostly its own error, often a hundred times the noise. The likelihood of that
-noise is then no likelihood: single samples at the edges of a dip decide, and move parameters by more than they are
-worth. Least squares, Eq. (8), need to know nothing of the error. So the estimate is the minimum of Eq. (8), from
-wherever a search ended and from all over the box: the same for one set of records whatever was searched with, and
-never worse than the search. Where draws of the noise leave as much as it does, the likelihood of the noise
-(`likelihood`, `observed`) is true and the most precise there is, and the estimate is its maximum.
+What a model leaves of a real record is mostly its own error, often a hundred times the noise. The
+likelihood of that noise is then no likelihood: single samples at the edges of a dip decide, and
+move parameters by more than they are worth. Least squares, Eq. (8), need to know nothing of the
+error. So the estimate is the minimum of Eq. (8), from wherever a search ended and from all over the
+box: the same for one set of records whatever was searched with, and never worse than the search.
+Where draws of the noise leave as much as it does, the likelihood of the noise (`likelihood`,
+`observed`) is true and the most precise there is, and the estimate is its maximum.
 
-Channels weighed by the size of what each leaves were tried beside Eq. (8): the same on 37 sets of a generator, and
-worse on records of ANDES, whose reactive power then counted for more than its error is worth.
+Channels weighed by the size of what each leaves were tried beside Eq. (8): the same on 37 sets of a
+generator, and worse on records of ANDES, whose reactive power then counted for more than its error
+is worth.
 """
 
 from collections import OrderedDict
@@ -24,17 +27,29 @@ from tractexp.identification.uncertainty import LocalMinimum, Uncertainty, concl
 from tractexp.inference.blocks import blocks_of, exceeds
 from tractexp.inference.least_squares import Descent
 from tractexp.inference.likelihood import Likelihood
-from tractexp.inference.multistart import along_least_certain, distinct, explore_minima, screen_points
+from tractexp.inference.multistart import (
+    along_least_certain,
+    distinct,
+    explore_minima,
+    screen_points,
+)
 from tractexp.inference.observed import Observed
 from tractexp.inference.prior import held_in_words
 from tractexp.inference.problem import Problem
-from tractexp.noise.color import FEWEST_NOISE_SAMPLES, SMALLEST_DEVIATION, fit_autoregression, stretches, white_noise
+from tractexp.noise.color import (
+    FEWEST_NOISE_SAMPLES,
+    SMALLEST_DEVIATION,
+    fit_autoregression,
+    stretches,
+    white_noise,
+)
 from tractexp.noise.model import Noise, Pair
 
 ESTIMATE_ROUNDS = 2  # of noise and fit in turn
 LARGEST_MINIMUM_RATIO = 1.3  # times the least sum of squares: valleys beyond it are given up
 BEHIND = 25.0  # of the deviance under the noise found: valleys farther behind are
-LEAST_MINIMUM_GAIN = 0.5  # of the deviance, by which a search's valley must be better than those of the box
+# of the deviance, by which a search's valley must be better than those of the box
+LEAST_MINIMUM_GAIN = 0.5
 OUTLIER = 5.0  # robust standard deviations from which a robust loss takes a sample for an outlier
 SAME_MINIMUM_DISTANCE = 1e-3  # of a range: ends closer than this are one valley
 REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
@@ -42,7 +57,8 @@ REMEMBERED = 4  # problems whose valleys are kept: the jobs of a sweep share one
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """One descent: where it began ("search", "box", "beside the best") and the parameters (d,) it ended at.
+    """One descent: where it began ("search", "box", "beside the best") and the parameters (d,) it
+    ended at.
 
     `above` is its sum of squares above the best's, in mean squares of what the best leaves.
     """
@@ -62,7 +78,9 @@ class Start:
 
 @dataclass(frozen=True, eq=False)
 class EstimationResult:
-    """An estimate, how surprising what it leaves is, and the valleys it was chosen from, the best first."""
+    """An estimate, how surprising what it leaves is, and the valleys it was chosen from, the best
+    first.
+    """
 
     uncertainty: Uncertainty
     surprise: Surprise
@@ -71,7 +89,9 @@ class EstimationResult:
 
 @dataclass(frozen=True, eq=False)
 class DescentEnds:
-    """Where descents by least squares ended: coordinates (n, d), sums of squares (n,) over `likelihood`'s, origins."""
+    """Where descents by least squares ended: coordinates (n, d), sums of squares (n,) over
+    `likelihood`'s, origins.
+    """
 
     observed: Observed
     likelihood: Likelihood
@@ -91,11 +111,17 @@ class DescentEnds:
     def near(self) -> np.ndarray:
         """Coordinates (at most 4, d) of distinct valleys that are not hopeless, the best first."""
         near = self.descent.deviance <= LARGEST_MINIMUM_RATIO * self.lowest
-        return distinct(Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free)
+        return distinct(
+            Descent(self.descent.unit[near], self.descent.deviance[near], 0), self.likelihood.free
+        )
 
     def joined(self, more: Descent, origin: str) -> "DescentEnds":
         """These and further ends of one origin."""
-        return replace(self, descent=self.descent.joined(more), origins=(*self.origins, *[origin] * len(more.unit)))
+        return replace(
+            self,
+            descent=self.descent.joined(more),
+            origins=(*self.origins, *[origin] * len(more.unit)),
+        )
 
     def looked_beside(self) -> "DescentEnds":
         """These and the ends of descents from beside the best."""
@@ -103,19 +129,26 @@ class DescentEnds:
         return self.joined(self.likelihood.descent(beside), "beside the best")
 
     def no_worse(self, unit: np.ndarray) -> bool:
-        """Whether coordinates (D,) of the likelihood fit as well by Eq. (8) as the best do, as far as chance explains.
+        """Whether coordinates (D,) of the likelihood fit as well by Eq. (8) as the best do, as far
+        as chance explains.
 
-        From the dips on: a load that swings before them makes a loud noise, to which a likelihood gives up too much.
+        From the dips on: a load that swings before them makes a loud noise, to which a likelihood
+        gives up too much.
         """
         squares, problem = self.likelihood, self.likelihood.problem
         rows = squares.rows(np.stack([unit[: squares.free], self.best]))
         polished, least = (rows**2).reshape(2, problem.drive.channels, -1).sum(axis=1)
-        return not exceeds(polished, least, blocks_of(problem.events, problem.drive, 3, from_dip=True))
+        return not exceeds(
+            polished, least, blocks_of(problem.events, problem.drive, 3, from_dip=True)
+        )
 
     @property
     def starts(self) -> tuple[Start, ...]:
         """What is told of them, the best first."""
-        values, above = self.likelihood.values(self.descent.unit), self.descent.deviance - self.lowest
+        values, above = (
+            self.likelihood.values(self.descent.unit),
+            self.descent.deviance - self.lowest,
+        )
         order = [k for k in np.argsort(above, kind="stable") if np.isfinite(above[k])]
         return tuple(Start(self.origins[k], values[k], float(above[k])) for k in order)
 
@@ -124,11 +157,14 @@ _remembered: OrderedDict[str, tuple[DescentEnds, EstimationResult]] = OrderedDic
 
 
 def estimate_without_search(problem: Problem) -> EstimationResult:
-    """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be simulated."""
+    """The estimate where nothing was searched. Raises `UserError` where nothing of the box can be
+    simulated.
+    """
     _, best = _of_box(problem)
     if best is None:
         raise UserError(
-            f"no parameter set tried can be simulated before {problem.events[0].record.name}; give values by"
+            f"no parameter set tried can be simulated before {problem.events[0].record.name}; give"
+            " values by"
             f" {TASK.values}=<result.json>, or narrow {MODEL.bounds}"
         )
     return best
@@ -137,8 +173,8 @@ def estimate_without_search(problem: Problem) -> EstimationResult:
 def estimate(problem: Problem, values: np.ndarray) -> EstimationResult:
     """The estimate for a problem whose search ended at free `values` (d,).
 
-    A robust loss takes samples more than `OUTLIER` standard deviations off the fit for outliers; what is left of the
-    records is then fitted from where the search ended.
+    A robust loss takes samples more than `OUTLIER` standard deviations off the fit for outliers;
+    what is left of the records is then fitted from where the search ended.
     """
     if not problem.loss.quadratic:
         return _robust(problem, values)
@@ -160,18 +196,26 @@ def _robust(problem: Problem, values: np.ndarray) -> EstimationResult:
 
 
 def _level(problem: Problem, values: np.ndarray) -> float:
-    """The root of the mean square [pu] that free values (d,) leave: a sum of squares over it counts samples."""
+    """The root of the mean square [pu] that free values (d,) leave: a sum of squares over it counts
+    samples.
+    """
     return max(float(np.sqrt(problem.objective(values[None])[0])), SMALLEST_DEVIATION)
 
 
 def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
-    """The ends of descents from all over the box, and the estimate that they give; None where none can be simulated."""
-    events = [(e.record.name, e.start, e.end, e.steady, e.noise_P, e.noise_Q) for e in problem.events]
+    """The ends of descents from all over the box, and the estimate that they give; None where none
+    can be simulated.
+    """
+    events = [
+        (e.record.name, e.start, e.end, e.steady, e.noise_P, e.noise_Q) for e in problem.events
+    ]
     key = f"{problem.digest()} {events}"
     if key not in _remembered:
         observed = Observed.of(problem)
         points, least = screen_points(observed.problem)
-        likelihood = Likelihood.of_squares(observed.problem, max(float(np.sqrt(least)), SMALLEST_DEVIATION))
+        likelihood = Likelihood.of_squares(
+            observed.problem, max(float(np.sqrt(least)), SMALLEST_DEVIATION)
+        )
         result = explore_minima(likelihood, points)
         ends = DescentEnds(observed, likelihood, result, ("box",) * len(result.unit))
         if not np.isfinite(ends.lowest):
@@ -188,16 +232,20 @@ def _of_box(problem: Problem) -> tuple[DescentEnds, EstimationResult | None]:
 
 
 def _in_own_units(ends: DescentEnds) -> DescentEnds:
-    """The same in mean squares of what the best leaves: there a descent's tolerance means the same for any record."""
+    """The same in mean squares of what the best leaves: there a descent's tolerance means the same
+    for any record.
+    """
     variance = max(ends.lowest / ends.likelihood.samples, 1e-12)
     descent = replace(ends.descent, deviance=ends.descent.deviance / variance)
     return replace(ends, likelihood=ends.likelihood.scaled(np.sqrt(variance)), descent=descent)
 
 
 def _without_offsets(ends: DescentEnds) -> DescentEnds:
-    """The ends of waveforms where what their channels' offsets do is left out of the sum of squares; else the same.
+    """The ends of waveforms where what their channels' offsets do is left out of the sum of
+    squares; else the same.
 
-    Offsets of the currents, and of the voltage as the model passes them on, are larger than a model's error there.
+    Offsets of the currents, and of the voltage as the model passes them on, are larger than a
+    model's error there.
     """
     problem = ends.observed.problem
     offsets = problem.domain.input_errors(problem, ends.likelihood.values(ends.best))
@@ -209,57 +257,85 @@ def _without_offsets(ends: DescentEnds) -> DescentEnds:
 
 
 def _choose_estimate(ends: DescentEnds, *, robust: bool = False) -> EstimationResult:
-    """Least squares where more than noise is left, and the maximum of the likelihood of the noise elsewhere."""
+    """Least squares where more than noise is left, and the maximum of the likelihood of the noise
+    elsewhere.
+    """
     observed = ends.observed
     likelihood, units = _under_noise(ends, robust=robust)
     surprising = surprise(observed, likelihood, units[0], ends.likelihood, ends.lowest)
     if not surprising.adequate:
         return _of_squares(ends, likelihood, surprising)
-    whole = noise_at(observed, likelihood, units[0], observed.input_errors(likelihood.values(units[0])), whole=True)
+    whole = noise_at(
+        observed,
+        likelihood,
+        units[0],
+        observed.input_errors(likelihood.values(units[0])),
+        whole=True,
+    )
     likelihood = replace(likelihood, noise=whole)  # nothing but noise is left: all of it tells
     result = likelihood.descent(units)
     best = int(result.deviance.argmin())
     if not ends.no_worse(result.unit[best]):
         return _of_squares(ends, likelihood, surprising)
     others = result.unit[np.arange(len(units)) != best]
-    return EstimationResult(with_local_minima(conclude(likelihood, result.unit[best]), others), surprising, ends.starts)
+    return EstimationResult(
+        with_local_minima(conclude(likelihood, result.unit[best]), others), surprising, ends.starts
+    )
 
 
 def _of_squares(ends: DescentEnds, noise: Likelihood, seen: Surprise) -> EstimationResult:
-    """The minimum of Eq. (8) as the estimate; with priors that of Eq. (8) and what machines usually are."""
+    """The minimum of Eq. (8) as the estimate; with priors that of Eq. (8) and what machines usually
+    are.
+    """
     uncertainty = conclude(ends.likelihood, ends.best, noise)
     near = ends.near
     if ends.likelihood.problem.priors:
         held = held_to_usual(ends.likelihood)
         near = _find_prior_minima(held, near)
-        uncertainty = conclude(held, near[0], noise, [held_in_words(held.problem, held.values(near[0]))])
+        uncertainty = conclude(
+            held, near[0], noise, [held_in_words(held.problem, held.values(near[0]))]
+        )
     return EstimationResult(with_local_minima(uncertainty, near), seen, ends.starts)
 
 
 def held_to_usual(squares: Likelihood) -> Likelihood:
-    """The same, whose rows are in units of what is left, with a prior beside which a block of samples counts as one."""
+    """The same, whose rows are in units of what is left, with a prior beside which a block of
+    samples counts as one.
+    """
     problem = squares.problem
     return replace(
-        squares, prior=np.sqrt(squares.samples / len(blocks_of(problem.events, problem.drive, squares.free)))
+        squares,
+        prior=np.sqrt(
+            squares.samples / len(blocks_of(problem.events, problem.drive, squares.free))
+        ),
     )
 
 
 def _find_prior_minima(likelihood: Likelihood, near: np.ndarray) -> np.ndarray:
-    """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it and the usual."""
+    """Coordinates (at most 4, d) of the valleys of a likelihood with a prior, from those without it
+    and the usual.
+    """
     space, defaults = likelihood.problem.space, likelihood.problem.defaults
     starts = np.concatenate([near, space.to_unit(defaults)[None]])
-    return distinct(likelihood.descent(np.concatenate([starts, explore_minima(likelihood).unit])), likelihood.free)
+    return distinct(
+        likelihood.descent(np.concatenate([starts, explore_minima(likelihood).unit])),
+        likelihood.free,
+    )
 
 
 def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.ndarray]:
-    """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best first."""
+    """The likelihood of the noise that the fit leaves in quiet, and its maxima (n, D), the best
+    first.
+    """
     observed, likelihood = ends.observed, ends.likelihood.with_initial_power
     units = likelihood.placed(ends.near)
     input_modes = observed.input_errors(likelihood.values(units[0]))
     for _ in range(ESTIMATE_ROUNDS):
         if robust:
             likelihood = drop_outliers(likelihood, units[:1])
-        likelihood = replace(likelihood, noise=noise_at(observed, likelihood, units[0], input_modes))
+        likelihood = replace(
+            likelihood, noise=noise_at(observed, likelihood, units[0], input_modes)
+        )
         result = likelihood.descent(units)
         order = np.argsort(result.deviance, kind="stable")
         units = result.unit[order[result.deviance[order] <= result.deviance.min() + BEHIND]]
@@ -267,21 +343,31 @@ def _under_noise(ends: DescentEnds, *, robust: bool) -> tuple[Likelihood, np.nda
 
 
 def noise_at(
-    observed: Observed, likelihood: Likelihood, unit: np.ndarray, input_modes: np.ndarray | None, whole: bool = False
+    observed: Observed,
+    likelihood: Likelihood,
+    unit: np.ndarray,
+    input_modes: np.ndarray | None,
+    whole: bool = False,
 ) -> Noise:
-    """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too little is quiet.
+    """The noise that a fit at coordinates (D,) leaves in quiet; of the `whole` residual where too
+    little is quiet.
 
-    The whole tells more, too, where only noise is left. `input_modes` is that of `Observed.input_errors`.
+    The whole tells more, too, where only noise is left. `input_modes` is that of
+    `Observed.input_errors`.
     """
     measured = likelihood.problem.drive.measured
     rows, J = replace(likelihood, noise=Noise.white(*[1.0] * len(measured))).jacobian(unit)
     residual = rows.reshape(measured.shape)
     values = likelihood.values(unit)
-    return observed.noise(residual, likelihood.valid, J, values, input_modes, whole) or noise_of(likelihood, residual)
+    return observed.noise(residual, likelihood.valid, J, values, input_modes, whole) or noise_of(
+        likelihood, residual
+    )
 
 
 def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
-    """An autoregression of each event's and channel's residual (2, N); what the fit has absorbed is given back."""
+    """An autoregression of each event's and channel's residual (2, N); what the fit has absorbed is
+    given back.
+    """
     drive = likelihood.problem.drive
     absorbed = likelihood.free + 2 * drive.events
     back = np.sqrt(likelihood.samples / max(likelihood.samples - absorbed, 1))
@@ -297,7 +383,9 @@ def noise_of(likelihood: Likelihood, residuals: np.ndarray) -> Noise:
 
 
 def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
-    """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at `unit` (1, D)."""
+    """The likelihood without the samples beyond `OUTLIER` robust standard deviations of the fit at
+    `unit` (1, D).
+    """
     drive = likelihood.problem.drive
     valid = drive.weights > 0
     residuals = np.abs(replace(likelihood, valid=valid).residuals(unit)[0])
@@ -306,23 +394,32 @@ def drop_outliers(likelihood: Likelihood, unit: np.ndarray) -> Likelihood:
             part = drive.part(e)
             sample = residuals[c, part][valid[c, part]]
             if len(sample):
-                valid[c, part] &= residuals[c, part] <= max(OUTLIER * 1.4826 * float(np.median(sample)), 1e-12)
+                valid[c, part] &= residuals[c, part] <= max(
+                    OUTLIER * 1.4826 * float(np.median(sample)), 1e-12
+                )
     return replace(likelihood, valid=valid)
 
 
 def with_local_minima(uncertainty: Uncertainty, units: np.ndarray) -> Uncertainty:
-    """The judgement with other valleys (n, D) that the records do not rule out: intervals reach over them.
+    """The judgement with other valleys (n, D) that the records do not rule out: intervals reach
+    over them.
 
-    A parameter that has another value in another valley is not identified, however narrow either valley is.
+    A parameter that has another value in another valley is not identified, however narrow either
+    valley is.
     """
     rows = uncertainty.likelihood.rows(units) if len(units) else np.empty((0, 1))
     above = (rows**2).sum(axis=1) - uncertainty.deviance
     apart = np.abs(units - uncertainty.unit).max(axis=1, initial=0.0) > SAME_MINIMUM_DISTANCE
-    local_minima = [LocalMinimum(unit, uncertainty.likelihood.values(unit), float(a))
-               for unit, a in zip(units[apart], above[apart], strict=True) if a < threshold()]  # fmt: skip
+    local_minima = [
+        LocalMinimum(unit, uncertainty.likelihood.values(unit), float(a))
+        for unit, a in zip(units[apart], above[apart], strict=True)
+        if a < threshold()
+    ]
     verdicts, own = dict(uncertainty.verdicts), uncertainty.intervals
     for minimum in local_minima:
         for j in np.flatnonzero((minimum.values < own[:, 0]) | (minimum.values > own[:, 1])):
             name, value = uncertainty.names[j], float(minimum.values[j])
-            verdicts[name] = verdicts[name].weakened(f"another valley, at {value:.4g}, fits as well")
+            verdicts[name] = verdicts[name].weakened(
+                f"another valley, at {value:.4g}, fits as well"
+            )
     return replace(uncertainty, verdicts=verdicts, local_minima=tuple(local_minima))

@@ -8,11 +8,15 @@ from tractexp.record import Event
 
 
 def by_depth(events: Sequence[Event], fitted: Sequence[Event]) -> list[str]:
-    """ "interpolation" for a dip no deeper than the deepest that was fitted, else "extrapolation"."""
+    """ "interpolation" for a dip no deeper than the deepest that was fitted, else
+    "extrapolation".
+    """
     deepest = max(event.depth for event in fitted)
     return ["interpolation" if event.depth <= deepest else "extrapolation" for event in events]
 
 
 def mean_residual(measured: np.ndarray, calculated: np.ndarray) -> float:
-    """Eq. (21) of the paper: the mean of |measured - calculated| [pu], both (N,); gaps (nan) are left out."""
+    """Eq. (21) of the paper: the mean of |measured - calculated| [pu], both (N,); gaps (nan) are
+    left out.
+    """
     return float(np.nanmean(np.abs(measured - calculated)))

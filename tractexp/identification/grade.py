@@ -1,7 +1,8 @@
 """The grade of a model on records: what its estimate leaves of the fitted and the held-out events.
 
-It is reckoned here alone, whoever asks. So the same model and records have the same error, grade and sentence in an
-identification, in an investigation, in what is stored, logged and exported, and on every page.
+It is reckoned here alone, whoever asks. So the same model and records have the same error, grade
+and sentence in an identification, in an investigation, in what is stored, logged and exported, and
+on every page.
 """
 
 import functools
@@ -29,7 +30,9 @@ from tractexp.record import Event
 
 @dataclass(frozen=True, eq=False)
 class GradedModel:
-    """A model's estimate, as it fits some events and predicts others; `fits` has the fitted events first."""
+    """A model's estimate, as it fits some events and predicts others; `fits` has the fitted events
+    first.
+    """
 
     problem: Problem
     estimation: EstimationResult
@@ -47,13 +50,16 @@ class GradedModel:
 
     @functools.cached_property
     def errors(self) -> dict[str, Any]:
-        """The model's error as `result.json` has it: of the fitted events, of those held out, and of each."""
+        """The model's error as `result.json` has it: of the fitted events, of those held out, and
+        of each.
+        """
         return model_errors(self.fits)
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far a model is off some events: the model's error, and the relative errors of Eq. (20), as fractions.
+    """How far a model is off some events: the model's error, and the relative errors of Eq. (20),
+    as fractions.
 
     `epsilon_i` is that of the currents, over several events the rms of theirs; None of phasors.
     """
@@ -72,35 +78,56 @@ class Misfit:
 
 
 def grade_model(
-    problem: Problem, validate: Sequence[Event] = (), searched: np.ndarray | None = None, shown: Collection[str] = ()
+    problem: Problem,
+    validate: Sequence[Event] = (),
+    searched: np.ndarray | None = None,
+    shown: Collection[str] = (),
 ) -> GradedModel:
     """The estimate for a problem, and its grade on the fitted events and on `validate`.
 
-    `searched` (d,) are free values that a search ended at, `shown` effects that the model has because its records show
-    them. Raises `UserError` where nothing of the box can be simulated.
+    `searched` (d,) are free values that a search ended at, `shown` effects that the model has
+    because its records show them. Raises `UserError` where nothing of the box can be simulated.
     """
-    estimation = estimate_without_search(problem) if searched is None else estimate(problem, searched)
+    estimation = (
+        estimate_without_search(problem) if searched is None else estimate(problem, searched)
+    )
     return grade_estimate(problem, estimation, validate, shown)
 
 
 def grade_playable(
-    problem: Problem, validate: Sequence[Event] = (), searched: np.ndarray | None = None, shown: Collection[str] = ()
+    problem: Problem,
+    validate: Sequence[Event] = (),
+    searched: np.ndarray | None = None,
+    shown: Collection[str] = (),
 ) -> GradedModel:
-    """As `grade_model`, where a held-out event without a steady state makes a wrong model and no refusal."""
-    estimation = estimate_without_search(problem) if searched is None else estimate(problem, searched)
+    """As `grade_model`, where a held-out event without a steady state makes a wrong model and no
+    refusal.
+    """
+    estimation = (
+        estimate_without_search(problem) if searched is None else estimate(problem, searched)
+    )
     shared = problem.full(estimation.uncertainty.values)[0]
-    refusals = {event.record.name: explain_refusal(problem.model, shared, event) for event in validate}
+    refusals = {
+        event.record.name: explain_refusal(problem.model, shared, event) for event in validate
+    }
     playable = [event for event in validate if not refusals[event.record.name]]
     graded = grade_estimate(problem, estimation, playable, shown)
     if len(playable) == len(validate):
         return graded
     reasons = [f"{name} cannot be simulated ({why})" for name, why in refusals.items() if why]
-    sentence = f"{graded.adequacy.sentence}; {'; '.join(reasons)}: the model does not describe this load"
-    return replace(graded, adequacy=replace(graded.adequacy, grade=Grade.WRONG_MODEL, sentence=sentence))
+    sentence = (
+        f"{graded.adequacy.sentence}; {'; '.join(reasons)}: the model does not describe this load"
+    )
+    return replace(
+        graded, adequacy=replace(graded.adequacy, grade=Grade.WRONG_MODEL, sentence=sentence)
+    )
 
 
 def grade_estimate(
-    problem: Problem, estimation: EstimationResult, validate: Sequence[Event] = (), shown: Collection[str] = ()
+    problem: Problem,
+    estimation: EstimationResult,
+    validate: Sequence[Event] = (),
+    shown: Collection[str] = (),
 ) -> GradedModel:
     """The grade of an estimate that is there already."""
     values = estimation.uncertainty.values
@@ -117,6 +144,13 @@ def grade_estimate(
 
 
 def _nuisances(problem: Problem, shown: Collection[str]) -> list[str]:
-    """Parameters, as the problem names them, of effects that nobody asked for: their bounds tell nothing."""
-    own = {p.name for effect in problem.model.effects if effect.name in shown for p in effect.parameters}
+    """Parameters, as the problem names them, of effects that nobody asked for: their bounds tell
+    nothing.
+    """
+    own = {
+        p.name
+        for effect in problem.model.effects
+        if effect.name in shown
+        for p in effect.parameters
+    }
     return [name for name in problem.space.names if name.partition("[")[0] in own]

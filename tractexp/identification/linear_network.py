@@ -1,11 +1,13 @@
-r"""The best linear network of a few poles from the recorded voltage to the recorded current: a model without physics.
+r"""The best linear network of a few poles from the recorded voltage to the recorded current: a
+model without physics.
 
     i = G u + C du/dt + sum_k g_k s / (s - p_k) u
 
-u and i deviate from their course before the dip, complex (`tractexp.domain.port`); G is how the current follows a
-voltage that stays, C a capacitance, g_k what pole k adds at first and what dies out with it. The zero sequence has the
-path of a resistance and an inductance, g / (s - p) u. Between samples u is a straight line: so responses are exact. The
-poles are found by variable projection (`tractexp.identification.projection`), their number by events held out.
+u and i deviate from their course before the dip, complex (`tractexp.domain.port`); G is how the
+current follows a voltage that stays, C a capacitance, g_k what pole k adds at first and what dies
+out with it. The zero sequence has the path of a resistance and an inductance, g / (s - p) u.
+Between samples u is a straight line: so responses are exact. The poles are found by variable
+projection (`tractexp.identification.projection`), their number by events held out.
 """
 
 from collections.abc import Sequence
@@ -28,7 +30,9 @@ HELD_OUT, CRITERION = "the held-out dips", "the Bayesian information criterion"
 
 @dataclass(frozen=True, eq=False)
 class LinearNetwork:
-    """Poles (n,) [rad/s] in the port's frame, and the linear part (k,): g_k, C, and G where the port leaves it open."""
+    """Poles (n,) [rad/s] in the port's frame, and the linear part (k,): g_k, C, and G where the
+    port leaves it open.
+    """
 
     poles: Complex
     coefficients: Complex
@@ -48,7 +52,9 @@ class LinearNetwork:
 
 @dataclass(frozen=True, eq=False)
 class BlackBox:
-    """A linear network for each port of a domain, and by what the number of its poles was chosen."""
+    """A linear network for each port of a domain, and by what the number of its
+    poles was chosen.
+    """
 
     domain: Domain
     networks: tuple[LinearNetwork, ...]
@@ -57,26 +63,41 @@ class BlackBox:
 
     @property
     def poles(self) -> list[dict[str, float]]:
-        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the vectors, the slowest first.
+        """`decay` [1/s], `frequency` [Hz] and `admittance` [pu] of each pole of the vectors, the
+        slowest first.
 
-        In waveforms the frequency is that in the phases, negative where the vector turns backwards; in phasors P and Q
-        oscillate with it. The admittance is what the pole adds at first and what dies out.
+        In waveforms the frequency is that in the phases, negative where the vector turns backwards;
+        in phasors P and Q oscillate with it. The admittance is what the pole adds at first and what
+        dies out.
         """
         poles, shares = self.networks[0].poles, np.abs(self.networks[0].coefficients)
-        turning = poles.imag / (2 * np.pi) + self.turns if self.turns else np.abs(poles.imag) / (2 * np.pi)
+        turning = (
+            poles.imag / (2 * np.pi) + self.turns
+            if self.turns
+            else np.abs(poles.imag) / (2 * np.pi)
+        )
         rows = zip((-poles.real).tolist(), turning.tolist(), shares.tolist(), strict=False)
-        return [dict(zip(("decay", "frequency", "admittance"), row, strict=True)) for row in sorted(rows)]
+        return [
+            dict(zip(("decay", "frequency", "admittance"), row, strict=True))
+            for row in sorted(rows)
+        ]
 
     def play(self, event: Event) -> Playback:
         """What it calculates of an event of its domain."""
-        responses = [n.response(port) for n, port in zip(self.networks, self.domain.ports(event), strict=False)]
+        responses = [
+            n.response(port)
+            for n, port in zip(self.networks, self.domain.ports(event), strict=False)
+        ]
         return self.domain.comparison(event, self.domain.outputs(event, responses))
 
 
-def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_POLES) -> list[BlackBox]:
+def black_boxes(
+    domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_POLES
+) -> list[BlackBox]:
     """The best ones for events of a domain together, of no pole, one, and so on.
 
-    Raises `UserError` where the voltage does not move, or the samples are too few for a network without poles.
+    Raises `UserError` where the voltage does not move, or the samples are too few for a network
+    without poles.
     """
     vectors, *zeros = zip(*map(domain.ports, train), strict=False)
     _refuse(vectors, ", ".join(e.record.name for e in train))
@@ -85,12 +106,18 @@ def black_boxes(domain: Domain, train: Sequence[Event], most: int = MOST_VECTOR_
 
 
 def best(domain: Domain, train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
-    """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes` does."""
+    """The best network of the number of poles that suits best. Raises `UserError` as `black_boxes`
+    does.
+    """
     return selection(black_boxes(domain, train), train, held_out)
 
 
-def selection(boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]) -> BlackBox:
-    """The one that leaves least of events that it has not seen; without such, of the least information criterion."""
+def selection(
+    boxes: Sequence[BlackBox], train: Sequence[Event], held_out: Sequence[Event]
+) -> BlackBox:
+    """The one that leaves least of events that it has not seen; without such, of the least
+    information criterion.
+    """
     vectors = [box.networks[0] for box in boxes]
     ports = [boxes[0].domain.ports(event)[0] for event in held_out or train]
     by = [one.squares(ports) for one in vectors] if held_out else information(vectors, ports)
@@ -108,7 +135,8 @@ def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
 
 
 def information(networks: Sequence[LinearNetwork], ports: Sequence[Port]) -> np.ndarray:
-    """The Bayesian information criterion of each (b,); samples count as what the last one leaves is correlated in time.
+    """The Bayesian information criterion of each (b,); samples count as what the last one leaves is
+    correlated in time.
 
     Source: Schwarz 1978; Bayley and Hammersley 1946 (the effective number of samples).
     """
@@ -136,8 +164,11 @@ def _refuse(ports: Sequence[Port], names: str) -> None:
     samples, needed = _samples(ports), SAMPLES * unknowns(0, ports[0])
     if samples < needed:
         raise UserError(
-            f"{names}: {samples // 2} samples from the dip on are too few for a linear network, which needs"
+            f"{names}: {samples // 2} samples from the dip on are too few for a linear network,"
+            " which needs"
             f" {-(-needed // 2)}; take a record that goes on longer, or of more samples in a second"
         )
     if max(float(np.abs(port.u[port.start :]).max()) for port in ports) < LEAST_VOLTAGE_MOVE:
-        raise UserError(f"the voltage of {names} does not change, and a network is known by what a change does")
+        raise UserError(
+            f"the voltage of {names} does not change, and a network is known by what a change does"
+        )

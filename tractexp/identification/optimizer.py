@@ -1,4 +1,6 @@
-"""What an optimizer is given and what it must do. Counting, clipping and keeping the best are not its business."""
+"""What an optimizer is given and what it must do. Counting, clipping and keeping the best are not
+its business.
+"""
 
 import itertools
 from abc import abstractmethod
@@ -17,38 +19,49 @@ __all__ = ["REFUSED", "Box", "Evaluate", "Iterative", "Optimizer"]
 
 
 class Evaluate(Protocol):
-    """The batch objective. Both calls clip `x` (n, d) into the box and return the points really evaluated.
+    """The batch objective. Both calls clip `x` (n, d) into the box and return the points really
+    evaluated.
 
-    `budget` is the number of evaluations the search may make, by which a schedule can be laid out; None: any.
+    `budget` is the number of evaluations the search may make, by which a schedule can be laid out;
+    None: any.
     """
 
     @property
     def budget(self) -> int | None: ...
 
     def __call__(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is better; never nan."""
+        """Points (n, d) -> (evaluated points (n, d), objectives (n,)). Lower is
+        better; never nan.
+        """
         ...
 
     def residuals(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, d) -> (evaluated points (n, d), residuals (n, m)); the objective is their sum of squares.
+        """Points (n, d) -> (evaluated points (n, d), residuals (n, m)); the objective is their sum
+        of squares.
 
-        A point that cannot be simulated has nan in its whole row. Raises `UserError` where the problem has no
-        residuals.
+        A point that cannot be simulated has nan in its whole row. Raises `UserError` where the
+        problem has no residuals.
         """
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class Optimizer(Plugin):
-    """Base of the optimizer plugins, chosen by `optimizer=NAME`. Its fields are settings of every optimizer."""
+    """Base of the optimizer plugins, chosen by `optimizer=NAME`. Its fields are settings of every
+    optimizer.
+    """
 
     group: ClassVar[str] = "optimizer"
-    plain: ClassVar[str] = ""  # the optimizer that this one is, bit for bit, with all its switches off
+    # the optimizer that this one is, bit for bit, with all its switches off
+    plain: ClassVar[str] = ""
     space: str = "unit"  # "unit": search in the unit cube; "raw": in the parameters' own units
-    polish: bool = False  # end with bounded least squares from the best points, inside the same budget
+    # end with bounded least squares from the best points, inside the same budget
+    polish: bool = False
 
     def end(self, budget: int | None) -> int | None:
-        """The iterations after which a search ends by itself under a budget of simulations; None where that is open."""
+        """The iterations after which a search ends by itself under a budget of simulations; None
+        where that is open.
+        """
         return getattr(self, "iterations", None)
 
     def check(self) -> None:
@@ -56,19 +69,24 @@ class Optimizer(Plugin):
 
     @abstractmethod
     def search(self, evaluate: Evaluate, box: Box, rng: np.random.Generator) -> Iterator[None]:
-        """Search `box`, yielding once at the end of each iteration (the initial population is iteration 0).
+        """Search `box`, yielding once at the end of each iteration (the initial population is
+        iteration 0).
 
-        A generator: the search loop runs it until it returns or a budget is spent, in which case `evaluate`
-        raises and the generator simply ends. All randomness comes from `rng`.
+        A generator: the search loop runs it until it returns or a budget is spent, in which case
+        `evaluate` raises and the generator simply ends. All randomness comes from `rng`.
         """
 
 
 @dataclass(frozen=True, kw_only=True)
 class Iterative(Optimizer):
-    """Base of the optimizers that repeat one step: so often as is set, or as the budget lasts for."""
+    """Base of the optimizers that repeat one step: so often as is set, or as the
+    budget lasts for.
+    """
 
-    usual: ClassVar[int] = 300  # where nothing else says: sections 4.2 and 4.3 of the traction load paper
-    iterations: int | None = None  # null: as many as the budget lasts for; without a budget the usual number
+    # where nothing else says: sections 4.2 and 4.3 of the traction load paper
+    usual: ClassVar[int] = 300
+    # null: as many as the budget lasts for; without a budget the usual number
+    iterations: int | None = None
 
     def check(self) -> None:
         super().check()
@@ -81,8 +99,8 @@ class Iterative(Optimizer):
     def laid_out(self, budget: int | None, first: float, each: float) -> tuple[int, Iterable[int]]:
         """How many iterations the search is laid out for, and their numbers 1, 2, ...
 
-        The first population costs `first` simulations and an iteration `each`, on average: a budget lasts for so many,
-        and then ends them, for the numbers go on.
+        The first population costs `first` simulations and an iteration `each`, on average: a budget
+        lasts for so many, and then ends them, for the numbers go on.
         """
         count = self.end(budget)
         if count is not None:

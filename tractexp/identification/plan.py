@@ -1,6 +1,8 @@
-"""Before the recording: what a dip would tell, how deep it must be, and which events of an archive are worth fitting.
+"""Before the recording: what a dip would tell, how deep it must be, and which events of an archive
+are worth fitting.
 
-The information matrix needs no measurement, only the voltage, the noise and a guess of the parameters.
+The information matrix needs no measurement, only the voltage, the noise and a guess of the
+parameters.
 """
 
 import math
@@ -19,18 +21,21 @@ from tractexp.noise import Autoregression, Noise
 from tractexp.record import Event
 
 BEFORE, AFTER = 0.3, 1.5  # s recorded before and after a planned dip
-LARGEST_SENSITIVITY = 1e100  # whitened sensitivities beyond which a calculation has left all numbers that mean anything
+# whitened sensitivities beyond which a calculation has left all numbers that mean anything
+LARGEST_SENSITIVITY = 1e100
 DEPTHS = np.arange(0.05, 0.951, 0.025)
 INERTIA = "H"  # H = M omega_s / 2 has the relative precision of M
 
 
 @dataclass(frozen=True)
 class DipShape:
-    """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within `memory` [s].
+    """A dip that might be recorded, from 1 pu, with trapezoidal edges. Noise [pu] forgets within
+    `memory` [s].
 
-    Of waveforms it is a dip of the positive sequence in which the voltage's phase jumps by `jump` [degrees], with a
-    negative sequence of `unbalance` times its depth (0: balanced; 1: a fault between two phases, Bollen 2000, types C
-    and D), and the noise is that of the currents alpha (noise_P) and beta (noise_Q).
+    Of waveforms it is a dip of the positive sequence in which the voltage's phase jumps by `jump`
+    [degrees], with a negative sequence of `unbalance` times its depth (0: balanced; 1: a fault
+    between two phases, Bollen 2000, types C and D), and the noise is that of the currents alpha
+    (noise_P) and beta (noise_Q).
     """
 
     depth: float
@@ -48,20 +53,34 @@ class DipShape:
 
     @classmethod
     def of(cls, event: Event, noise: Noise | None = None) -> "DipShape":
-        """The shape of a recorded event, with the noise that a fit found there, or that before the dip."""
+        """The shape of a recorded event, with the noise that a fit found there, or that before the
+        dip.
+        """
         noise, domain = noise or Noise((before_the_event(event),)), domain_of(event)
         (noise_P, noise_Q, *_), memory = noise.levels, noise.memory(event.record.step)
         return cls(
-            event.depth, event.duration, event.rate, noise_P, noise_Q, event.P0, event.Q0,
-            event.record.base.frequency, memory, domain, **domain.shape(event),
-        )  # fmt: skip
+            event.depth,
+            event.duration,
+            event.rate,
+            noise_P,
+            noise_Q,
+            event.P0,
+            event.Q0,
+            event.record.base.frequency,
+            memory,
+            domain,
+            **domain.shape(event),
+        )
 
     @property
     def noise(self) -> Noise:
         """Noise of what is compared at this rate: a first-order autoregression."""
         a = math.exp(-1 / (self.rate * self.memory)) if self.memory > 0 else 0.0
         color, shock = np.array([[0.0], [a]]), math.sqrt(1 - a * a)
-        P, Q = (Autoregression(color, level * np.array([1.0, shock])) for level in (self.noise_P, self.noise_Q))
+        P, Q = (
+            Autoregression(color, level * np.array([1.0, shock]))
+            for level in (self.noise_P, self.noise_Q)
+        )
         return Noise(((P, Q, P)[: len(self.domain.channels)],))
 
     def check(self, where: str = "task") -> None:
@@ -73,7 +92,8 @@ class DipShape:
         check_range(f"{where}.unbalance", self.unbalance, 0.0, 1.0)
         if not min(self.noise_P, self.noise_Q) > 0:
             raise UserError(
-                f"the records show no noise before the dip, and without noise every interval is zero; give it as"
+                "the records show no noise before the dip, and without noise every interval is"
+                " zero; give it as"
                 f" {where}.noise, a fraction of P before the dip"
             )
 
@@ -118,15 +138,19 @@ def forecast(
     earlier: Information | None = None,
     noise: Noise | None = None,
 ) -> Forecast:
-    """The intervals that `shape` would give at free `values` (d,), added to what is `earlier` already.
+    """The intervals that `shape` would give at free `values` (d,), added to what is `earlier`
+    already.
 
-    `noise` replaces the shape's. Raises `UserError` where the values have no steady state, and for a model that
-    reads more than a planned dip has.
+    `noise` replaces the shape's. Raises `UserError` where the values have no steady state, and for
+    a model that reads more than a planned dip has.
     """
     if reads := problem.model.reads:
-        readers = ", ".join(f"{part.group} '{part.name}' reads {channel}" for channel, part in reads.items())
+        readers = ", ".join(
+            f"{part.group} '{part.name}' reads {channel}" for channel, part in reads.items()
+        )
         raise UserError(
-            f"a planned dip is a voltage alone, but of this model the {readers}: nothing can be planned with it"
+            f"a planned dip is a voltage alone, but of this model the {readers}: nothing can be"
+            " planned with it"
         )
     planned = like(problem, [shape.event()])
     informations = each(planned, values, noise or shape.noise)
@@ -144,9 +168,12 @@ def each(problem: Problem, values: np.ndarray, noise: Noise | None = None) -> li
     likelihood = Likelihood.of(problem, noise)
     _, J = likelihood.jacobian(likelihood.to_unit(values)[0])
     width = problem.upper - problem.lower
-    diverges = not np.abs(J.columns).max() < LARGEST_SENSITIVITY  # a dip in which the motor stalls tells nothing
+    # a dip in which the motor stalls tells nothing
+    diverges = not np.abs(J.columns).max() < LARGEST_SENSITIVITY
     rows = np.zeros_like(J.columns[: J.k].T) if diverges else J.without_own
-    return [Information(problem.space.names, np.asarray(values), width, rows[own]) for own in J.rows]
+    return [
+        Information(problem.space.names, np.asarray(values), width, rows[own]) for own in J.rows
+    ]
 
 
 def add_information(informations: Sequence[Information]) -> Information:
@@ -156,7 +183,9 @@ def add_information(informations: Sequence[Information]) -> Information:
 
 @dataclass(frozen=True, eq=False)
 class Needed:
-    """How deep a dip must be to know a parameter within a share of its value; `depth` None: no dip is."""
+    """How deep a dip must be to know a parameter within a share of its value; `depth` None: no dip
+    is.
+    """
 
     parameter: str
     within: float
@@ -168,17 +197,26 @@ class Needed:
         best = int(np.argmin(self.relative))
         if self.depth is None:
             return (
-                f"no dip of this kind gives {self.parameter} within {100 * self.within:g} %: the best, of"
+                f"no dip of this kind gives {self.parameter} within {100 * self.within:g} %: the"
+                " best, of"
                 f" {100 * self.depths[best]:.0f} %, gives ± {100 * self.relative[best]:.2g} %"
             )
-        return f"a dip of {100 * self.depth:.0f} % gives {self.parameter} within {100 * self.within:g} %"
+        return (
+            f"a dip of {100 * self.depth:.0f} % gives {self.parameter} within {100 * self.within:g}"
+            " %"
+        )
 
 
 def column(names: Sequence[str], parameter: str) -> int:
-    """The column of a parameter, `H` standing for `M`; raises `UserError` for one that is not free."""
+    """The column of a parameter, `H` standing for `M`; raises `UserError` for one that
+    is not free.
+    """
     name = "M" if parameter == INERTIA and "M" in names else parameter
     if name not in names:
-        raise UserError(f"{TASK.parameter}={parameter} is not a free parameter{among(parameter, [*names, INERTIA])}")
+        raise UserError(
+            f"{TASK.parameter}={parameter} is not a free"
+            f" parameter{among(parameter, [*names, INERTIA])}"
+        )
     return list(names).index(name)
 
 
@@ -190,7 +228,9 @@ def over_depth(
     noise: Noise | None = None,
 ) -> list[Forecast]:
     """Forecasts for dips of every depth, otherwise of this `shape`."""
-    return [forecast(problem, values, replace(shape, depth=float(d)), earlier, noise) for d in DEPTHS]
+    return [
+        forecast(problem, values, replace(shape, depth=float(d)), earlier, noise) for d in DEPTHS
+    ]
 
 
 def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -> Needed:
@@ -204,13 +244,17 @@ def depth_needed(forecasts: Sequence[Forecast], parameter: str, within: float) -
         depth = float(depths[k])
         if k and np.isfinite(relative[k - 1]):
             a, b = np.log(relative[k - 1 : k + 1])
-            depth = float(depths[k - 1] + (np.log(within) - a) / (b - a) * (depths[k] - depths[k - 1]))
+            depth = float(
+                depths[k - 1] + (np.log(within) - a) / (b - a) * (depths[k] - depths[k - 1])
+            )
     return Needed(parameter, within, depth, depths, relative)
 
 
 @dataclass(frozen=True)
 class ChosenEvent:
-    """One event of the best set, in the order of choice: by how much the intervals shrink with it, on average."""
+    """One event of the best set, in the order of choice: by how much the intervals shrink with it,
+    on average.
+    """
 
     event: int
     name: str
@@ -218,20 +262,28 @@ class ChosenEvent:
     half: tuple[float, ...]  # half intervals of all parameters once it is added
 
 
-def best_events(problem: Problem, values: np.ndarray, least: float, most: int | None = None) -> list[ChosenEvent]:
-    """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses them."""
-    return best_of(each(problem, values), [event.record.name for event in problem.events], least, most)
+def best_events(
+    problem: Problem, values: np.ndarray, least: float, most: int | None = None
+) -> list[ChosenEvent]:
+    """The events of a problem that tell most together at free `values` (d,), as `best_of` chooses
+    them.
+    """
+    return best_of(
+        each(problem, values), [event.record.name for event in problem.events], least, most
+    )
 
 
 def best_of(
     informations: Sequence[Information], names: Sequence[str], least: float, most: int | None = None
 ) -> list[ChosenEvent]:
-    """The events that tell most together, greedily by the determinant of the information (D-optimal).
+    """The events that tell most together, greedily by the determinant of the information
+    (D-optimal).
 
-    Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count as what is
-    known beforehand, so that a set that leaves a parameter open still has a volume.
+    Ends before the event whose gain is below `least`, or after `most`. The parameters' bounds count
+    as what is known beforehand, so that a set that leaves a parameter open still has a volume.
     """
-    prior = np.eye(len(informations[0].names)) * 12.0  # per range: the variance of a uniform distribution
+    # per range: the variance of a uniform distribution
+    prior = np.eye(len(informations[0].names)) * 12.0
     matrices = [i.J.T @ i.J for i in informations]
     volume = lambda chosen: np.linalg.slogdet(prior + sum(matrices[e] for e in chosen))[1]  # noqa: E731
     chosen: list[int] = []
@@ -244,15 +296,21 @@ def best_of(
         if chosen and gain < least:
             break
         chosen.append(best)
-        half = interval_factor() * add_information([informations[e] for e in chosen]).standard_errors
-        choices.append(ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist())))
+        half = (
+            interval_factor() * add_information([informations[e] for e in chosen]).standard_errors
+        )
+        choices.append(
+            ChosenEvent(best, names[best], gain if len(chosen) > 1 else 1.0, tuple(half.tolist()))
+        )
     return choices
 
 
 def alone(problem: Problem, values: np.ndarray) -> Information:
-    """The information of a problem's only event at free `values` (d,), in as few rows as there are parameters.
+    """The information of a problem's only event at free `values` (d,), in as few rows as there are
+    parameters.
 
-    Of an archive, event by event: their Jacobian together, with P0 and Q0 of each, would not fit into memory.
+    Of an archive, event by event: their Jacobian together, with P0 and Q0 of each, would not fit
+    into memory.
     """
     (information,) = each(problem, values)
     return replace(information, J=np.linalg.qr(information.J, mode="r"))

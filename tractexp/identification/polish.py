@@ -1,4 +1,5 @@
-"""Bounded least squares from good starts: the end of a polished search and the body of a multi-start one.
+"""Bounded least squares from good starts: the end of a polished search and the body of a
+multi-start one.
 
 A step costs d + 1 simulations: one trial, and a Jacobian whose d forward differences are one batch.
 """
@@ -10,25 +11,31 @@ import numpy as np
 from tractexp.identification.optimizer import REFUSED, Box, Evaluate
 from tractexp.parameter import best_distinct
 
-UNIT_DIFFERENCE = 1e-6  # of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
+# of the box's width; rounding (3e-13 relative) and curvature both stay below 1e-6 of a column
+UNIT_DIFFERENCE = 1e-6
 BOX_MARGIN = 1e-9  # SciPy's interior method starts strictly inside the box
 ELITE = 30  # starts of a polish: the valley sought may rank twentieth where the motor stalls
-# between starts, in the coordinate that differs most: a search that has settled in one valley must not fill the elite
-# with points of it
+# between starts, in the coordinate that differs most: a search that has settled in one valley must
+# not fill the elite with points of it
 LEAST_START_DISTANCE = 0.3
 
-ROUGH, ROUGH_TRIALS = 1e-2, 12  # relative tolerance and trials of a descent that has yet to prove itself
+# relative tolerance and trials of a descent that has yet to prove itself
+ROUGH, ROUGH_TRIALS = 1e-2, 12
 
 
 class Elite:
-    """The best points a search has met that lie apart from each other, best first: where a polish starts."""
+    """The best points a search has met that lie apart from each other, best first: where a polish
+    starts.
+    """
 
     def __init__(self, box: Box):
         self.box = box
         self.x, self.f = np.empty((0, box.dimension)), np.empty(0)
 
     def add(self, x: np.ndarray, f: np.ndarray) -> None:
-        """Consider points (n, d) with objectives (n,); those refused or worse than a full elite are passed over."""
+        """Consider points (n, d) with objectives (n,); those refused or worse than a full elite are
+        passed over.
+        """
         better = f < (self.f[-1] if len(self.f) == ELITE else REFUSED)
         if better.any():
             x, f = np.concatenate((self.x, x[better])), np.concatenate((self.f, f[better]))
@@ -47,15 +54,16 @@ class _Residuals:
         return self.evaluate.residuals(self.box.from_unit(unit))[1] * self.scale
 
     def __call__(self, unit: np.ndarray) -> np.ndarray:
-        if not np.array_equal(unit, self.unit):  # asked again, as for the Jacobian: no second simulation
+        # asked again, as for the Jacobian: no second simulation
+        if not np.array_equal(unit, self.unit):
             self.unit, self.value = unit.copy(), self._rows(unit[None])[0]
         return self.value
 
     def jacobian(self, unit: np.ndarray) -> np.ndarray:
         """(m, d). A difference steps away from the nearer wall.
 
-        One that cannot be simulated steps the other way, and is left at zero where that fails as well: the
-        parameter then rests for one step.
+        One that cannot be simulated steps the other way, and is left at zero where that fails as
+        well: the parameter then rests for one step.
         """
         h = np.where(unit > 0.5, -UNIT_DIFFERENCE, UNIT_DIFFERENCE)
         rows = self._rows(unit + np.diag(h))
@@ -67,16 +75,24 @@ class _Residuals:
 
 
 def least_squares_from(
-    evaluate: Evaluate, box: Box, start: np.ndarray, objective: float, tolerance: float = 1e-8, trials: int = 100
+    evaluate: Evaluate,
+    box: Box,
+    start: np.ndarray,
+    objective: float,
+    tolerance: float = 1e-8,
+    trials: int = 100,
 ) -> tuple[np.ndarray, float]:
-    """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is known.
+    """Bounded least squares (SciPy's trust region reflective) from `start` (d,), whose objective is
+    known.
 
-    Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance` is relative:
-    the descent ends when the objective, the step or the gradient is below it, or after `trials` trials. Returns
-    the point (d,) it ended at and its objective; a start that cannot be simulated is left at once.
+    Works in the unit cube and on residuals scaled to a sum of squares of one, so that `tolerance`
+    is relative: the descent ends when the objective, the step or the gradient is below it, or after
+    `trials` trials. Returns the point (d,) it ended at and its objective; a start that cannot be
+    simulated is left at once.
 
-    Not `inference.least_squares.descend`: here each simulation is counted and the search loop may stop it anywhere, and
-    the method is a library's; there hundreds of lanes share each simulation call.
+    Not `inference.least_squares.descend`: here each simulation is counted and the search loop may
+    stop it anywhere, and the method is a library's; there hundreds of lanes share each simulation
+    call.
     """
     from scipy.optimize import least_squares  # its annotations know `jac` as a string only
 
@@ -85,19 +101,31 @@ def least_squares_from(
     if not np.isfinite(residuals(unit)).all():
         return start, objective
     result = least_squares(
-        residuals, unit, residuals.jacobian,  # pyright: ignore[reportArgumentType]
-        (0.0, 1.0), ftol=tolerance, xtol=tolerance, gtol=tolerance, max_nfev=trials,
-    )  # fmt: skip
+        residuals,
+        unit,
+        residuals.jacobian,  # pyright: ignore[reportArgumentType]
+        (0.0, 1.0),
+        ftol=tolerance,
+        xtol=tolerance,
+        gtol=tolerance,
+        max_nfev=trials,
+    )
     return box.from_unit(result.x), float(2 * result.cost / residuals.scale**2)
 
 
 def race(
-    evaluate: Evaluate, box: Box, starts: Iterable[tuple[np.ndarray, float]], tolerance: float = 1e-8, trials: int = 100
+    evaluate: Evaluate,
+    box: Box,
+    starts: Iterable[tuple[np.ndarray, float]],
+    tolerance: float = 1e-8,
+    trials: int = 100,
 ) -> Iterator[None]:
-    """Descend briefly from each start (point, objective), and to the end from each that comes out lowest so far.
+    """Descend briefly from each start (point, objective), and to the end from each that comes out
+    lowest so far.
 
-    In the right valley a descent is soon below the bottoms of the wrong ones, which take most of the simulations where
-    every descent is finished. What was left is finished at last, lowest first. An iteration is one descent.
+    In the right valley a descent is soon below the bottoms of the wrong ones, which take most of
+    the simulations where every descent is finished. What was left is finished at last, lowest
+    first. An iteration is one descent.
     """
     left, best = [], np.inf
     for start, objective in starts:

@@ -1,4 +1,6 @@
-"""A sample of the posterior, to confirm intervals where the likelihood is no parabola. Needs the extra [posterior]."""
+"""A sample of the posterior, to confirm intervals where the likelihood is no parabola. Needs the
+extra [posterior].
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -37,21 +39,30 @@ class PosteriorSample:
 
 
 def sample(
-    uncertainty: Uncertainty, walkers: int, steps: int, seed: int, parts: Callable[[int], Counting] = make_silent_counter
+    uncertainty: Uncertainty,
+    walkers: int,
+    steps: int,
+    seed: int,
+    parts: Callable[[int], Counting] = make_silent_counter,
 ) -> PosteriorSample:
-    """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one simulation call.
+    """Goodman and Weare's affine-invariant ensemble (emcee), all walkers of a half-step in one
+    simulation call.
 
-    P0 and Q0 of each event are sampled along; `parts` counts the steps. Raises `UserError` where emcee is missing.
+    P0 and Q0 of each event are sampled along; `parts` counts the steps. Raises `UserError` where
+    emcee is missing.
     """
     try:
         import emcee
     except ImportError:
         raise UserError(
-            f"{setting('task=posterior')} needs emcee; install it by: pip install 'tractexp[posterior]'"
+            f"{setting('task=posterior')} needs emcee; install it by: pip install"
+            " 'tractexp[posterior]'"
         ) from None
     likelihood, d = uncertainty.likelihood, len(uncertainty.unit)
     if walkers < 2 * d:
-        raise UserError(f"{TASK.walkers}={walkers} is too few: {d} coordinates need at least {2 * d}")
+        raise UserError(
+            f"{TASK.walkers}={walkers} is too few: {d} coordinates need at least {2 * d}"
+        )
 
     def log_probability(unit: np.ndarray) -> np.ndarray:
         outside = ((unit < 0) | (unit > 1)).any(axis=1)
@@ -60,7 +71,9 @@ def sample(
         return np.where(outside | ~np.isfinite(value), -np.inf, value)
 
     rng = np.random.default_rng(seed)
-    start = np.clip(uncertainty.unit + _spread(uncertainty) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6)
+    start = np.clip(
+        uncertainty.unit + _spread(uncertainty) * rng.standard_normal((walkers, d)), 1e-6, 1 - 1e-6
+    )
     start[~np.isfinite(log_probability(start))] = np.clip(uncertainty.unit, 1e-6, 1 - 1e-6)
     start = np.clip(start + 1e-7 * rng.standard_normal(start.shape), 0, 1)
     sampler = emcee.EnsembleSampler(walkers, d, log_probability, vectorize=True)
@@ -72,12 +85,19 @@ def sample(
     time = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
     draws = likelihood.values(chain)
     return PosteriorSample(
-        uncertainty.names, draws, steps, time, float(sampler.acceptance_fraction.mean()), walkers * (steps + 2)
+        uncertainty.names,
+        draws,
+        steps,
+        time,
+        float(sampler.acceptance_fraction.mean()),
+        walkers * (steps + 2),
     )
 
 
 def _spread(uncertainty: Uncertainty) -> np.ndarray:
-    """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a tenth."""
+    """Standard deviation of the start (D,), in ranges: that of the information matrix, at most a
+    tenth.
+    """
     wide = uncertainty.information.standard_errors / (uncertainty.upper - uncertainty.lower)
     rest = np.full(len(uncertainty.unit) - len(wide), 1e-3)
     return np.concatenate((np.clip(wide, 1e-6, 0.1), rest))

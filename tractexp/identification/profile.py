@@ -1,13 +1,15 @@
 """Profile likelihood: the deviance of the best fit for each value of a parameter, all others free.
 
-Where the likelihood is no parabola, the interval of the information matrix misleads; the profile does not. Its lanes
-end where the deviance has risen too far, though beyond a crest it may fall again: so the rest of each range is looked
-at, too, from every valley, and lanes go on from where the records fit as well.
-Every point of a profile that the records do not rule out belongs to the intervals of all parameters, not only of the
-profiled one: where it lies beyond another's, a lane of that goes on from there.
+Where the likelihood is no parabola, the interval of the information matrix misleads; the profile
+does not. Its lanes end where the deviance has risen too far, though beyond a crest it may fall
+again: so the rest of each range is looked at, too, from every valley, and lanes go on from where
+the records fit as well. Every point of a profile that the records do not rule out belongs to the
+intervals of all parameters, not only of the profiled one: where it lies beyond another's, a lane of
+that goes on from there.
 
-Deviances are told over what a parameter's may rise by, in units of the chi-squared quantile: under least squares, that
-of another scatter (`Uncertainty.limits`), one threshold holds for all. Source: Chandler and Bate 2007.
+Deviances are told over what a parameter's may rise by, in units of the chi-squared quantile: under
+least squares, that of another scatter (`Uncertainty.limits`), one threshold holds for all. Source:
+Chandler and Bate 2007.
 """
 
 from collections.abc import Callable, Sequence
@@ -47,9 +49,15 @@ class Profiles:
 
     @property
     def wider(self) -> np.ndarray:
-        """(d,) Whether points of the profiles that the records do not rule out lie beyond the interval by curvature."""
+        """(d,) Whether points of the profiles that the records do not rule out lie beyond the
+        interval by curvature.
+        """
         uncertainty = self.uncertainty
-        ends = zip(uncertainty.values - uncertainty.half, uncertainty.values + uncertainty.half, strict=True)
+        ends = zip(
+            uncertainty.values - uncertainty.half,
+            uncertainty.values + uncertainty.half,
+            strict=True,
+        )
         units = [_in_range(uncertainty, c, interval) for c, interval in enumerate(ends)]
         return np.array([bool(self.region.outermost(c, *unit)) for c, unit in enumerate(units)])
 
@@ -58,24 +66,40 @@ class Profiles:
         if not self.restarts:
             return []
         times = "once" if self.restarts == 1 else f"{self.restarts} times"
-        return [f"a better optimum turned up along a profile; the profiles were restarted from it {times}"]
+        return [
+            "a better optimum turned up along a profile; the profiles were restarted from it"
+            f" {times}"
+        ]
 
     @property
     def verdicts(self) -> dict[str, ParameterVerdict]:
         """The verdicts of the information matrix, corrected by what the profiles show."""
         uncertainty = self.uncertainty
-        bounds = dict(zip(uncertainty.names, zip(uncertainty.lower, uncertainty.upper, strict=True), strict=True))
+        bounds = dict(
+            zip(
+                uncertainty.names,
+                zip(uncertainty.lower, uncertainty.upper, strict=True),
+                strict=True,
+            )
+        )
         other = dict(zip(uncertainty.names, uncertainty.elsewhere, strict=True))
         return uncertainty.verdicts | {
-            p.name: revise_verdict(uncertainty.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name]))
+            p.name: revise_verdict(
+                uncertainty.verdicts[p.name], p, *bounds[p.name], elsewhere=bool(other[p.name])
+            )
             for p in self.profiles
         }
 
 
 def revise_verdict(
-    verdict: ParameterVerdict, profile: LikelihoodProfile, low: float, high: float, elsewhere: bool = False
+    verdict: ParameterVerdict,
+    profile: LikelihoodProfile,
+    low: float,
+    high: float,
+    elsewhere: bool = False,
 ) -> ParameterVerdict:
-    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a weakness.
+    """A verdict in the light of a profile: its width decides; an open side or a second minimum is a
+    weakness.
 
     So is another valley, `elsewhere`.
     """
@@ -88,7 +112,12 @@ def revise_verdict(
         word = UNIDENTIFIED
     elif verdict.word == BOUND:
         word = BOUND
-    elif any(opened) or profile.minima or elsewhere or (b - a) / 2 > IDENTIFIED_SHARE * size(value, low, high):
+    elif (
+        any(opened)
+        or profile.minima
+        or elsewhere
+        or (b - a) / 2 > IDENTIFIED_SHARE * size(value, low, high)
+    ):
         word = WEAK
     else:
         word = IDENTIFIED
@@ -96,12 +125,14 @@ def revise_verdict(
     return ParameterVerdict(word, detail)
 
 
-def check_by_profiles(uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter) -> Uncertainty:
+def check_by_profiles(
+    uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter
+) -> Uncertainty:
     """The judgement with profiles in place of curvature wherever the curvature may mislead.
 
-    That is for intervals wider than `DOUBTFUL` of the value, for parameters that have another value in another valley,
-    and for those that another's profile leads beyond their interval; else a narrow one is a parabola. Parameters that
-    are not identifiable by structure have no profile.
+    That is for intervals wider than `DOUBTFUL` of the value, for parameters that have another value
+    in another valley, and for those that another's profile leads beyond their interval; else a
+    narrow one is a parabola. Parameters that are not identifiable by structure have no profile.
     """
     bounds = zip(uncertainty.lower, uncertainty.upper, strict=True)
     sizes = np.array([size(v, *pair) for v, pair in zip(uncertainty.values, bounds, strict=True)])
@@ -118,8 +149,12 @@ def check_by_profiles(uncertainty: Uncertainty, parts: Callable[[int], Counting]
     )
 
 
-def _of_doubtful(uncertainty: Uncertainty, doubtful: np.ndarray, parts: Callable[[int], Counting]) -> Profiles:
-    """Profiles of the doubtful (d,) parameters and of those that these lead beyond their interval by curvature."""
+def _of_doubtful(
+    uncertainty: Uncertainty, doubtful: np.ndarray, parts: Callable[[int], Counting]
+) -> Profiles:
+    """Profiles of the doubtful (d,) parameters and of those that these lead beyond their interval
+    by curvature.
+    """
     names = [name for name, d in zip(uncertainty.names, doubtful, strict=True) if d]
     result = profiles(uncertainty, names=names, parts=parts)
     wider = doubtful | result.wider & uncertainty.information.identifiable
@@ -135,9 +170,11 @@ def profiles(
     names: Sequence[str] | None = None,
     parts: Callable[[int], Counting] = make_silent_counter,
 ) -> Profiles:
-    """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points` points a side.
+    """Profiles of every free parameter (or of `names`) around `uncertainty`, of at most `points`
+    points a side.
 
-    Where a point fits better than the optimum did, everything starts again from there. `parts` counts the points.
+    Where a point fits better than the optimum did, everything starts again from there. `parts`
+    counts the points.
     """
     simulations, restarts, names = 0, 0, names or uncertainty.names
     while True:
@@ -152,7 +189,14 @@ def profiles(
                 break
         simulations += drawing.simulations
         if drawing.better is None or restarts == RESTARTS:
-            return Profiles(uncertainty, tuple(drawing.curves), threshold(), simulations, restarts, drawing.region)
+            return Profiles(
+                uncertainty,
+                tuple(drawing.curves),
+                threshold(),
+                simulations,
+                restarts,
+                drawing.region,
+            )
         descent = uncertainty.likelihood.descent(drawing.better[None])
         simulations += descent.simulations
         uncertainty = uncertainty.at(descent.unit[0])
@@ -165,13 +209,17 @@ class _Drawing:
     def __init__(self, uncertainty: Uncertainty, column: np.ndarray):
         self.uncertainty, self.column = uncertainty, column
         self.curves: list[LikelihoodProfile] = []
-        self.region = Region(np.empty((0, len(uncertainty.unit))), np.empty((0, len(uncertainty.names))))
+        self.region = Region(
+            np.empty((0, len(uncertainty.unit))), np.empty((0, len(uncertainty.names)))
+        )
         self.better: np.ndarray | None = None
         self.simulations = 0
 
     def begin(self, points: int, ended: Callable[[], None]) -> None:
         k = len(self.column)
-        lanes = Lanes(self.uncertainty, self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k))
+        lanes = Lanes(
+            self.uncertainty, self.column, np.tile(self.uncertainty.unit, (k, 1)), np.zeros(k)
+        )
         self._run(lanes, points, ended)
         self.curves = [lanes.profile(i) for i in range(k)]
 
@@ -180,9 +228,14 @@ class _Drawing:
         self._join(_elsewhere(self.uncertainty, self.column, self.curves), points)
 
     def go_on(self, points: int) -> bool:
-        """Lanes from points of all lanes that fit and lie beyond a profile's interval; False where there are none."""
-        where = [(int(c), k) for c, p in zip(self.column, self.curves, strict=True)
-                 for k in self.region.outermost(int(c), *_in_range(self.uncertainty, int(c), p.interval))]  # fmt: skip
+        """Lanes from points of all lanes that fit and lie beyond a profile's interval; False where
+        there are none.
+        """
+        where = [
+            (int(c), k)
+            for c, p in zip(self.column, self.curves, strict=True)
+            for k in self.region.outermost(int(c), *_in_range(self.uncertainty, int(c), p.interval))
+        ]
         if where:
             c, k = np.array(where).T
             rise = self.region.rise[k, c] * threshold()
@@ -191,8 +244,12 @@ class _Drawing:
 
     def _join(self, lanes: Lanes, points: int) -> None:
         self._run(lanes, points)
-        self.curves = [_join_profiles(p, [lanes.profile(int(k)) for k in np.flatnonzero(lanes.column[::2] == c)])
-                       for p, c in zip(self.curves, self.column, strict=True)]  # fmt: skip
+        self.curves = [
+            _join_profiles(
+                p, [lanes.profile(int(k)) for k in np.flatnonzero(lanes.column[::2] == c)]
+            )
+            for p, c in zip(self.curves, self.column, strict=True)
+        ]
 
     def _run(self, lanes: Lanes, points: int, ended: Callable[[], None] = lambda: None) -> None:
         lanes.run(points, ended)
@@ -201,22 +258,33 @@ class _Drawing:
         self.region = self.region.joined(lanes.region)
 
 
-def _in_range(uncertainty: Uncertainty, c: int, interval: tuple[float, float]) -> tuple[float, float]:
+def _in_range(
+    uncertainty: Uncertainty, c: int, interval: tuple[float, float]
+) -> tuple[float, float]:
     """An interval of the c-th parameter in its range."""
     low, width = uncertainty.lower[c], uncertainty.upper[c] - uncertainty.lower[c]
     return (interval[0] - low) / width, (interval[1] - low) / width
 
 
-def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]) -> Lanes:
+def _elsewhere(
+    uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[LikelihoodProfile]
+) -> Lanes:
     """Lanes from the best place of each range beyond the profile's interval that fits as well."""
     begin = np.array([uncertainty.unit, *(minimum.unit for minimum in uncertainty.local_minima)])
     wanted = []  # (column, value in the range)
     for c, profile in zip(column, curves, strict=True):
         low, high = _in_range(uncertainty, c, profile.interval)
         values = np.concatenate([GRID, begin[1:, c]])
-        wanted += [(c, v) for v in values[(values < low - INTERVAL_NEIGHBORHOOD) | (values > high + INTERVAL_NEIGHBORHOOD)]]
+        wanted += [
+            (c, v)
+            for v in values[
+                (values < low - INTERVAL_NEIGHBORHOOD) | (values > high + INTERVAL_NEIGHBORHOOD)
+            ]
+        ]
     if not wanted:
-        return Lanes(uncertainty, np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0))
+        return Lanes(
+            uncertainty, np.empty(0, dtype=int), np.empty((0, len(uncertainty.unit))), np.empty(0)
+        )
     columns = np.repeat([c for c, _ in wanted], len(begin))
     start = np.tile(begin, (len(wanted), 1))
     rows = np.arange(len(start))
@@ -228,10 +296,14 @@ def _elsewhere(uncertainty: Uncertainty, column: np.ndarray, curves: Sequence[Li
     return Lanes(uncertainty, columns[best], descent.unit[best], rise[best], descent.simulations)
 
 
-def _join_profiles(profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]) -> LikelihoodProfile:
-    """A profile with what further lanes found: the least of both at each value, and an interval over both.
+def _join_profiles(
+    profile: LikelihoodProfile, others: Sequence[LikelihoodProfile]
+) -> LikelihoodProfile:
+    """A profile with what further lanes found: the least of both at each value, and an interval
+    over both.
 
-    What fits best of a lane from beyond the interval is another minimum, unless it is in the interval.
+    What fits best of a lane from beyond the interval is another minimum, unless it is in the
+    interval.
     """
     for other in others:
         every = sorted((profile, other), key=lambda p: p.interval)
@@ -241,7 +313,9 @@ def _join_profiles(profile: LikelihoodProfile, others: Sequence[LikelihoodProfil
         profile = replace(
             profile,
             values=values,
-            deviance=np.minimum(*(np.interp(values, p.values, p.deviance, np.inf, np.inf) for p in every)),
+            deviance=np.minimum(
+                *(np.interp(values, p.values, p.deviance, np.inf, np.inf) for p in every)
+            ),
             interval=(every[0].interval[0], max(p.interval[1] for p in every)),
             ends=(every[0].ends[0], max(every, key=lambda p: p.interval[1]).ends[1]),
             minima=profile.minima if low <= least <= high else (*profile.minima, least),

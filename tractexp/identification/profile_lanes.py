@@ -1,7 +1,8 @@
-"""Lanes of profiles: each follows the best fit as one parameter moves away from where it begins, all others free.
+"""Lanes of profiles: each follows the best fit as one parameter moves away from where it begins,
+all others free.
 
-All lanes advance in lockstep, two (down and up) for each place, so that one simulation call carries a step of every one
-of them. A lane ends where the deviance has risen too far.
+All lanes advance in lockstep, two (down and up) for each place, so that one simulation call carries
+a step of every one of them. A lane ends where the deviance has risen too far.
 """
 
 from collections.abc import Callable
@@ -32,7 +33,9 @@ class End(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class LikelihoodProfile:
-    """One parameter: `deviance` (n,) above the optimum's at `values` (n,), in increasing order of value."""
+    """One parameter: `deviance` (n,) above the optimum's at `values` (n,), in increasing order of
+    value.
+    """
 
     name: str
     values: np.ndarray
@@ -55,7 +58,8 @@ class LikelihoodProfile:
 
 @dataclass(frozen=True, eq=False)
 class Region:
-    """Points of lanes: coordinates (n, D), and by what share of what it may rise by each parameter's deviance is up.
+    """Points of lanes: coordinates (n, D), and by what share of what it may rise by each
+    parameter's deviance is up.
 
     That is `rise` (n, d).
     """
@@ -64,24 +68,39 @@ class Region:
     rise: np.ndarray
 
     def joined(self, other: "Region") -> "Region":
-        return Region(np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise]))
+        return Region(
+            np.concatenate([self.unit, other.unit]), np.concatenate([self.rise, other.rise])
+        )
 
     def outermost(self, c: int, low: float, high: float) -> list[int]:
-        """Which points lie farthest below and above an interval of the c-th parameter and fit; [] where none does."""
+        """Which points lie farthest below and above an interval of the c-th parameter and fit; []
+        where none does.
+        """
         values = np.where(self.rise[:, c] < 1.0, self.unit[:, c], low)
         if not len(values):
             return []
         down, up = int(values.argmin()), int(values.argmax())
-        return [down] * bool(values[down] < low - SMALLEST_STEP) + [up] * bool(values[up] > high + SMALLEST_STEP)
+        return [down] * bool(values[down] < low - SMALLEST_STEP) + [up] * bool(
+            values[up] > high + SMALLEST_STEP
+        )
 
 
 class Lanes:
-    """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the k-th place, in its parameter."""
+    """The state of all lanes: lane 2 k goes down, lane 2 k + 1 up from the k-th place, in its
+    parameter.
+    """
 
     def __init__(
-        self, uncertainty: Uncertainty, column: np.ndarray, unit: np.ndarray, rise: np.ndarray, simulations: int = 0
+        self,
+        uncertainty: Uncertainty,
+        column: np.ndarray,
+        unit: np.ndarray,
+        rise: np.ndarray,
+        simulations: int = 0,
     ):
-        """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,) and so many `simulations` led to."""
+        """From coordinates `unit` (k, D), where the deviance is up by `rise` (k,) and so many
+        `simulations` led to.
+        """
         self.uncertainty, self.limit, self.simulations = uncertainty, threshold(), simulations
         self.origin, self.risen = unit, rise
         self.column, self.unit = np.repeat(column, 2), np.repeat(unit, 2, axis=0)
@@ -93,7 +112,8 @@ class Lanes:
         self.rise = np.repeat(rise, 2)
         self.open = np.ones(len(self.column), dtype=bool)
         self.path: list[list[tuple[float, float]]] = [[] for _ in self.column]
-        self.trail: list[tuple[np.ndarray, np.ndarray]] = []  # coordinates (n, D), deviances above the optimum's (n,)
+        # coordinates (n, D), deviances above the optimum's (n,)
+        self.trail: list[tuple[np.ndarray, np.ndarray]] = []
         self.better: np.ndarray | None = None
 
     @property
@@ -125,7 +145,8 @@ class Lanes:
         self.simulations += descent.simulations
         rise = (descent.deviance - self.uncertainty.deviance) * self.scale[lanes]
         moved = target - here
-        over = ~(rise <= OVERSHOOT * self.limit) & (self.rise[lanes] < self.limit)  # or cannot be simulated
+        # or cannot be simulated
+        over = ~(rise <= OVERSHOOT * self.limit) & (self.rise[lanes] < self.limit)
         if (over := over & (np.abs(moved) > 2 * SMALLEST_STEP)).any():
             self.step[lanes[over]] = np.abs(moved[over]) / 3
             fine = ~over
@@ -148,7 +169,9 @@ class Lanes:
         return True
 
     def _adapt(self, lanes: np.ndarray, rise: np.ndarray, moved: np.ndarray) -> None:
-        """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of the last."""
+        """Steps that raise the root of the deviance by about `AIM`, at most thrice or a third of
+        the last.
+        """
         roots = np.sqrt(np.maximum(np.stack((rise, self.rise[lanes])), 0.0))
         gained = np.maximum(roots[0] - roots[1], 1e-3)
         factor = np.clip(np.where(np.isfinite(gained), AIM / gained, 1 / 3), 1 / 3, 3.0)
@@ -189,11 +212,14 @@ class Lanes:
         return [
             float(path[k, 0])
             for k in range(1, len(heights) - 1)
-            if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit) and heights[:k].max() - heights[k] > RISE
+            if heights[k] <= min(heights[k - 1], heights[k + 1], self.limit)
+            and heights[:k].max() - heights[k] > RISE
         ]
 
 
-def others_free(uncertainty: Uncertainty, start: np.ndarray, columns: np.ndarray, tolerance: float) -> Descent:
+def others_free(
+    uncertainty: Uncertainty, start: np.ndarray, columns: np.ndarray, tolerance: float
+) -> Descent:
     """Descents from coordinates (n, D), each with one of the `columns` (n,) as it is."""
     frozen = np.arange(start.shape[1]) == columns[:, None]
     return uncertainty.likelihood.descent(start, frozen, tolerance=tolerance)

@@ -1,7 +1,8 @@
-"""Variable projection: the poles of a network by nonlinear least squares, everything that is linear projected out.
+"""Variable projection: the poles of a network by nonlinear least squares, everything that is linear
+projected out.
 
-A pole more starts where one of a grid takes most of what the others leave. Bounds keep each where it dies out, within
-the time that is recorded, and is no faster than the samples show.
+A pole more starts where one of a grid takes most of what the others leave. Bounds keep each where
+it dies out, within the time that is recorded, and is no faster than the samples show.
 Source: Golub and Pereyra 2003; Kaufman 1975 (the Jacobian).
 """
 
@@ -14,14 +15,17 @@ import numpy as np
 from tractexp.domain.port import Complex, Port
 
 TRIED_DECAYS = 6  # of a pole that is tried, from the slowest to the fastest
-FREQUENCIES = (0.0, 2.0, 5.0, 12.0, 25.0, 50.0, 100.0)  # Hz against the frame, of a pole that is tried
+# Hz against the frame, of a pole that is tried
+FREQUENCIES = (0.0, 2.0, 5.0, 12.0, 25.0, 50.0, 100.0)
 FASTEST, HIGHEST = 0.5, 0.25  # of the sampling rate: a decay [1/s], a frequency [Hz]
 MOST_PROJECTION_STEPS = 40  # of the nonlinear least squares
 PARALLEL = 1e-6  # of a response: where the others leave no more of it, it is theirs
 
 
 class LinearPart(NamedTuple):
-    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), the residual (R,)."""
+    """The linear part for given poles: its best coefficients (k,), an orthonormal base (R, k), the
+    residual (R,).
+    """
 
     coefficients: Complex
     base: Complex
@@ -47,13 +51,21 @@ class Projection:
         """The best linear part beside poles (n,)."""
         base, triangle = np.linalg.qr(_rows(self.ports, lambda port: basis(port, poles)))
         inside = base.conj().T @ self.current
-        return LinearPart(np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside)
+        return LinearPart(
+            np.linalg.lstsq(triangle, inside, rcond=None)[0], base, self.current - base @ inside
+        )
 
     @property
     def grid(self) -> list[complex]:
         decays = np.geomspace(self.slowest, FASTEST * self.rate, TRIED_DECAYS + 2)[1:-1].tolist()
-        turns = [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]
-        return [complex(-a, 2 * np.pi * f) for a in decays for f in sorted({*turns, *(-f for f in turns)})]
+        turns = (
+            [0.0] if self.ports[0].series else [f for f in FREQUENCIES if f < HIGHEST * self.rate]
+        )
+        return [
+            complex(-a, 2 * np.pi * f)
+            for a in decays
+            for f in sorted({*turns, *(-f for f in turns)})
+        ]
 
     def start(self, poles: Complex) -> complex:
         """The pole of the grid that takes most of what these leave, beside them."""
@@ -73,26 +85,39 @@ class Projection:
 
         n, apart = len(poles), 2 * np.pi * HIGHEST * self.rate
         lower, upper = np.log(self.slowest), np.log(FASTEST * self.rate)
-        bounds = np.array([[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)).T
+        bounds = np.array(
+            [[lower, upper]] * n + [[-apart, apart]] * (0 if self.ports[0].series else n)
+        ).T
         first = np.concatenate([np.log(-poles.real), poles.imag])[: bounds.shape[1]]
         optimum = least_squares(
-            lambda x: _parts(self.linear_part(_poles(x, n)).residual), np.clip(first, *bounds),
+            lambda x: _parts(self.linear_part(_poles(x, n)).residual),
+            np.clip(first, *bounds),
             lambda x: self.jacobian(_poles(x, n)),  # pyright: ignore[reportArgumentType]
-            bounds=bounds, x_scale="jac", method="dogbox", max_nfev=MOST_PROJECTION_STEPS,
-        )  # fmt: skip
+            bounds=bounds,
+            x_scale="jac",
+            method="dogbox",
+            max_nfev=MOST_PROJECTION_STEPS,
+        )
         return _poles(optimum.x, n)
 
     def jacobian(self, poles: Complex) -> np.ndarray:
-        """How what is left (2 R,) moves with the logarithms of the decays and with the frequencies."""
+        """How what is left (2 R,) moves with the logarithms of the decays and with the
+        frequencies.
+        """
         coefficients, base, _ = self.linear_part(poles)
-        moved = _rows(self.ports, lambda port: np.stack([with_pole(port, p) for p in poles], axis=1))
+        moved = _rows(
+            self.ports, lambda port: np.stack([with_pole(port, p) for p in poles], axis=1)
+        )
         moved = moved * coefficients[: len(poles)]
         moved = base @ (base.conj().T @ moved) - moved
-        return _parts(np.concatenate([moved * poles.real] + [1j * moved] * (not self.ports[0].series), axis=1))
+        return _parts(
+            np.concatenate([moved * poles.real] + [1j * moved] * (not self.ports[0].series), axis=1)
+        )
 
 
 def basis(port: Port, poles: Complex) -> Complex:
-    """Responses to u (N, k): of each pole, of the derivative and, where that is open, of a constant.
+    """Responses to u (N, k): of each pole, of the derivative and, where that is open, of a
+    constant.
 
     Of a path in series those of its poles alone.
     """
@@ -116,8 +141,11 @@ def with_pole(port: Port, pole: complex) -> Complex:
 
 
 def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
-    """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line between samples."""
-    from scipy.linalg import get_blas_funcs  # as fast as scipy.signal's filter, which takes a second to import
+    """The response 1 / (s - p) (N,) to u, at rest at first; exact where u is a straight line
+    between samples.
+    """
+    # as fast as scipy.signal's filter, which takes a second to import
+    from scipy.linalg import get_blas_funcs
 
     z = pole * step
     grown = np.expm1(z)
@@ -130,12 +158,16 @@ def compute_pole_response(u: Complex, pole: complex, step: float) -> Complex:
 
 
 def _rows(ports: Sequence[Port], of: Callable[[Port], Complex]) -> Complex:
-    """What `of` gives of each port, (N, ...), at the samples that are compared, one port after the other."""
+    """What `of` gives of each port, (N, ...), at the samples that are compared, one port after the
+    other.
+    """
     return np.concatenate([of(port)[np.isfinite(port.i)] for port in ports])
 
 
 def _poles(x: np.ndarray, n: int) -> Complex:
-    """Poles (n,) of the logarithms of their decays and, where they may oscillate, their frequencies [rad/s]."""
+    """Poles (n,) of the logarithms of their decays and, where they may oscillate, their frequencies
+    [rad/s].
+    """
     return -np.exp(x[:n]) + 1j * (x[n:] if len(x) > n else np.zeros(n))
 
 

@@ -1,4 +1,6 @@
-"""What an identification found: the estimate, how well it fits each event, and its file `result.json`."""
+"""What an identification found: the estimate, how well it fits each event, and its file
+`result.json`.
+"""
 
 import json
 import math
@@ -34,10 +36,19 @@ FILE = "result.json"  # in the folder of a run
 
 
 def parts(node: Mapping[str, Any]) -> tuple[Any, Any, list[Any], str, str, float | str | None]:
-    """The motor, static load and effects a model configuration names, built; integration, domain, recorder's window."""
+    """The motor, static load and effects a model configuration names, built; integration, domain,
+    recorder's window.
+    """
     effects = [build("effect", {"name": name}) for name in node.get("effects", ())]
     motor, static = build("model/motor", node["motor"]), build("model/static", node["static"])
-    return motor, static, effects, node.get("integration", CLASSICAL), node.get("domain", PHASORS), node.get("window")
+    return (
+        motor,
+        static,
+        effects,
+        node.get("integration", CLASSICAL),
+        node.get("domain", PHASORS),
+        node.get("window"),
+    )
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -47,22 +58,38 @@ class Fit(Playback):
     role: str  # TRAIN or VALIDATE
 
     def to_dict(self) -> dict[str, Any]:
-        """As `result.json` has it; where Q is a small share of S, Eq. (20) divides its error by little."""
+        """As `result.json` has it; where Q is a small share of S, Eq. (20) divides its error by
+        little.
+        """
         record = self.event.record
-        share = float(np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30)))
+        share = float(
+            np.sqrt(np.nansum(record.Q**2) / max(np.nansum(record.P**2 + record.Q**2), 1e-30))
+        )
         row: dict[str, Any] = {"name": record.name, "role": self.role}
         row |= {"epsilon_p": self.epsilon_p, "epsilon_q": self.epsilon_q, "Q_over_S": share}
-        return row if self.epsilon_i is None else row | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
+        return (
+            row
+            if self.epsilon_i is None
+            else row | {"epsilon_i": self.epsilon_i, "unsettled": self.unsettled}
+        )
 
 
-def by_event(values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]) -> dict[str, float]:
+def by_event(
+    values: Mapping[str, float], per_event: Mapping[str, Sequence[float]]
+) -> dict[str, float]:
     """Parameters by name, with T_m[1], T_m[2], ... where each event has its own."""
-    own = {f"{name}[{k}]": value for name, each in per_event.items() for k, value in enumerate(each, start=1)}
+    own = {
+        f"{name}[{k}]": value
+        for name, each in per_event.items()
+        for k, value in enumerate(each, start=1)
+    }
     return {**values, **own}
 
 
 def respond(model: Model, values: np.ndarray, event: Event, role: str) -> Fit:
-    """Play one event through the model. Raises `UserError` where these parameters have no steady state there."""
+    """Play one event through the model. Raises `UserError` where these parameters have no steady
+    state there.
+    """
     domain = domain_of(model)
     event = domain.event(event)
     drive = Drive.of([domain.excitation(event, model)])
@@ -83,10 +110,10 @@ def explain_refusal(model: Model, values: np.ndarray, event: Event) -> str:
 class Result:
     """The content of `result.json`. `model` and `before` are what it takes to simulate it again.
 
-    Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the optimizer itself end, and
-    simulations, iterations, seconds and status are what it took to get there. Everything is on the record's own base;
-    `own_base` says which that is, and `parameters_on_given_base` are the parameters on that of the file where it
-    differs.
+    Parameters, errors, intervals and verdicts belong to the estimate; `search` is where the
+    optimizer itself end, and simulations, iterations, seconds and status are what it took to get
+    there. Everything is on the record's own base; `own_base` says which that is, and
+    `parameters_on_given_base` are the parameters on that of the file where it differs.
     """
 
     parameters: dict[str, float]
@@ -105,34 +132,44 @@ class Result:
     bounds: dict[str, list[float]]
     model: dict[str, Any]
     before: dict[str, float]
-    shown_effects: dict[str, str] = field(default_factory=dict)  # {effect of the model that the records show: how}
+    # {effect of the model that the records show: how}
+    shown_effects: dict[str, str] = field(default_factory=dict)
     optimizer: str = ""
     search: dict[str, Any] = field(default_factory=dict)
-    adequacy: dict[str, Any] = field(default_factory=dict)  # grade, sentence, p; empty where it was not judged
-    # value, interval, of_S of the fitted events; held_out the same of those; events: name, role, value, interval, of_S
+    # grade, sentence, p; empty where it was not judged
+    adequacy: dict[str, Any] = field(default_factory=dict)
+    # value, interval, of_S of the fitted events; held_out the same of those; events: name, role,
+    # value, interval, of_S
     model_error: dict[str, Any] = field(default_factory=dict)
-    linear_network: dict[str, Any] = field(default_factory=dict)  # the best one beside it: `yardstick`
-    rival_structures: list[dict[str, Any]] = field(default_factory=list)  # name, model_error, parameters
+    # the best one beside it: `yardstick`
+    linear_network: dict[str, Any] = field(default_factory=dict)
+    # name, model_error, parameters
+    rival_structures: list[dict[str, Any]] = field(default_factory=list)
     advice: list[str] = field(default_factory=list)  # what to do next, the most pressing first
     notes: list[str] = field(default_factory=list)
-    per_event: dict[str, list[float]] = field(default_factory=dict)  # of which `parameters` holds the mean
+    # of which `parameters` holds the mean
+    per_event: dict[str, list[float]] = field(default_factory=dict)
     standard_errors: dict[str, float | None] = field(default_factory=dict)  # None: not identifiable
     intervals: dict[str, list[float]] = field(default_factory=dict)  # 95 %
     verdicts: dict[str, str] = field(default_factory=dict)
     uncertainty: dict[str, Any] = field(default_factory=dict)
-    starts: list[dict[str, Any]] = field(default_factory=list)  # of the descents to the estimate, the best first
-    records: list[dict[str, Any]] = field(default_factory=list)  # name, role, sha256 of its channels, source, base ...
-    own_base: dict[str, Any] = field(default_factory=dict)  # power and file_power, in MVA where known; origin
+    # of the descents to the estimate, the best first
+    starts: list[dict[str, Any]] = field(default_factory=list)
+    # name, role, sha256 of its channels, source, base ...
+    records: list[dict[str, Any]] = field(default_factory=list)
+    # power and file_power, in MVA where known; origin
+    own_base: dict[str, Any] = field(default_factory=dict)
     parameters_on_given_base: dict[str, float] = field(default_factory=dict)
     tractexp_version: str = ""
     commit: str = ""  # of the package's repository; "" for a wheel
 
     @classmethod
     def of(cls, content: Any, where: str) -> "Result":
-        """The result that a file holds; `where` names it. Values outside their bounds are warned of.
+        """The result that a file holds; `where` names it. Values outside their bounds are warned
+        of.
 
-        Raises `UserError` for what no identification writes: other keys or kinds, a model that is none, parameters that
-        are missing or no finite numbers.
+        Raises `UserError` for what no identification writes: other keys or kinds, a model that is
+        none, parameters that are missing or no finite numbers.
         """
         stored.check_fields(cls, content, where)
         result = cls(**stored.without_nulls(cls, content))
@@ -142,13 +179,20 @@ class Result:
             motor, static, effects, *_ = parts(result.model)
             ratio = result.base.ratio
         except (KeyError, TypeError, ValueError, AttributeError, ZeroDivisionError) as error:
-            raise UserError(f"{where}: its model or own_base is none that an identification writes") from error
+            raise UserError(
+                f"{where}: its model or own_base is none that an identification writes"
+            ) from error
         if missing := [key for key in BEFORE if key not in result.before]:
             raise UserError(f"{where}: before lacks {missing[0]}; identify again")
         if not (math.isfinite(ratio) and ratio > 0):
-            raise UserError(f"{where}: own_base has powers that are no finite numbers above zero; identify again")
+            raise UserError(
+                f"{where}: own_base has powers that are no finite numbers above zero; identify"
+                " again"
+            )
         stored.check_parameters(where, result.parameters, (motor, static, *effects))
-        for sentence in stored.outside(by_event(result.parameters, result.per_event), result.bounds):
+        for sentence in stored.outside(
+            by_event(result.parameters, result.per_event), result.bounds
+        ):
             warnings.warn(f"{where}: {sentence}", UserWarning, stacklevel=2)
         return result
 
@@ -166,18 +210,27 @@ class Result:
         """The parameters on the base that a record is on."""
         ratio = self.base.over(record)
         motor, static, effects, *_ = parts(self.model)
-        exponents = {p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters}
-        return {name: scale_parameter(value, exponents[name], ratio) for name, value in self.parameters.items()}
+        exponents = {
+            p.name: p.power_exponent for part in (motor, static, *effects) for p in part.parameters
+        }
+        return {
+            name: scale_parameter(value, exponents[name], ratio)
+            for name, value in self.parameters.items()
+        }
 
     def on_given_base(self) -> str:
-        """The parameters whose values are others on the file's base, in one line; "" where it is the record's own."""
+        """The parameters whose values are others on the file's base, in one line; "" where it is
+        the record's own.
+        """
         own = by_event(self.parameters, self.per_event)
         values = [f"{n} = {v:.5g}" for n, v in self.parameters_on_given_base.items() if v != own[n]]
         return f"on {self.base.file}: {', '.join(values)}" if values else ""
 
     @property
     def free(self) -> dict[str, float]:
-        """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have values of their own."""
+        """The estimate by the names of intervals and verdicts: T_m[1], T_m[2] where events have
+        values of their own.
+        """
         values = by_event(self.parameters, self.per_event)
         return {name: values[name] for name in self.verdicts or values}
 
@@ -185,7 +238,12 @@ class Result:
     def nuisances(self) -> dict[str, float]:
         """The parameters of the effects that are in the model because the records show them."""
         _, _, effects, *_ = parts(self.model)
-        names = [p.name for effect in effects if effect.name in self.shown_effects for p in effect.parameters]
+        names = [
+            p.name
+            for effect in effects
+            if effect.name in self.shown_effects
+            for p in effect.parameters
+        ]
         return {name: value for name, value in self.free.items() if name.partition("[")[0] in names}
 
     @property
@@ -200,9 +258,13 @@ class Result:
 
     @property
     def acceptance(self) -> str:
-        """Whether Eq. (20) accepts the model, in a sentence; where Q is small, what its error is divided by."""
+        """Whether Eq. (20) accepts the model, in a sentence; where Q is small, what its error is
+        divided by.
+        """
         holds = "holds" if self.acceptable else "does NOT hold"
-        sentence = f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
+        sentence = (
+            f"acceptance of Eq. (20), epsilon_p and epsilon_q below {in_percent(ACCEPTED)}: {holds}"
+        )
         shares = [e["Q_over_S"] for e in self.events if e["role"] == TRAIN and "Q_over_S" in e]
         if shares and min(shares) < SMALL_Q and self.epsilon_q >= ACCEPTED > self.epsilon_p:
             sentence += f" (epsilon_q divides by Q alone, here {in_percent(min(shares))} of S)"
@@ -210,17 +272,21 @@ class Result:
 
     def write(self, path: Path) -> Path:
         """Write the file in one move, so that no half-written one is ever seen."""
-        return files.write(path, json.dumps(files.plain(asdict(self)), indent=2, ensure_ascii=False) + "\n")
+        return files.write(
+            path, json.dumps(files.plain(asdict(self)), indent=2, ensure_ascii=False) + "\n"
+        )
 
     def predict(
         self, t: Any, U: Any, f: Any = None, P0: float | None = None, Q0: float | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
-        """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency is known.
+        """P and Q [pu] for a new voltage U [pu] at uniform times t [s]; f [Hz] where the frequency
+        is known.
 
-        Powers, given and calculated, are on the file's base. The voltage before the first dip (all of it where there is
-        none) gives the steady state. P0 and Q0 are the power drawn there; by default that of the event the model was
-        identified on. Of a model identified in waveforms the voltage is taken as balanced, and the power is
-        instantaneous. Raises `UserError` for what is no finite number, and where there is no steady state.
+        Powers, given and calculated, are on the file's base. The voltage before the first dip (all
+        of it where there is none) gives the steady state. P0 and Q0 are the power drawn there; by
+        default that of the event the model was identified on. Of a model identified in waveforms
+        the voltage is taken as balanced, and the power is instantaneous. Raises `UserError` for
+        what is no finite number, and where there is no steady state.
         """
         model = compose(*parts(self.model))
         drawn = {key: value for key, value in {"P0": P0, "Q0": Q0}.items() if value is not None}
@@ -238,25 +304,37 @@ class Result:
         omega_s0 = 0.0 if omega_s is None else float(omega_s[steady].mean())
         P, Q = domain_of(model).play(model, values, t, U, before, omega_s, omega_s0)
         if not (np.isfinite(P).all() and np.isfinite(Q).all()):
-            raise UserError("the response to this voltage grows beyond all bounds: the parameters suit no such event")
+            raise UserError(
+                "the response to this voltage grows beyond all bounds: the parameters suit no such"
+                " event"
+            )
         return ratio * P, ratio * Q
 
 
 def write_history(path: Path, history: History) -> Path:
-    """Write the search as CSV, one row per iteration: simulations and seconds spent, best objective so far [pu²]."""
+    """Write the search as CSV, one row per iteration: simulations and seconds spent, best objective
+    so far [pu²].
+    """
     rows = zip(history.simulations, history.seconds, history.objective, strict=True)
-    lines = [f"{k},{n},{s:.4f},{f!r}" for k, (n, s, f) in enumerate((int(n), float(s), float(f)) for n, s, f in rows)]
+    lines = [
+        f"{k},{n},{s:.4f},{f!r}"
+        for k, (n, s, f) in enumerate((int(n), float(s), float(f)) for n, s, f in rows)
+    ]
     return files.write(path, "\n".join(["iteration,simulations,seconds,objective", *lines]) + "\n")
 
 
 def load(path: Path) -> Result:
-    """Read a `result.json`, or that of a run's folder. Raises `UserError` where it is missing or not one of ours."""
+    """Read a `result.json`, or that of a run's folder. Raises `UserError` where it is missing or
+    not one of ours.
+    """
     if path.is_dir():
         path = path / FILE
     try:
         return Result.of(files.read_json(path), str(path))
     except FileNotFoundError:
-        raise UserError(f"there is no result file {path}; run an identification first, it writes {FILE}") from None
+        raise UserError(
+            f"there is no result file {path}; run an identification first, it writes {FILE}"
+        ) from None
 
 
 def conclude(
@@ -268,7 +346,8 @@ def conclude(
     settings: Mapping[str, Any],
     optimizer: str,
 ) -> Result:
-    """The result of free values (d,) and what they make of each event, `fits` of `play`; `end` is that of the search.
+    """The result of free values (d,) and what they make of each event, `fits` of `play`; `end` is
+    that of the search.
 
     Raises `UserError` where no candidate at all had a steady state.
     """
@@ -290,13 +369,23 @@ def conclude(
         units={p.name: p.unit for p in problem.parameters},
         bounds={p.name: list(p.bounds) for p in problem.parameters},
         model=dict(settings),
-        before={"U0": first.U0, "P0": first.P0, "Q0": first.Q0, "frequency": first.record.base.frequency},
+        before={
+            "U0": first.U0,
+            "P0": first.P0,
+            "Q0": first.Q0,
+            "frequency": first.record.base.frequency,
+        },
         optimizer=optimizer,
         search=describe_search(problem, end),
         notes=[note for f in fits for note in f.event.record.notes],
-        records=[{"name": f.event.record.name, "role": f.role} | Identity.at(f.event.record).to_dict() for f in fits],
+        records=[
+            {"name": f.event.record.name, "role": f.role} | Identity.at(f.event.record).to_dict()
+            for f in fits
+        ],
         own_base=asdict(own),
-        parameters_on_given_base={} if own.ratio == 1 else own.values(by_event(*estimates.values()), exponents),
+        parameters_on_given_base={}
+        if own.ratio == 1
+        else own.values(by_event(*estimates.values()), exponents),
         tractexp_version=provenance.version(),
         commit=provenance.commit(),
     )
@@ -305,9 +394,15 @@ def conclude(
 def model_errors(fits: Sequence[Fit]) -> dict[str, Any]:
     """The model's error on the fitted events together, on those held out, and on each."""
     held_out = [f for f in fits if f.role != TRAIN]
-    each = [{"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits]
+    each = [
+        {"name": f.event.record.name, "role": f.role, **model_error([f]).to_dict()} for f in fits
+    ]
     fitted = model_error([f for f in fits if f.role == TRAIN]).to_dict()
-    return {**fitted, "held_out": model_error(held_out).to_dict() if held_out else None, "events": each}
+    return {
+        **fitted,
+        "held_out": model_error(held_out).to_dict() if held_out else None,
+        "events": each,
+    }
 
 
 def refuse_failed(problem: Problem, end: SearchResult) -> None:
@@ -327,9 +422,14 @@ def _meant(problem: Problem) -> str:
 
 
 def play(problem: Problem, free: np.ndarray, validate: Sequence[Event] = ()) -> list[Fit]:
-    """The fitted events at free values (d,), then those of `validate`, at which nothing was fitted."""
+    """The fitted events at free values (d,), then those of `validate`, at which
+    nothing was fitted.
+    """
     own = problem.by_event(free)[:, 0]
-    fits = [respond(problem.model, v, event, TRAIN) for v, event in zip(own, problem.events, strict=True)]
+    fits = [
+        respond(problem.model, v, event, TRAIN)
+        for v, event in zip(own, problem.events, strict=True)
+    ]
     shared = problem.full(free)[0]
     return fits + [respond(problem.model, shared, event, VALIDATE) for event in validate]
 
@@ -338,19 +438,29 @@ def relative_errors(fits: Sequence[Fit]) -> tuple[float, float]:
     """epsilon_p and epsilon_q of Eq. (20) over some events together, as fractions."""
     measured = {c: np.concatenate([getattr(fit.event.record, c) for fit in fits]) for c in "PQ"}
     calculated = {c: np.concatenate([getattr(fit, c) for fit in fits]) for c in "PQ"}
-    return relative_error(measured["P"], calculated["P"]), relative_error(measured["Q"], calculated["Q"])
+    return relative_error(measured["P"], calculated["P"]), relative_error(
+        measured["Q"], calculated["Q"]
+    )
 
 
 def describe_search(problem: Problem, end: SearchResult) -> dict[str, Any]:
     """Where the optimizer itself end, and what that took: what optimizers are compared by."""
     epsilon_p, epsilon_q = relative_errors(play(problem, end.values))
     errors = {"objective": end.objective, "epsilon_p": epsilon_p, "epsilon_q": epsilon_q}
-    return _values(problem, end.values) | errors | _spent(end) | {"at_bound": at_bound(problem, end.values)}
+    return (
+        _values(problem, end.values)
+        | errors
+        | _spent(end)
+        | {"at_bound": at_bound(problem, end.values)}
+    )
 
 
 def _spent(end: SearchResult) -> dict[str, Any]:
     """What a search took, and the sentence it ended with."""
-    return {name: getattr(end, name) for name in ("simulations", "seconds", "refused", "iterations", "status")}
+    return {
+        name: getattr(end, name)
+        for name in ("simulations", "seconds", "refused", "iterations", "status")
+    }
 
 
 def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
@@ -365,10 +475,16 @@ def _values(problem: Problem, free: np.ndarray) -> dict[str, Any]:
 def at_bound(problem: Problem, values: np.ndarray) -> list[str]:
     """Names of the free parameters within a thousandth of their range of a bound."""
     unit = problem.space.to_unit(values)
-    return [n for n, z in zip(problem.space.names, unit, strict=True) if z < BOUND_DISTANCE or z > 1 - BOUND_DISTANCE]
+    return [
+        n
+        for n, z in zip(problem.space.names, unit, strict=True)
+        if z < BOUND_DISTANCE or z > 1 - BOUND_DISTANCE
+    ]
 
 
-def active_bounds(problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()) -> list[str]:
+def active_bounds(
+    problem: Problem, values: np.ndarray, nuisances: Collection[str] = ()
+) -> list[str]:
     """The same without nuisances, as a sentence tells them: 'T_m at 1'."""
     names = [name for name in at_bound(problem, values) if name not in nuisances]
     return [f"{name} at {values[problem.space.index(name)]:.4g}" for name in names]

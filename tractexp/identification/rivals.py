@@ -1,10 +1,11 @@
 """What another structure would make of the parameters: the bias that no scatter of residuals holds.
 
-A model that lacks a stator resistance, or whose static load follows another law, is fitted again with it, from where
-its own fit ended. Where that fits as well or better, each parameter that both have moves. The move is told beside the
-estimate, and where more than noise is left the interval reaches over it (docs/uncertainty.md has how often that holds).
-Which structures are tried the plugins say (`Part.rival`); an effect that the equations refuse is none, and neither is a
-static load that refuses an effect of the model.
+A model that lacks a stator resistance, or whose static load follows another law, is fitted again
+with it, from where its own fit ended. Where that fits as well or better, each parameter that both
+have moves. The move is told beside the estimate, and where more than noise is left the interval
+reaches over it (docs/uncertainty.md has how often that holds). Which structures are tried the
+plugins say (`Part.rival`); an effect that the equations refuse is none, and neither is a static
+load that refuses an effect of the model.
 """
 
 from collections.abc import Callable, Iterator
@@ -28,7 +29,9 @@ RIVAL_ITERATIONS = 25
 
 @dataclass(frozen=True, eq=False)
 class RivalStructure:
-    """A structure that fits as well: its name, what it leaves over what the model leaves, and the shared parameters."""
+    """A structure that fits as well: its name, what it leaves over what the model leaves, and the
+    shared parameters.
+    """
 
     name: str
     squares: float  # its objective over the model's
@@ -39,22 +42,37 @@ class RivalStructure:
         return {"name": self.name, "objective_ratio": self.squares, "parameters": self.values}
 
 
-def with_rivals(uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter) -> Uncertainty:
-    """The judgement with the rival structures that fit as well as the model, or better; `parts` counts them."""
-    structures, candidates = list(_structures(uncertainty.likelihood.problem.model)), list[RivalStructure | None]()
+def with_rivals(
+    uncertainty: Uncertainty, parts: Callable[[int], Counting] = make_silent_counter
+) -> Uncertainty:
+    """The judgement with the rival structures that fit as well as the model, or better; `parts`
+    counts them.
+    """
+    structures, candidates = (
+        list(_structures(uncertainty.likelihood.problem.model)),
+        list[RivalStructure | None](),
+    )
     with parts(len(structures)) as ended:
         for name, model in structures:
             candidates.append(_fit_rival(uncertainty, name, model))
             ended()
     beside = replace(uncertainty, rivals=tuple(rival for rival in candidates if rival is not None))
-    return replace(beside, verdicts=uncertainty.verdicts | dict(_find_moved_parameters(uncertainty, beside)))
+    return replace(
+        beside, verdicts=uncertainty.verdicts | dict(_find_moved_parameters(uncertainty, beside))
+    )
 
 
-def _find_moved_parameters(own: Uncertainty, beside: Uncertainty) -> Iterator[tuple[str, ParameterVerdict]]:
-    """Verdicts of the parameters that a rival moves beyond their interval, or until that is wide."""
+def _find_moved_parameters(
+    own: Uncertainty, beside: Uncertainty
+) -> Iterator[tuple[str, ParameterVerdict]]:
+    """Verdicts of the parameters that a rival moves beyond their interval, or until
+    that is wide.
+    """
     for j, (name, (low, high)) in enumerate(zip(own.names, own.intervals.tolist(), strict=True)):
         value, verdict = float(own.values[j]), own.verdicts[name]
-        there = [(rival.values[name], rival.name) for rival in beside.rivals if name in rival.values]
+        there = [
+            (rival.values[name], rival.name) for rival in beside.rivals if name in rival.values
+        ]
         far, by = max(there, key=lambda one: abs(one[0] - value), default=(value, ""))
         half = max(abs(far - value), float(np.ptp(beside.intervals[j])) / 2)
         wide = half > IDENTIFIED_SHARE * size(value, own.lower[j], own.upper[j])
@@ -68,14 +86,30 @@ def _structures(model: Model) -> Iterator[tuple[str, Model]]:
     for name in sorted(registered.get("model/static", {})):
         cls = get("model/static", name)
         if cls.rival and type(model.static).rival and name != model.static.name:
-            other = compose(model.motor, cls(), model.effects, model.integration, model.domain, model.window)
+            other = compose(
+                model.motor, cls(), model.effects, model.integration, model.domain, model.window
+            )
             if _composes(other):
                 yield name, other
     for name in sorted(registered.get("effect", {})):
         cls = get("effect", name)
-        if cls.rival and name not in {e.name for e in model.effects} and model.acceptance(cls()).refusal is None:
+        if (
+            cls.rival
+            and name not in {e.name for e in model.effects}
+            and model.acceptance(cls()).refusal is None
+        ):
             effects = [*model.effects, cls()]
-            yield name, compose(model.motor, model.static, effects, model.integration, model.domain, model.window)
+            yield (
+                name,
+                compose(
+                    model.motor,
+                    model.static,
+                    effects,
+                    model.integration,
+                    model.domain,
+                    model.window,
+                ),
+            )
 
 
 def _composes(model: Model) -> bool:
@@ -83,11 +117,16 @@ def _composes(model: Model) -> bool:
     if not model.effects:
         return True
     *others, last = model.effects
-    return compose(model.motor, model.static, others, domain=model.domain).acceptance(last).refusal is None
+    return (
+        compose(model.motor, model.static, others, domain=model.domain).acceptance(last).refusal
+        is None
+    )
 
 
 def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStructure | None:
-    """A rival fitted from where the model's own fit ended; None where it cannot be, or fits worse."""
+    """A rival fitted from where the model's own fit ended; None where it cannot be,
+    or fits worse.
+    """
     problem = uncertainty.likelihood.problem
     own = {p.name: p.bounds for p in problem.parameters if p.name in model.names}
     fixed = {n: value for n, value in problem.fixed.items() if n in model.names}
@@ -107,11 +146,15 @@ def _fit_rival(uncertainty: Uncertainty, name: str, model: Model) -> RivalStruct
         return None
     values = dict(zip(other.space.names, likelihood.values(ended.unit[best]).tolist(), strict=True))
     shared = {n: value for n, value in values.items() if n in uncertainty.names}
-    return RivalStructure(name, float(ended.deviance[best] / max(uncertainty.deviance, 1e-30)), shared)
+    return RivalStructure(
+        name, float(ended.deviance[best] / max(uncertainty.deviance, 1e-30)), shared
+    )
 
 
 def _starts(uncertainty: Uncertainty, other: Problem) -> np.ndarray:
-    """Points (n, free) of a rival's box: the shared parameters as estimated, its own as usual and all over."""
+    """Points (n, free) of a rival's box: the shared parameters as estimated, its own as usual and
+    all over.
+    """
     names, parameters = other.space.names, {p.name: p for p in other.parameters}
     shared = dict(zip(uncertainty.names, uncertainty.values, strict=True))
     alone = [k for k, n in enumerate(names) if n not in shared]

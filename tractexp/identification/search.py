@@ -1,6 +1,8 @@
-"""The one search loop: it clips, evaluates, keeps the best, counts, enforces the budget and records the history.
+"""The one search loop: it clips, evaluates, keeps the best, counts, enforces the budget and records
+the history.
 
-No optimizer does any of this, so none can misreport, and all are compared by the same count of simulations.
+No optimizer does any of this, so none can misreport, and all are compared by the same count of
+simulations.
 """
 
 import time
@@ -15,7 +17,8 @@ from tractexp.identification.optimizer import REFUSED, Box, Optimizer
 from tractexp.identification.polish import Elite, polish
 
 UNKNOWN = 1e30  # stands for an objective that is not a finite number: worse than any miss
-POLISH_STEPS = 450  # least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
+# least-squares steps, of d + 2 simulations, that a budget keeps back for the polish,
+POLISH_STEPS = 450
 POLISH_SHARE = 2 / 3  # but never more than this share of it
 
 
@@ -26,7 +29,9 @@ class Objective(Protocol):
     upper: np.ndarray  # (d,)
 
     def objective(self, values: np.ndarray) -> np.ndarray:
-        """Raw values (n, d) -> objectives (n,); `REFUSED` plus a measure of the miss where there is none."""
+        """Raw values (n, d) -> objectives (n,); `REFUSED` plus a measure of the miss where there is
+        none.
+        """
         ...
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
@@ -45,7 +50,9 @@ class Limits:
 
 @dataclass(frozen=True)
 class History:
-    """The search, one row per iteration, shapes (n_iterations,) except `values` (n_iterations, d)."""
+    """The search, one row per iteration, shapes (n_iterations,) except `values`
+    (n_iterations, d).
+    """
 
     simulations: np.ndarray  # simulations spent by the end of the iteration
     objective: np.ndarray  # best so far
@@ -97,13 +104,17 @@ class _Counter:
         return self.limits.simulations
 
     def _admit(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-        """The points a limit still allows, clipped, the same in raw units, and how many it cut off; raises for none."""
+        """The points a limit still allows, clipped, the same in raw units, and how many it cut off;
+        raises for none.
+        """
         limits = self.limits
         if limits.seconds is not None and self.seconds >= limits.seconds:
             raise _Stop(f"stopped at the time limit of {limits.seconds:g} s")
         x = self.box.clip(np.atleast_2d(x))
         if np.isnan(x).any():
-            raise UserError("the optimizer proposed a point that is not a number; this is a fault of its plugin")
+            raise UserError(
+                "the optimizer proposed a point that is not a number; this is a fault of its plugin"
+            )
         asked = len(x)
         if limits.simulations is not None:
             remaining = limits.simulations - self.simulations
@@ -145,10 +156,14 @@ def _before_polish(limits: Limits, dimension: int) -> Limits:
     simulations, seconds = limits.simulations, limits.seconds
     if simulations is not None:
         simulations -= min(int(simulations * POLISH_SHARE), POLISH_STEPS * (dimension + 2))
-    return Limits(simulations, None if seconds is None else seconds * (1 - POLISH_SHARE), limits.target)
+    return Limits(
+        simulations, None if seconds is None else seconds * (1 - POLISH_SHARE), limits.target
+    )
 
 
-def _begin_search(counter: _Counter, optimizer: Optimizer, rng: np.random.Generator) -> Iterator[None]:
+def _begin_search(
+    counter: _Counter, optimizer: Optimizer, rng: np.random.Generator
+) -> Iterator[None]:
     """Return the optimizer's iterations, none of which has begun.
 
     Raises `UserError` where `search` runs at its call, as it does without a `yield`: there would
@@ -167,8 +182,12 @@ def _begin_search(counter: _Counter, optimizer: Optimizer, rng: np.random.Genera
     return iterations
 
 
-def _iterations(counter: _Counter, optimizer: Optimizer, rng: np.random.Generator) -> Iterator[None]:
-    """The optimizer's iterations, then, where asked for, the polish in what the limits have kept back for it."""
+def _iterations(
+    counter: _Counter, optimizer: Optimizer, rng: np.random.Generator
+) -> Iterator[None]:
+    """The optimizer's iterations, then, where asked for, the polish in what the limits have kept
+    back for it.
+    """
     if not optimizer.polish:
         yield from _begin_search(counter, optimizer, rng)
         return
@@ -191,10 +210,11 @@ def search(
     limits: Limits = Limits(),
     progress: Callable[[int, float, int], None] | None = None,
 ) -> SearchResult:
-    """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for bit.
+    """Run `optimizer` on `problem` with one seed. The same seed gives the same history, bit for
+    bit.
 
-    `progress(iteration, best objective, simulations)` is called after each iteration. Ctrl-C is raised as `Stopped`,
-    with what was found so far.
+    `progress(iteration, best objective, simulations)` is called after each iteration. Ctrl-C is
+    raised as `Stopped`, with what was found so far.
     """
     counter = _Counter(problem, optimizer.space == "unit", limits)
     rows: list[tuple[int, float, np.ndarray, float]] = []
@@ -218,7 +238,9 @@ def search(
     return _result(counter, rows, status)
 
 
-def _result(counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str) -> SearchResult:
+def _result(
+    counter: _Counter, rows: list[tuple[int, float, np.ndarray, float]], status: str
+) -> SearchResult:
     rows = rows or [(counter.simulations, counter.best, counter.best_values, counter.seconds)]
     simulations, best, values, seconds = zip(*rows, strict=True)
     history = History(np.array(simulations), np.array(best), np.array(values), np.array(seconds))

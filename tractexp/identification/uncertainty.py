@@ -1,7 +1,8 @@
 """How sure an estimate is, in intervals and verdicts.
 
-Where nothing but noise is left, by the curvature of the likelihood at its maximum; else by the scatter of least squares
-(`sandwich`), under which the likelihood of everything that follows is as wide.
+Where nothing but noise is left, by the curvature of the likelihood at its maximum; else by the
+scatter of least squares (`sandwich`), under which the likelihood of everything that follows is as
+wide.
 """
 
 import functools
@@ -39,9 +40,9 @@ class LocalMinimum:
 class Uncertainty:
     """What is known about the free parameters; arrays (d,) in the order of `names`.
 
-    `likelihood` is what intervals, profiles and samples stand on. Where more than noise is left it is that of
-    Eq. (8), as wide as the estimate scatters: its deviance may rise by `limits`. `of_noise` is the likelihood of the
-    noise.
+    `likelihood` is what intervals, profiles and samples stand on. Where more than noise is left it
+    is that of Eq. (8), as wide as the estimate scatters: its deviance may rise by `limits`.
+    `of_noise` is the likelihood of the noise.
     """
 
     likelihood: Likelihood
@@ -55,14 +56,17 @@ class Uncertainty:
     verdicts: dict[str, ParameterVerdict]
     of_noise: Likelihood
     notes: list[str]
-    profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # intervals that replace the curvature's
+    # intervals that replace the curvature's
+    profiled: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     local_minima: tuple[LocalMinimum, ...] = ()  # others that fit as well
     rivals: "tuple[RivalStructure, ...]" = ()  # structures that fit as well
 
     @property
     def elsewhere(self) -> np.ndarray:
         """(d,) Whether another valley has another value than the interval by curvature holds."""
-        values = np.array([minimum.values for minimum in self.local_minima]).reshape(-1, len(self.names))
+        values = np.array([minimum.values for minimum in self.local_minima]).reshape(
+            -1, len(self.names)
+        )
         return np.any(np.abs(values - self.values) > self.half, axis=0)
 
     @property
@@ -87,7 +91,9 @@ class Uncertainty:
     @functools.cached_property
     def whitened(self) -> np.ndarray:
         """The residual of the estimate over the noise, (2 N,)."""
-        return self.of_noise.rows(self.unit[None] if self.exact else self.of_noise.placed(self.unit[None]))[0]
+        return self.of_noise.rows(
+            self.unit[None] if self.exact else self.of_noise.placed(self.unit[None])
+        )[0]
 
     @functools.cached_property
     def tests(self) -> list[dict[str, Any]]:
@@ -101,17 +107,23 @@ class Uncertainty:
                 if len(seen) < FEWEST_NOISE_SAMPLES:
                     continue
                 tests = ljung_box(seen, self.of_noise.noise.pair(e)[c].order), jarque_bera(seen)
-                results += [{"event": event.record.name, "channel": channel, **vars(t)} for t in tests]
+                results += [
+                    {"event": event.record.name, "channel": channel, **vars(t)} for t in tests
+                ]
         return results
 
     @functools.cached_property
     def noise(self) -> list[dict[str, Any]]:
-        """Level [pu] and color of the noise of each event and channel, with the level before the dip beside it."""
+        """Level [pu] and color of the noise of each event and channel, with the level before the
+        dip beside it.
+        """
         rows, noise, problem = [], self.of_noise.noise, self.of_noise.problem
         for e, event in enumerate(problem.events):
             pair, covariance = noise.pair(e), noise.covariance(e)
             cross = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
-            for c, (channel, before) in enumerate(zip(problem.drive.names, event.levels, strict=True)):
+            for c, (channel, before) in enumerate(
+                zip(problem.drive.names, event.levels, strict=True)
+            ):
                 rows.append(
                     {
                         "event": event.record.name,
@@ -119,7 +131,9 @@ class Uncertainty:
                         "deviation": float(np.sqrt(covariance[c, c])),
                         "before": float(before),
                         "order": pair[c].order,
-                        "correlation": 0.0 if pair[c].white else float(pair[c].coefficients[1, 0].real),
+                        "correlation": 0.0
+                        if pair[c].white
+                        else float(pair[c].coefficients[1, 0].real),
                         "between_P_and_Q": float(cross),
                         "wanders": noise.random_walk is not None,
                         "of_the_voltage": float(np.sqrt(noise.loudest_input_mode)),
@@ -140,26 +154,41 @@ class Uncertainty:
     def intervals(self) -> np.ndarray:
         """(d, 2), 95 %, inside the bounds: by profile where there is one, else by the curvature.
 
-        Where another valley fits as well, they reach over it, too. Where more than noise is left, so do they over what
-        each rival structure makes of a parameter, as far beyond it as beyond the estimate.
+        Where another valley fits as well, they reach over it, too. Where more than noise is left,
+        so do they over what each rival structure makes of a parameter, as far beyond it as beyond
+        the estimate.
         """
         ends = self.values[:, None] + self.half[:, None] * [-1.0, 1.0]
         for name, interval in self.profiled.items():
             ends[self.names.index(name)] = interval
         for minimum in self.local_minima:
-            ends = np.stack([np.minimum(ends[:, 0], minimum.values), np.maximum(ends[:, 1], minimum.values)], axis=1)
+            ends = np.stack(
+                [np.minimum(ends[:, 0], minimum.values), np.maximum(ends[:, 1], minimum.values)],
+                axis=1,
+            )
         own = ends.copy()
         for rival in () if self.exact else self.rivals:
-            there = [rival.values.get(n, value) for n, value in zip(self.names, self.values.tolist(), strict=True)]
+            there = [
+                rival.values.get(n, value)
+                for n, value in zip(self.names, self.values.tolist(), strict=True)
+            ]
             there = own + (np.array(there) - self.values)[:, None]
-            ends = np.stack([np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1)
+            ends = np.stack(
+                [np.fmin(ends[:, 0], there[:, 0]), np.fmax(ends[:, 1], there[:, 1])], axis=1
+            )
         return np.clip(ends, self.lower[:, None], self.upper[:, None])
 
     @property
     def samples(self) -> dict[str, int]:
-        """How much the fit stands on: `samples` values compared, `parameters` searched, what is left of freedom."""
+        """How much the fit stands on: `samples` values compared, `parameters` searched, what is
+        left of freedom.
+        """
         compared = self.likelihood.samples
-        return {"samples": compared, "parameters": len(self.names), "freedom": compared - len(self.unit)}
+        return {
+            "samples": compared,
+            "parameters": len(self.names),
+            "freedom": compared - len(self.unit),
+        }
 
     def fields(self) -> dict[str, Any]:
         """What `result.json` gains; numbers that do not exist are None."""
@@ -190,9 +219,13 @@ def threshold() -> float:
 
 
 def conclude(
-    likelihood: Likelihood, unit: np.ndarray, noise: Likelihood | None = None, notes: Sequence[str] = ()
+    likelihood: Likelihood,
+    unit: np.ndarray,
+    noise: Likelihood | None = None,
+    notes: Sequence[str] = (),
 ) -> Uncertainty:
-    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise, or at the minimum of Eq. (8).
+    """Intervals and verdicts at the maximum `unit` (D,) of the likelihood of the noise, or at the
+    minimum of Eq. (8).
 
     Of the latter more than `noise` is left.
     """
@@ -200,16 +233,33 @@ def conclude(
     likelihood, deviance, information, factors, limits = (
         _curvature(likelihood, unit) if likelihood.initial_power else _scatter(likelihood, unit)
     )
-    information = replace(information, held=_find_immovable_parameters(likelihood, unit, information.blind))
-    verdicts = judge(information, problem.lower, problem.upper, factors * information.standard_errors, factors)
+    information = replace(
+        information, held=_find_immovable_parameters(likelihood, unit, information.blind)
+    )
+    verdicts = judge(
+        information, problem.lower, problem.upper, factors * information.standard_errors, factors
+    )
     return Uncertainty(
-        likelihood, unit, deviance, information, problem.lower, problem.upper, factors, limits, verdicts,
-        noise or likelihood, list(notes),
-    )  # fmt: skip
+        likelihood,
+        unit,
+        deviance,
+        information,
+        problem.lower,
+        problem.upper,
+        factors,
+        limits,
+        verdicts,
+        noise or likelihood,
+        list(notes),
+    )
 
 
-def _find_immovable_parameters(likelihood: Likelihood, unit: np.ndarray, names: Sequence[str]) -> tuple[str, ...]:
-    """Those of the parameters that no step from coordinates (D,) to either side leaves a steady state."""
+def _find_immovable_parameters(
+    likelihood: Likelihood, unit: np.ndarray, names: Sequence[str]
+) -> tuple[str, ...]:
+    """Those of the parameters that no step from coordinates (D,) to either side leaves a steady
+    state.
+    """
     all_names = likelihood.problem.space.names
 
     def possible(name: str) -> bool:
@@ -221,7 +271,8 @@ def _find_immovable_parameters(likelihood: Likelihood, unit: np.ndarray, names: 
     return tuple(name for name in names if not possible(name))
 
 
-Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]  # with deviance, factors (d,) and limits (d,)
+# with deviance, factors (d,) and limits (d,)
+Spread = tuple[Likelihood, float, Information, np.ndarray, np.ndarray]
 
 
 def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
@@ -231,12 +282,22 @@ def _curvature(likelihood: Likelihood, unit: np.ndarray) -> Spread:
     width = problem.upper - problem.lower
     information = Information(problem.space.names, likelihood.values(unit), width, J.without_own)
     factor = interval_factor(likelihood.samples - len(unit))
-    return likelihood, float(rows @ rows), information, np.full(free, factor), np.full(free, threshold())
+    return (
+        likelihood,
+        float(rows @ rows),
+        information,
+        np.full(free, factor),
+        np.full(free, threshold()),
+    )
 
 
 def _scatter(squares: Likelihood, unit: np.ndarray) -> Spread:
-    """How far least squares spread, by their scatter over blocks, and the likelihood that is as wide."""
-    left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(squares.samples - len(unit), 1)
+    """How far least squares spread, by their scatter over blocks, and the likelihood that is as
+    wide.
+    """
+    left = float(np.sum(squares.of_records.rows(unit[None])[0] ** 2)) / max(
+        squares.samples - len(unit), 1
+    )
     scattered = scatter(squares.scaled(np.sqrt(left)), unit)
     likelihood = squares.scaled(np.sqrt(left) * scattered.spread)
     rows = likelihood.rows(unit[None])[0]

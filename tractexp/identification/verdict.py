@@ -1,4 +1,6 @@
-"""What an interval means, in words: identified, weakly identified and why, not identifiable and what is instead."""
+"""What an interval means, in words: identified, weakly identified and why, not identifiable and
+what is instead.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,8 +16,10 @@ IDENTIFIED, WEAK, UNIDENTIFIED, BOUND = (
     "at its bound",
 )
 HELD = "a requirement of the model holds it there: beside it there is no steady state"
-IDENTIFIED_SHARE = 0.2  # an interval of at most plus and minus this share of the value identifies a parameter
-NEAR_ZERO = 0.1  # of the range: what may be zero is measured against this where its value is smaller
+# an interval of at most plus and minus this share of the value identifies a parameter
+IDENTIFIED_SHARE = 0.2
+# of the range: what may be zero is measured against this where its value is smaller
+NEAR_ZERO = 0.1
 TRADES = 0.8  # correlation from which two parameters are said to trade against each other
 PARTNERS = 2  # named at most
 STEEPEST_COMBINATION = 4.0  # power of a combination that is told
@@ -30,7 +34,9 @@ class ParameterVerdict:
     detail: str
 
     def weakened(self, also: str, *, enough: bool = True) -> "ParameterVerdict":
-        """With what speaks against it as well: weak where it was identified, if that is `enough`."""
+        """With what speaks against it as well: weak where it was identified, if that
+        is `enough`.
+        """
         word = WEAK if enough and self.word == IDENTIFIED else self.word
         return replace(self, word=word, detail="; ".join(filter(None, (self.detail, also))))
 
@@ -44,7 +50,9 @@ def brief(verdict: str) -> str:
 
 
 def size(value: float, low: float, high: float) -> float:
-    """What an interval is measured against: the value, or a tenth of the range for a small one that may be zero."""
+    """What an interval is measured against: the value, or a tenth of the range for a small one that
+    may be zero.
+    """
     return max(abs(value), NEAR_ZERO * (high - low)) if low <= 0 <= high else abs(value)
 
 
@@ -56,9 +64,15 @@ def format_half_width(value: float, half: float, low: float, high: float) -> str
 
 
 def judge(
-    information: Information, lower: np.ndarray, upper: np.ndarray, half: np.ndarray, factors: np.ndarray
+    information: Information,
+    lower: np.ndarray,
+    upper: np.ndarray,
+    half: np.ndarray,
+    factors: np.ndarray,
 ) -> dict[str, ParameterVerdict]:
-    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that over its error."""
+    """A verdict for each parameter: `half` (d,) is half of its 95 % interval, `factors` (d,) that
+    over its error.
+    """
     width = upper - lower
     unseen, identifiable = information.unseen, information.identifiable
     verdicts = {}
@@ -70,7 +84,9 @@ def judge(
             verdicts[name] = ParameterVerdict(UNIDENTIFIED, _structural(information, unseen, j))
         elif low <= lower[j] and high >= upper[j]:
             span = f"its 95 % interval holds its whole range {lower[j]:g} .. {upper[j]:g}"
-            verdicts[name] = ParameterVerdict(UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])]))
+            verdicts[name] = ParameterVerdict(
+                UNIDENTIFIED, "; ".join([span, *_trade(information, j, factors[j])])
+            )
         elif half[j] > IDENTIFIED_SHARE * size(value, lower[j], upper[j]):
             why = _trade(information, j, factors[j]) or ["the record hardly changes with it"]
             edge = [f"the estimate is at its bound {at[0]}"] if at else []
@@ -80,27 +96,46 @@ def judge(
                 BOUND, f"{at[0]}; the record asks for a value beyond it: widen model.bounds.{name}"
             )
         else:
-            tight = "" if lower[j] <= low and high <= upper[j] else "the interval reaches past its bounds"
+            tight = (
+                ""
+                if lower[j] <= low and high <= upper[j]
+                else "the interval reaches past its bounds"
+            )
             verdicts[name] = ParameterVerdict(IDENTIFIED, tight)
     return verdicts
 
 
 def _trade(information: Information, j: int, factor: float) -> list[str]:
-    """Against which parameters this one trades, and which combination is known; empty where there is none."""
+    """Against which parameters this one trades, and which combination is known; empty where there
+    is none.
+    """
     correlation = np.where(np.arange(len(information.names)) == j, 0.0, information.correlation[j])
-    partners = [int(k) for k in np.argsort(-np.abs(correlation))[:PARTNERS] if abs(correlation[k]) >= TRADES]
+    partners = [
+        int(k) for k in np.argsort(-np.abs(correlation))[:PARTNERS] if abs(correlation[k]) >= TRADES
+    ]
     if not partners:
         return []
-    named = " and ".join(f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners)
+    named = " and ".join(
+        f"{information.names[k]} (correlation {_number(correlation[k])})" for k in partners
+    )
     sentence, k = [f"trades against {named}"], partners[0]
     covariance, values = information.covariance, information.values
     if values[j] > 0 and values[k] > 0:
         exponents = np.zeros(len(values))
-        exponents[j], exponents[k] = 1.0, -covariance[j, k] / covariance[k, k] * values[k] / values[j]
+        exponents[j], exponents[k] = (
+            1.0,
+            -covariance[j, k] / covariance[k, k] * values[k] / values[j],
+        )
         error = factor * information.relative_error(exponents)
-        if error > IDENTIFIED_SHARE or abs(exponents[k]) > STEEPEST_COMBINATION or abs(exponents[k]) < 1 / STEEPEST_COMBINATION:
+        if (
+            error > IDENTIFIED_SHARE
+            or abs(exponents[k]) > STEEPEST_COMBINATION
+            or abs(exponents[k]) < 1 / STEEPEST_COMBINATION
+        ):
             return sentence  # a combination that is hardly known, or that nobody would think in
-        sentence.append(f"{combination(information.names, exponents)} is known to ± {100 * error:.2g} %")
+        sentence.append(
+            f"{combination(information.names, exponents)} is known to ± {100 * error:.2g} %"
+        )
     return sentence
 
 
@@ -109,7 +144,9 @@ def _number(correlation: float) -> str:
 
 
 def _structural(information: Information, unseen: np.ndarray, j: int) -> str:
-    """Which changes leave the record unchanged, and which combinations of those parameters it does see."""
+    """Which changes leave the record unchanged, and which combinations of those parameters it does
+    see.
+    """
     with_it = [row for row in unseen if abs(row[j]) > SHARE]
     direction = min(with_it, key=lambda row: np.count_nonzero(np.abs(row) > SHARE))
     names, pivot = information.names, j  # told from the parameter in question

@@ -1,7 +1,9 @@
-"""How good a model of these records can get: its error over that of the best linear network of few poles.
+"""How good a model of these records can get: its error over that of the best linear network of few
+poles.
 
-A network knows no physics, has as many poles as predict best, and leaves noise and what is not linear. A model that
-leaves much more lacks something; one that leaves less knows something that no linear network can.
+A network knows no physics, has as many poles as predict best, and leaves noise and what is not
+linear. A model that leaves much more lacks something; one that leaves less knows something that no
+linear network can.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,11 +20,12 @@ from tractexp.wording import count_noun
 
 
 def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
-    """The `linear_network` of `result.json`, for a model that leaves `error` (its `model_error`) of these events.
+    """The `linear_network` of `result.json`, for a model that leaves `error` (its `model_error`) of
+    these events.
 
-    `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`, `model_error` and `events` as those of the
-    result, `ratio` of the errors on the events held out, else on those fitted; and the `sentence`, which alone is there
-    where no network can be fitted.
+    `poles` [{decay [1/s], frequency [Hz], admittance [pu]}], `chosen_by`, `model_error` and
+    `events` as those of the result, `ratio` of the errors on the events held out, else on those
+    fitted; and the `sentence`, which alone is there where no network can be fitted.
     """
     events = [fit.waves or fit.event for fit in fits]
     split = sum(fit.role == TRAIN for fit in fits)
@@ -30,16 +33,27 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
         box = best(domain_of(events[0]), events[:split], events[split:])
     except UserError as why:
         return {"sentence": f"no linear network stands beside it: {why}"}
-    played = [Fit(role=fit.role, **vars(box.play(event))) for fit, event in zip(fits, events, strict=True)]
+    played = [
+        Fit(role=fit.role, **vars(box.play(event))) for fit, event in zip(fits, events, strict=True)
+    ]
     own, judged = model_errors(played), slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
     ratio = model / left if left > 0 else None
-    on = f"on the dip{'s' * (len(fits[judged]) > 1)} it {'never saw' if own['held_out'] else 'was fitted to'}"
-    sentence = _sentence(ratio, model, len(box.poles), on) + _of_currents(fits[judged], played[judged])
+    on = (
+        f"on the dip{'s' * (len(fits[judged]) > 1)} it"
+        f" {'never saw' if own['held_out'] else 'was fitted to'}"
+    )
+    sentence = _sentence(ratio, model, len(box.poles), on) + _of_currents(
+        fits[judged], played[judged]
+    )
     return {
-        "poles": box.poles, "chosen_by": box.chosen_by, "model_error": own, "events": [one.to_dict() for one in played],
-        "ratio": ratio, "sentence": sentence,
-    }  # fmt: skip
+        "poles": box.poles,
+        "chosen_by": box.chosen_by,
+        "model_error": own,
+        "events": [one.to_dict() for one in played],
+        "ratio": ratio,
+        "sentence": sentence,
+    }
 
 
 def poles_in_words(poles: Sequence[dict[str, float]]) -> str:
@@ -49,19 +63,30 @@ def poles_in_words(poles: Sequence[dict[str, float]]) -> str:
 
 def network_in_words(poles: int) -> str:
     """What the best network of so many poles is called."""
-    return f"the best linear network {'of ' + count_noun(poles, 'pole') if poles else 'without poles'}"
+    return (
+        f"the best linear network {'of ' + count_noun(poles, 'pole') if poles else 'without poles'}"
+    )
 
 
 def _sentence(ratio: float | None, model: float, poles: int, on: str) -> str:
     network = network_in_words(poles)
     if ratio is None:
-        return f"{network} leaves no more than noise {on}, the physical model {in_percent(model)} of the response"
+        return (
+            f"{network} leaves no more than noise {on}, the physical model {in_percent(model)} of"
+            " the response"
+        )
     return f"the physical model leaves {ratio:.2g} times what {network} does {on}"
 
 
 def _of_currents(fits: Sequence[Fit], played: Sequence[Fit]) -> str:
     """The same of the currents themselves, which hold more than P and Q; "" of phasors."""
-    model, left = (float(np.sqrt(np.mean([(one.epsilon_i or 0.0) ** 2 for one in of]))) for of in (fits, played))
+    model, left = (
+        float(np.sqrt(np.mean([(one.epsilon_i or 0.0) ** 2 for one in of])))
+        for of in (fits, played)
+    )
     if not left:
         return ""
-    return f", and of the currents {model / left:.2g} times (epsilon_i {in_percent(model)} against {in_percent(left)})"
+    return (
+        f", and of the currents {model / left:.2g} times (epsilon_i {in_percent(model)} against"
+        f" {in_percent(left)})"
+    )

@@ -1,1 +1,3 @@
-"""What free numbers do to residuals: fits, noise, chance, intervals. It knows no verdicts and no pages."""
+"""What free numbers do to residuals: fits, noise, chance, intervals. It knows no verdicts and no
+pages.
+"""

@@ -1,8 +1,10 @@
-"""Stretches of a tenth of a second: what a model leaves in one of them tells little of what it leaves in the next.
+"""Stretches of a tenth of a second: what a model leaves in one of them tells little of what it
+leaves in the next.
 
-A residual that is no noise is correlated, in a way that no noise model knows. Blocks longer than its memory are nearly
-independent, and to leave out one of them at a time tells how far an estimate hangs on each: the delete-a-block
-jackknife. Source: Kunsch 1989 (blocks of a series); MacKinnon, Nielsen and Webb 2023 (clusters of a regression).
+A residual that is no noise is correlated, in a way that no noise model knows. Blocks longer than
+its memory are nearly independent, and to leave out one of them at a time tells how far an estimate
+hangs on each: the delete-a-block jackknife. Source: Kunsch 1989 (blocks of a series); MacKinnon,
+Nielsen and Webb 2023 (clusters of a regression).
 """
 
 import itertools
@@ -19,39 +21,55 @@ FEWEST_BLOCKS = 3  # blocks for each parameter: of records with fewer, blocks ar
 LEAST_SQUARES_DIFFERENCE = 0.02  # of a sum of squares, 1 % of an error: less is no difference
 
 
-def blocks_of(events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False) -> list[slice]:
-    """Blocks of the drive's samples, counted from the start of each dip; `from_dip` leaves out what is before it."""
+def blocks_of(
+    events: Sequence[Event], drive: Drive, parameters: int = 1, *, from_dip: bool = False
+) -> list[slice]:
+    """Blocks of the drive's samples, counted from the start of each dip; `from_dip` leaves out what
+    is before it.
+    """
     parts = [drive.part(e) for e in range(drive.events)]
     starts = [part.start + event.start for part, event in zip(parts, events, strict=True)]
     first = starts if from_dip else [part.start for part in parts]
-    seconds = sum((p.stop - a) * e.record.step for p, a, e in zip(parts, first, events, strict=True))
+    seconds = sum(
+        (p.stop - a) * e.record.step for p, a, e in zip(parts, first, events, strict=True)
+    )
     length = min(LENGTH, seconds / (FEWEST_BLOCKS * max(parameters, 1)))
     pieces = []
     for part, begin, start, event in zip(parts, first, starts, events, strict=True):
         n = max(1, round(length / event.record.step))
-        edges = [begin, *range(start - (start - begin - 1) // n * n, start, n), *range(start, part.stop - n // 2, n)]
+        edges = [
+            begin,
+            *range(start - (start - begin - 1) // n * n, start, n),
+            *range(start, part.stop - n // 2, n),
+        ]
         edges = sorted({*edges, part.stop})
         pieces += [slice(a, b) for a, b in itertools.pairwise(edges)]
     return pieces
 
 
 def exceeds(squares: np.ndarray, others: np.ndarray, blocks: Sequence[slice]) -> bool:
-    """Whether squares (N,) exceed others by more than chance explains: by twice the scatter of their differences.
+    """Whether squares (N,) exceed others by more than chance explains: by twice the scatter of
+    their differences.
 
     Paired by sample, summed over blocks; and by more than `ALIKE` of the others.
     """
     difference = np.array([float(np.sum(squares[b] - others[b])) for b in blocks])
     count, total = len(difference), float(difference.sum())
     scatter = np.sqrt(count / max(count - 1, 1) * np.sum((difference - difference.mean()) ** 2))
-    return total > 2 * scatter and total > LEAST_SQUARES_DIFFERENCE * sum(float(others[b].sum()) for b in blocks)
+    return total > 2 * scatter and total > LEAST_SQUARES_DIFFERENCE * sum(
+        float(others[b].sum()) for b in blocks
+    )
 
 
 def reach(without: np.ndarray, whole: float) -> float:
-    """Half the 95 % interval of a figure that is `whole`, by its values without each block (b,): a jackknife's.
+    """Half the 95 % interval of a figure that is `whole`, by its values without each block (b,): a
+    jackknife's.
 
     One block tells nothing of chance: infinite.
     """
     count = len(without)
     if count < 2:
         return np.inf
-    return interval_factor(count - 1) * float(np.sqrt((count - 1) / count * np.sum((without - whole) ** 2)))
+    return interval_factor(count - 1) * float(
+        np.sqrt((count - 1) / count * np.sum((without - whole) ** 2))
+    )

@@ -16,14 +16,16 @@ from tractexp.record import Event
 
 MOST_SETTINGS = 16  # combinations of an effect's scanned parameters
 
-# Change of the frequency [Hz] below which effects of it cannot be tested: a thousandth of nominal, by which a load of
-# exponent 2 moves by 0.2 % of its power.
+# Change of the frequency [Hz] below which effects of it cannot be tested: a thousandth of nominal,
+# by which a load of exponent 2 moves by 0.2 % of its power.
 LEAST_SWING = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """An effect that may be missing. `settings` are the values scanned of parameters that vanish at the null."""
+    """An effect that may be missing. `settings` are the values scanned of parameters that vanish at
+    the null.
+    """
 
     name: str
     effect: Effect
@@ -46,7 +48,8 @@ class Candidate:
         return float(self.effect.relevant.get(parameter.name, 0.1 * (high - low)))
 
     def sized(self, parameter: Parameter, size: float, least: float) -> float:
-        """The value of one of `sizes` that is `size` off its null, or `least` relevant sizes where that is more.
+        """The value of one of `sizes` that is `size` off its null, or `least` relevant sizes where
+        that is more.
 
         A null on a bound is left into the box, whatever sign the size has.
         """
@@ -59,8 +62,8 @@ class Candidate:
 class Catalogue:
     """All candidates that can be tested, and why the others cannot.
 
-    `members` of their families have another place or another law; they are tried beside the best textbook
-    effect.
+    `members` of their families have another place or another law; they are tried beside the best
+    textbook effect.
     """
 
     candidates: tuple[Candidate, ...]
@@ -93,7 +96,9 @@ class Catalogue:
     def spoken(self, name: str) -> str:
         """An effect as a sentence tells it: by its textbook name, and what differs from that."""
         differs = self[name].effect.differs
-        return f"{self.family(name)}{',' * differs.startswith('but')} {differs}" if differs else name
+        return (
+            f"{self.family(name)}{',' * differs.startswith('but')} {differs}" if differs else name
+        )
 
     @functools.cached_property
     def effects(self) -> list[Effect]:
@@ -114,14 +119,17 @@ NOTHING = Catalogue((), {})  # of a model that is fitted as it is
 
 
 def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -> Catalogue:
-    """The registered effects that the model lacks. `only` restricts it; faults of the measurement always stay.
+    """The registered effects that the model lacks. `only` restricts it; faults of the measurement
+    always stay.
 
     Raises `UserError` for a name in `only` that no effect has.
     """
     registered = discover().get("effect", {})
     for name in only:
         if name not in registered:
-            raise UserError(f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}")
+            raise UserError(
+                f"{TASK.effects} names '{name}', which is no effect{among(name, registered)}"
+            )
     here = {effect.name for effect in model.effects}
     testable, untestable, members = [], {}, []
     for name in sorted(registered):
@@ -138,7 +146,9 @@ def catalogue(model: Model, events: Sequence[Event], only: Sequence[str] = ()) -
         else:
             testable.append(candidate(effect))
     heads = {c.name for c in testable}
-    return Catalogue(tuple(testable), untestable, tuple(m for m in members if m.effect.family in heads))
+    return Catalogue(
+        tuple(testable), untestable, tuple(m for m in members if m.effect.family in heads)
+    )
 
 
 def missing_channel(effect: Effect, events: Sequence[Event]) -> str:
@@ -158,6 +168,9 @@ def candidate(effect: Effect) -> Candidate:
     scanned = [p for p in effect.parameters if p.null is None]
     grid = getattr(effect, "grid", {})
     values = [grid.get(p.name, (p.default,)) for p in scanned]
-    settings = [dict(zip((p.name for p in scanned), choice, strict=True)) for choice in itertools.product(*values)]
+    settings = [
+        dict(zip((p.name for p in scanned), choice, strict=True))
+        for choice in itertools.product(*values)
+    ]
     step = -(-len(settings) // MOST_SETTINGS)
     return Candidate(effect.name, effect, sizes, tuple(settings[::step]))

@@ -1,7 +1,9 @@
-"""What chance alone does to the tests: the fit's own noise drawn again and put through the same projection.
+"""What chance alone does to the tests: the fit's own noise drawn again and put through the same
+projection.
 
-Thresholds hold for the largest of all candidates at once, for the noise as it was estimated, and, where the quiet
-samples are few, for the error of that estimate too: each draw then estimates its noise anew.
+Thresholds hold for the largest of all candidates at once, for the noise as it was estimated, and,
+where the quiet samples are few, for the error of that estimate too: each draw then estimates its
+noise anew.
 """
 
 from collections.abc import Mapping
@@ -21,30 +23,37 @@ from tractexp.noise import Noise
 from tractexp.wording import in_words
 
 NULL_DRAWS = 199
-# Independent quiet samples below which every draw estimates its noise anew: the error of the estimate then is a tenth
-# of the noise, as large as what a level of 5 % allows.
+# Independent quiet samples below which every draw estimates its noise anew: the error of the
+# estimate then is a tenth of the noise, as large as what a level of 5 % allows.
 QUIET_WORTH = 150.0
-# Variance from noise of the voltage, over that of the power, from which faults of the measurement are not judged:
-# whatever smooths the calculated power would seem to be there.
+# Variance from noise of the voltage, over that of the power, from which faults of the measurement
+# are not judged: whatever smooths the calculated power would seem to be there.
 BLURRED = 0.5
 SCALE_DRAW_FACTOR = 10  # times as many are drawn for the scales alone
 
 
 def by_draws(p: float) -> str:
-    """A probability as a sentence tells it: no finer than the draws do, though its tail is extrapolated."""
+    """A probability as a sentence tells it: no finer than the draws do, though its tail is
+    extrapolated.
+    """
     return in_words(p) if p >= 1 / (NULL_DRAWS + 1) else f"less than {1 / (NULL_DRAWS + 1):g}"
 
 
 @dataclass(frozen=True, eq=False)
 class Chance:
-    """Draws of the smallest p (b,) of any candidate or fault of the measurement, and of what is left."""
+    """Draws of the smallest p (b,) of any candidate or fault of the measurement, and of what is
+    left.
+    """
 
     least_p: np.ndarray
     left: dict[str, np.ndarray]
-    scales: Mapping[str, Scale] = field(default_factory=dict)  # of the statistics that have exact ones
+    # of the statistics that have exact ones
+    scales: Mapping[str, Scale] = field(default_factory=dict)
 
     def critical_p(self, alpha: float) -> float:
-        """The p a single candidate must undercut so that chance names any with probability `alpha`."""
+        """The p a single candidate must undercut so that chance names any with
+        probability `alpha`.
+        """
         return float(np.quantile(self.least_p, alpha, method="lower"))
 
     def surprises(self, projection: ScoreTest, context: Context) -> dict[str, float]:
@@ -54,12 +63,14 @@ class Chance:
 
 def chance_at(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
-) -> Chance:  # fmt: skip
-    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise taken as known.
+) -> Chance:
+    """Draw every statistic at a fit as chance makes it; where the case is `plain`, with the noise
+    taken as known.
 
     `own` is the projection of the fit under this noise.
 
-    Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less than keeping them.
+    Draws that estimate their noise anew are kept, as for a run that was stopped; others cost less
+    than keeping them.
     """
     context = t.context
     plain = plain or is_noise_exact(context, noise)
@@ -77,25 +88,33 @@ def chance_at(
 
 
 def scales(t: Linearization, own: ScoreTest, noise: Noise, seed: int) -> dict[str, Scale]:
-    """Scales of the statistics of which the largest counts, by many draws of noise that is taken as known.
+    """Scales of the statistics of which the largest counts, by many draws of noise that is taken as
+    known.
 
-    The scale of the column that turns out largest is the one most likely to be too small. By the draws of a `Chance`
-    alone it is a tenth off, and a p of 1e-3 comes out as anything from 1e-4 to 1e-2.
+    The scale of the column that turns out largest is the one most likely to be too small. By the
+    draws of a `Chance` alone it is a tenth off, and a p of 1e-3 comes out as anything from 1e-4 to
+    1e-2.
     """
 
     def part(k: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         drawn = own.of(_white(t, noise, np.random.default_rng((seed, k))))
         by_test = goodness_of_fit.statistics(drawn.channels(t.context.problem), t.context.problem)
-        return {name: (values.mean(axis=0), (values**2).mean(axis=0)) for name, values in by_test.items()}
+        return {
+            name: (values.mean(axis=0), (values**2).mean(axis=0))
+            for name, values in by_test.items()
+        }
 
     parts = each_apart(part, range(1, SCALE_DRAW_FACTOR + 1), t.context.effort)
     moments = {name: np.mean([p[name] for p in parts], axis=0) for name in parts[0]}
-    return {name: Scale(mean, np.sqrt(square - mean**2) + 1e-12) for name, (mean, square) in moments.items()}
+    return {
+        name: Scale(mean, np.sqrt(square - mean**2) + 1e-12)
+        for name, (mean, square) in moments.items()
+    }
 
 
 def _draw_null_distribution(
     t: Linearization, own: ScoreTest, noise: Noise, quiet: QuietNoise, seed: int, plain: bool
-) -> Chance:  # fmt: skip
+) -> Chance:
     rng = np.random.default_rng(seed)
     if plain:
         return _chance(t, own.of(_white(t, noise, rng)), noise)
@@ -117,7 +136,9 @@ def _white(t: Linearization, noise: Noise, rng: np.random.Generator) -> np.ndarr
 
 
 def is_noise_exact(context: Context, noise: Noise) -> bool:
-    """Whether quiet stretches tell the noise exactly enough; of one that follows from the model, its size alone."""
+    """Whether quiet stretches tell the noise exactly enough; of one that follows from the model,
+    its size alone.
+    """
     samples = sum(part.stop - part.start for part in context.problem.quiet)
     return context.domain.noise_from_model or noise.worth(samples) >= QUIET_WORTH
 

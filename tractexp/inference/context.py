@@ -1,4 +1,6 @@
-"""What every step of an investigation works with: records, coordinates and the kernels that simulate them."""
+"""What every step of an investigation works with: records, coordinates and the kernels that
+simulate them.
+"""
 
 import functools
 from collections.abc import Mapping, Sequence
@@ -25,14 +27,16 @@ from tractexp.record import Event
 if TYPE_CHECKING:
     from tractexp.discrepancy.criteria import Criteria
 
-# Standard deviation of a fault of the measurement before anything is seen, in its relevant sizes: clocks, windows and
-# drifts beyond that are seen before a record is used.
+# Standard deviation of a fault of the measurement before anything is seen, in its relevant sizes:
+# clocks, windows and drifts beyond that are seen before a record is used.
 FAULT_PRIOR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class Context:
-    """A base model with its catalogue on the events of `records`. Nothing of it changes but what `effort` counts."""
+    """A base model with its catalogue on the events of `records`. Nothing of it changes but what
+    `effort` counts.
+    """
 
     load: Model
     catalogue: Catalogue
@@ -44,17 +48,30 @@ class Context:
 
     @classmethod
     def of(
-        cls, load: Model, catalogue: Catalogue, records: Records, bounds: Mapping[str, Sequence[float]],
-        fixed: Mapping[str, float], criteria: "Criteria", effort: Effort, substeps: int | None = None,
+        cls,
+        load: Model,
+        catalogue: Catalogue,
+        records: Records,
+        bounds: Mapping[str, Sequence[float]],
+        fixed: Mapping[str, float],
+        criteria: "Criteria",
+        effort: Effort,
+        substeps: int | None = None,
         family: type[Family] = Family,
-    ) -> "Context":  # fmt: skip
-        """A context for these records; the load is simulated behind the recorder's window, where there is one."""
-        kernels = Kernels(family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps)
+    ) -> "Context":
+        """A context for these records; the load is simulated behind the recorder's window, where
+        there is one.
+        """
+        kernels = Kernels(
+            family(load.behind(records.window), catalogue), records.events, bounds, fixed, substeps
+        )
         coordinates = FreeSet.of_effects(kernels.bare, kernels.whole, catalogue, FAULT_PRIOR)
         return cls(load, catalogue, records, kernels, coordinates, criteria, effort)
 
     def on(self, records: Records) -> "Context":
-        """The same model and catalogue on other records, with the same Runge-Kutta steps and a count of its own."""
+        """The same model and catalogue on other records, with the same Runge-Kutta steps and a
+        count of its own.
+        """
         kernels, criteria, effort = self.kernels, self.criteria, self.effort.anew()
         same = kernels.bounds, kernels.fixed, criteria, effort, kernels.substeps
         there = Context.of(self.load, self.catalogue, records, *same, type(kernels.family))
@@ -62,7 +79,9 @@ class Context:
 
     @property
     def with_measured_power(self) -> "Context":
-        """The same with P0 and Q0 of each event as they were measured before it: they are no part of a fit."""
+        """The same with P0 and Q0 of each event as they were measured before it: they are no part
+        of a fit.
+        """
         return replace(self, coordinates=replace(self.coordinates, before=np.array([], dtype=int)))
 
     @property
@@ -72,15 +91,24 @@ class Context:
 
     @functools.cached_property
     def digest(self) -> str:
-        """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not known."""
+        """SHA-256 of all that a fit here depends on beside noise and starts; "" where that is not
+        known.
+        """
         load, at = self.load, self.coordinates
         parts = (load.motor, load.static, *load.effects, *self.catalogue.effects)
         if not all(map(store.is_installed, parts)):
             return ""
         content = (
-            self.kernels.bare.digest(), self.kernels.substeps, self.criteria, at.box.lower, at.box.upper,
-            at.null, at.before, at.prior_deviation, sorted(self.kernels.fixed.items()),
-        )  # fmt: skip
+            self.kernels.bare.digest(),
+            self.kernels.substeps,
+            self.criteria,
+            at.box.lower,
+            at.box.upper,
+            at.null,
+            at.before,
+            at.prior_deviation,
+            sorted(self.kernels.fixed.items()),
+        )
         return store.key(store.environment(), repr(parts), self.records.window, *content)
 
     @property
@@ -113,10 +141,15 @@ class Context:
     def describe(self, noise: Noise) -> str:
         """Level and color of the noise of what is compared, as a run prints them."""
         labels = noise.describe(self.drive.spoken).split(", ")
-        return ", ".join(part for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True) if there)
+        return ", ".join(
+            part
+            for part, there in zip(labels, [*np.any(self.valid, axis=1), True], strict=True)
+            if there
+        )
 
     def residuals(self, unit: np.ndarray, names: Sequence[str], beside: str = "") -> np.ndarray:
-        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names` are at their null.
+        """Calculated minus measured (n, C, N) [pu] at coordinates (n, D) where effects but `names`
+        are at their null.
 
         Of what they leave one more effect `beside` them, or the pushes, may be off theirs.
         """
@@ -134,14 +167,20 @@ class Context:
             residuals[mine] = self.residuals(unit[mine], sets[mine[0]])
         return residuals
 
-    def changes(self, unit: np.ndarray, points: np.ndarray, names: Sequence[str], beside: Sequence[str]) -> np.ndarray:
-        """What each of the points (n, D) changes (n, C, N) [pu] against coordinates (D,): one effect beside the names.
+    def changes(
+        self, unit: np.ndarray, points: np.ndarray, names: Sequence[str], beside: Sequence[str]
+    ) -> np.ndarray:
+        """What each of the points (n, D) changes (n, C, N) [pu] against coordinates (D,): one
+        effect beside the names.
 
-        Both by the same kernel, so that what changes nothing is exactly 0; 0 where a simulation diverges, too.
+        Both by the same kernel, so that what changes nothing is exactly 0; 0 where a simulation
+        diverges, too.
         """
         changes = np.empty((len(points), self.drive.channels, self.drive.samples))
         for mine in self._of_one_kernel([(names, other) for other in beside]):
-            both = self.residuals(np.concatenate([unit[None], points[mine]]), names, beside[mine[0]])
+            both = self.residuals(
+                np.concatenate([unit[None], points[mine]]), names, beside[mine[0]]
+            )
             changes[mine] = finite(both[1:] - both[0])
         return changes
 
@@ -156,8 +195,12 @@ class Context:
         """Residuals (n, C, N) as rows (n, C N) of independent unit variance."""
         return noise.whiten(residuals, self.drive, self.valid)
 
-    def rows(self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]) -> np.ndarray:
-        """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of the free faults."""
+    def rows(
+        self, unit: np.ndarray, noise: Noise, faults: Sequence[int], sets: Sequence[Sequence[str]]
+    ) -> np.ndarray:
+        """Whitened residuals (n, C N) of coordinates with a set of names each, then the prior of
+        the free faults.
+        """
         raw = self.residuals_of(unit, sets)
         white = self.whiten(noise, raw)
         at = self.coordinates
@@ -167,9 +210,11 @@ class Context:
     def linearize(
         self, unit: np.ndarray, noise: Noise, columns: Sequence[int], names: Sequence[str]
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they and their differences.
+        """Return the residuals (C, N) of a fit with the named effects, and rows (1 + k, R): they
+        and their differences.
 
-        The rows are whitened: C N of the records, then those of the priors of the faults of the measurement.
+        The rows are whitened: C N of the records, then those of the priors of the faults of the
+        measurement.
         """
         at, k = self.coordinates, len(columns)
         points, width = two_sided(unit, columns)

@@ -1,7 +1,8 @@
-"""Independent items on all cores, each in a process that is forked for it and so knows all that this one knows.
+"""Independent items on all cores, each in a process that is forked for it and so knows all that
+this one knows.
 
-A search is thousands of short calls of machine code. Threads that hand the interpreter to each other after each of them
-took longer on two cores than one takes by itself.
+A search is thousands of short calls of machine code. Threads that hand the interpreter to each
+other after each of them took longer on two cores than one takes by itself.
 """
 
 import contextlib
@@ -22,25 +23,31 @@ from tractexp.workers import end_with_parent
 FORKS = sys.platform == "linux"  # elsewhere it is not safe, or not there
 Item = TypeVar("Item")
 Result = TypeVar("Result")
-_calls: list[Callable[[int], Any]] = []  # what this process was forked for: it takes the position of an item
+# what this process was forked for: it takes the position of an item
+_calls: list[Callable[[int], Any]] = []
 
 
 def cores() -> int:
-    """How many processes an investigation may fork: as many as there are cores for this one, a container's limit
-    considered.
+    """How many processes an investigation may fork: as many as there are cores for this one, a
+    container's limit considered.
 
-    One in a worker of a sweep, which has its share of the cores, in a process that was forked here, and in a thread:
-    others may hold locks beside it.
+    One in a worker of a sweep, which has its share of the cores, in a process that was forked here,
+    and in a thread: others may hold locks beside it.
     """
     from joblib import cpu_count
 
-    beside = multiprocessing.parent_process() or threading.current_thread() is not threading.main_thread()
+    beside = (
+        multiprocessing.parent_process()
+        or threading.current_thread() is not threading.main_thread()
+    )
     return 1 if beside or not FORKS else cpu_count()
 
 
-def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort: Effort) -> list[Result]:
-    """`function` of each item, on all cores. What it returns is data; what it does to objects of this process is lost,
-    but for what it spends of an effort.
+def each_apart(
+    function: Callable[[Item], Result], items: Sequence[Item], effort: Effort
+) -> list[Result]:
+    """`function` of each item, on all cores. What it returns is data; what it does to objects of
+    this process is lost, but for what it spends of an effort.
 
     Raises `UserError` where a process is killed.
     """
@@ -63,15 +70,22 @@ def each_apart(function: Callable[[Item], Result], items: Sequence[Item], effort
 
 
 @contextlib.contextmanager
-def _fork_processes(call: Callable[[int], Any], processes: int) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
+def _fork_processes(
+    call: Callable[[int], Any], processes: int
+) -> Iterator[Callable[[Iterable[int]], Iterable[Any]]]:
     """Processes that know this call, ended at once where an error or Ctrl-C leaves it."""
     others = multiprocessing.active_children()
     try:
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)  # no thread holds a lock that they take
-            with ProcessPoolExecutor(processes, multiprocessing.get_context("fork"), _begin, (call,)) as pool:
+            # no thread holds a lock that they take
+            warnings.filterwarnings("ignore", ".*fork", DeprecationWarning)
+            with ProcessPoolExecutor(
+                processes, multiprocessing.get_context("fork"), _begin, (call,)
+            ) as pool:
                 try:
-                    yield lambda positions: _results_in_order([pool.submit(_call, k) for k in positions])
+                    yield lambda positions: _results_in_order(
+                        [pool.submit(_call, k) for k in positions]
+                    )
                 except BaseException:
                     for process in multiprocessing.active_children():
                         if process not in others:
@@ -79,13 +93,16 @@ def _fork_processes(call: Callable[[int], Any], processes: int) -> Iterator[Call
                     raise
     except BrokenProcessPool as error:
         raise UserError(
-            "a process at work on a part of this step was killed, as systems do where memory is short; close other"
+            "a process at work on a part of this step was killed, as systems do where memory is"
+            " short; close other"
             " programs, or allow this one fewer cores (taskset)"
         ) from error
 
 
 def _results_in_order(calls: Sequence[Future[Any]]) -> Iterator[Any]:
-    """Not `Executor.map`: it cancels what is left, and Python 3.11's pool cannot end a call that was cancelled."""
+    """Not `Executor.map`: it cancels what is left, and Python 3.11's pool cannot end a call that
+    was cancelled.
+    """
     for future in calls:
         yield future.result()
 
@@ -100,7 +117,9 @@ def _call(k: int) -> Any:
 
 
 def _begin(call: Callable[[int], Any]) -> None:
-    """Keep the call, which a fork need not send; end by Ctrl-C without a word, and with the parent, even killed."""
+    """Keep the call, which a fork need not send; end by Ctrl-C without a word, and with the parent,
+    even killed.
+    """
     _calls.append(call)
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     end_with_parent()

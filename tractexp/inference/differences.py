@@ -1,4 +1,6 @@
-"""Differences of rows and residuals: what each coordinate changes by a small step, one-sided or from both sides."""
+"""Differences of rows and residuals: what each coordinate changes by a small step, one-sided or
+from both sides.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -6,21 +8,28 @@ import numpy as np
 
 from tractexp.inference.separable import NOT_SEPARABLE, SeparableColumns
 
-# (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot be simulated
+# (n, D) unit values and (n,) their lanes -> rows (n, R) whose squares are summed; nan rows cannot
+# be simulated
 Rows = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 RANGE_DIFFERENCE = 1e-6  # of a parameter's range
-CENTRAL = 1e-5  # of it, where both sides are taken: truncation and rounding both stay below 1e-7 of a column
+# of it, where both sides are taken: truncation and rounding both stay below 1e-7 of a column
+CENTRAL = 1e-5
 COORDINATE_STEP = 1e-4  # of a coordinate's range, for the residuals at a fit
 
 
 def forward_differences(
-    rows: Rows, unit: np.ndarray, base: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
+    rows: Rows,
+    unit: np.ndarray,
+    base: np.ndarray,
+    lanes: np.ndarray,
+    apart: SeparableColumns = NOT_SEPARABLE,
 ) -> np.ndarray:
-    """Derivatives (n, k + m, R) of the rows at `unit` (n, D), where they are `base` (n, R), away from the nearer wall.
+    """Derivatives (n, k + m, R) of the rows at `unit` (n, D), where they are `base` (n, R), away
+    from the nearer wall.
 
-    First those to each coordinate that acts on all rows, then those to the m of each row's own event. One that cannot
-    be simulated is zero.
+    First those to each coordinate that acts on all rows, then those to the m of each row's own
+    event. One that cannot be simulated is zero.
     """
     n, d = unit.shape
     shared, steps = apart.shared(d), apart.moves(d)
@@ -39,16 +48,22 @@ def forward_differences(
 def central_differences(
     rows: Rows, unit: np.ndarray, lanes: np.ndarray, apart: SeparableColumns = NOT_SEPARABLE
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Rows (n, R) at `unit` (n, D) and derivatives (n, k + m, R) from both sides, in the order of the forward ones.
+    """Rows (n, R) at `unit` (n, D) and derivatives (n, k + m, R) from both sides, in the order of
+    the forward ones.
 
-    One batch of n (2 (k + m) + 1). Next to a wall, or where one side cannot be simulated, the difference is one-sided.
+    One batch of n (2 (k + m) + 1). Next to a wall, or where one side cannot be simulated, the
+    difference is one-sided.
     """
     n, d = unit.shape
     up = np.minimum(unit + CENTRAL, 1.0) - unit
     down = unit - np.maximum(unit - CENTRAL, 0.0)
     shared, moves = apart.shared(d), apart.moves(d)
-    steps = np.concatenate([np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1)
-    batch = rows((unit[:, None] + steps).reshape(-1, d), np.repeat(lanes, steps.shape[1])).reshape(*steps.shape[:2], -1)
+    steps = np.concatenate(
+        [np.zeros((n, 1, d)), moves * up[:, None], moves * -down[:, None]], axis=1
+    )
+    batch = rows((unit[:, None] + steps).reshape(-1, d), np.repeat(lanes, steps.shape[1])).reshape(
+        *steps.shape[:2], -1
+    )
     base, above, below = batch[:, 0], batch[:, 1 : len(moves) + 1], batch[:, len(moves) + 1 :]
     J, k = np.zeros_like(above), len(shared)
     J[:, :k] = _from_both_sides(base, above[:, :k], below[:, :k], up[:, shared], down[:, shared])
@@ -62,7 +77,9 @@ def central_differences(
 def _from_both_sides(
     base: np.ndarray, above: np.ndarray, below: np.ndarray, up: np.ndarray, down: np.ndarray
 ) -> np.ndarray:
-    """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k) from there."""
+    """Derivatives (n, k, R) from rows (n, R) and those (n, k, R) one step `up` and `down` (n, k)
+    from there.
+    """
     lost_up, lost_down = np.isnan(above).any(axis=2), np.isnan(below).any(axis=2)
     for side, lost in (above, lost_up), (below, lost_down):
         side[lost] = base[np.nonzero(lost)[0]]
@@ -71,20 +88,31 @@ def _from_both_sides(
 
 
 def finite(changes: np.ndarray) -> np.ndarray:
-    """Changes of a residual; none where a simulation diverges: that tells nothing of what little would do."""
+    """Changes of a residual; none where a simulation diverges: that tells nothing of what little
+    would do.
+    """
     return np.nan_to_num(changes, posinf=0.0, neginf=0.0)
 
 
-def two_sided(unit: np.ndarray, columns: Sequence[int] | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (2 k, D) a small step above in each of the columns, then below, and how far they are apart (k,)."""
-    points, at = np.tile(unit, (2, len(columns), 1)), (np.arange(len(columns)), np.asarray(columns, dtype=int))
+def two_sided(
+    unit: np.ndarray, columns: Sequence[int] | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Points (2 k, D) a small step above in each of the columns, then below, and how far they are
+    apart (k,).
+    """
+    points, at = (
+        np.tile(unit, (2, len(columns), 1)),
+        (np.arange(len(columns)), np.asarray(columns, dtype=int)),
+    )
     points[0][at] = np.minimum(unit[at[1]] + COORDINATE_STEP, 1.0)
     points[1][at] = np.maximum(unit[at[1]] - COORDINATE_STEP, 0.0)
     return points.reshape(-1, len(unit)), points[0][at] - points[1][at]
 
 
 def slopes(rows: np.ndarray, width: np.ndarray) -> np.ndarray:
-    """Difference quotients (k, ...) of what there is (2 k, ...) at such points; 0 where that diverges."""
+    """Difference quotients (k, ...) of what there is (2 k, ...) at such points; 0 where that
+    diverges.
+    """
     k = len(width)
     with np.errstate(over="ignore", invalid="ignore"):
         quotients = (rows[:k] - rows[k:]) / width.reshape(k, *[1] * (rows.ndim - 1))

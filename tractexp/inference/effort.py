@@ -46,7 +46,9 @@ class Effort:
 
     @contextmanager
     def parts(self, total: int) -> Iterator[Callable[[], None]]:
-        """Count the parts of the step at hand: yield what is to be called at the end of each. Parts may have parts."""
+        """Count the parts of the step at hand: yield what is to be called at the end of each. Parts
+        may have parts.
+        """
         counted = Parts(total)
         self._parts.append(counted)
         try:
@@ -61,10 +63,14 @@ class Effort:
 
     def spent_since(self, counts: Sequence[int]) -> list[int]:
         """Simulations of each of those parts since, and of parts that were begun since."""
-        return [now - before for now, before in itertools.zip_longest(self.counts, counts, fillvalue=0)]
+        return [
+            now - before for now, before in itertools.zip_longest(self.counts, counts, fillvalue=0)
+        ]
 
     def add(self, spent: Sequence[int]) -> None:
-        """Count what another process has spent on each part; what this one does not know was begun for this part."""
+        """Count what another process has spent on each part; what this one does not know was begun
+        for this part.
+        """
         known = tuple(self._all)
         for effort, simulations in zip(known, spent, strict=False):
             effort.spend(simulations)
@@ -88,10 +94,15 @@ class Effort:
             while not ended.wait(SILENCE / 4):
                 now = time.perf_counter()
                 if now - self._said >= SILENCE:
-                    far = [str(part) for part in self._parts if part.total > 1][:1]  # parts of parts come and go
+                    # parts of parts come and go
+                    far = [str(part) for part in self._parts if part.total > 1][:1]
                     far += [f"{self.total} simulations"] * (self.total > counted)
                     self._said, counted = now, self.total
-                    self._tell(": ".join([f"  still {self._step or 'at work'}", *[", ".join(far)] * bool(far)]))
+                    self._tell(
+                        ": ".join(
+                            [f"  still {self._step or 'at work'}", *[", ".join(far)] * bool(far)]
+                        )
+                    )
 
         watcher = Thread(target=watch, name="progress", daemon=True)
         watcher.start()

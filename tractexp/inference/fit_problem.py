@@ -1,4 +1,6 @@
-"""What a fit moves, and the residuals that come of it: a model on its events, and which numbers are free."""
+"""What a fit moves, and the residuals that come of it: a model on its events, and which numbers are
+free.
+"""
 
 import functools
 from dataclasses import dataclass
@@ -14,8 +16,8 @@ from tractexp.inference.separable import SeparableColumns
 class FitProblem:
     """A problem whose residuals are asked for at coordinates (n, D) of its free set.
 
-    With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they are the means before.
-    `valid` (C, N) marks the samples that count: gaps do not.
+    With `initial_power` P0 and Q0 of each event are coordinates beside the parameters; else they
+    are the means before. `valid` (C, N) marks the samples that count: gaps do not.
     """
 
     problem: Problem
@@ -47,7 +49,8 @@ class FitProblem:
         return self.placed(self.problem.space.to_unit(np.atleast_2d(values)))
 
     def placed(self, unit: np.ndarray) -> np.ndarray:
-        """Parameters (n, free or more) in the unit cube as coordinates (n, D), at the measured power before each event.
+        """Parameters (n, free or more) in the unit cube as coordinates (n, D), at the measured
+        power before each event.
 
         Whatever power the given ones have is left out.
         """
@@ -58,13 +61,17 @@ class FitProblem:
         return self.problem.space.from_unit(unit[..., : self.free])
 
     def residuals(self, unit: np.ndarray) -> np.ndarray:
-        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D): 0 in gaps, nan where not simulated."""
+        """Calculated minus measured (n, 2, N) [pu] at coordinates (n, D): 0 in gaps, nan where not
+        simulated.
+        """
         problem, drive = self.problem, self.problem.drive
         before = None
         if self.initial_power:
             power = self.free_set.box.from_unit(unit)[:, self.free_set.before]
             before = power.reshape(len(unit), drive.events, 2).swapaxes(0, 1)
-        response = problem.model.simulate(drive, problem.candidates(self.values(unit)), problem.step.substeps, before)
+        response = problem.model.simulate(
+            drive, problem.candidates(self.values(unit)), problem.step.substeps, before
+        )
         rows = response.by_candidate
         rows -= drive.measured
         if self.gaps:
@@ -77,4 +84,6 @@ class FitProblem:
     @functools.cached_property
     def apart(self) -> SeparableColumns:
         """P0 and Q0 of each event, which act on its own rows only."""
-        return SeparableColumns.of_power(self.problem.drive, self.free if self.initial_power else None)
+        return SeparableColumns.of_power(
+            self.problem.drive, self.free if self.initial_power else None
+        )

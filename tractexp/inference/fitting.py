@@ -1,4 +1,6 @@
-"""Fits of sets of effects side by side: each is a lane of the batched descent with its own free columns."""
+"""Fits of sets of effects side by side: each is a lane of the batched descent with its own free
+columns.
+"""
 
 import itertools
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,7 +32,9 @@ class Refit:
 
     @property
     def cost(self) -> float:
-        """Akaike's criterion, by which sets of the same number of effects are compared: a parameter costs 2."""
+        """Akaike's criterion, by which sets of the same number of effects are compared: a parameter
+        costs 2.
+        """
         return self.deviance + 2 * self.parameters
 
 
@@ -42,8 +46,11 @@ def best_of(fits: Iterable[Refit]) -> list[Refit]:
     return list(best.values())
 
 
-def refit(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None) -> list[Refit]:
-    """Fit sets of effects side by side, with the named faults of the measurement free beside each (by default all).
+def refit(
+    context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None
+) -> list[Refit]:
+    """Fit sets of effects side by side, with the named faults of the measurement free beside each
+    (by default all).
 
     Of several starts of one set the best is returned; the result is in order of cost.
     """
@@ -51,8 +58,12 @@ def refit(context: Context, noise: Noise, wanted: Sequence[Start], faults: Seque
 
 
 def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list[Refit]:
-    """As `refit`, good enough to rank sets that are far apart; what falls behind early is given up."""
-    begun = _run_descents(context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]))
+    """As `refit`, good enough to rank sets that are far apart; what falls behind early
+    is given up.
+    """
+    begun = _run_descents(
+        context, noise, wanted, None, (fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1])
+    )
     best = best_of(begun)
     far = _far([r.cost for r in best])
     promising = [r.names for r in best if r.cost <= best[0].cost + far]
@@ -68,7 +79,10 @@ def rough_refit(context: Context, noise: Noise, wanted: Sequence[Start]) -> list
                 noise,
                 again,
                 None,
-                (fit_effort.ROUGH_DESCENT[0] - fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]),
+                (
+                    fit_effort.ROUGH_DESCENT[0] - fit_effort.FIRST_ITERATIONS,
+                    fit_effort.ROUGH_DESCENT[1],
+                ),
             ),
         ]
     )
@@ -80,21 +94,27 @@ def _far(costs: Sequence[float]) -> float:
 
 
 def wide_refit(
-    context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None = None,
+    context: Context,
+    noise: Noise,
+    wanted: Sequence[Start],
+    faults: Sequence[str] | None = None,
     again: int = fit_effort.SCATTER_ROUNDS,
-) -> list[Refit]:  # fmt: skip
-    """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and descended in turn.
+) -> list[Refit]:
+    """As `refit`, for one set whose thresholds and times have hardly a slope: moved far and
+    descended in turn.
 
-    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted. Around the best it is
-    begun `again` so often.
+    A descent walks a relay's time by a sample a step, and a wrong time bends what else is fitted.
+    Around the best it is begun `again` so often.
     """
     return _around(context, noise, _in_turns(context, noise, wanted, faults), faults, again)
 
 
 def _around(
     context: Context, noise: Noise, fits: list[Refit], faults: Sequence[str] | None, again: int
-) -> list[Refit]:  # fmt: skip
-    """Fits of one set searched further around the best of them as long as that gains, and the nearest then exactly."""
+) -> list[Refit]:
+    """Fits of one set searched further around the best of them as long as that gains, and the
+    nearest then exactly.
+    """
     for _ in range(again if context.coordinates.settings(fits[0].names) else 0):
         others = _in_turns(context, noise, scatter_starts(context, fits[0]), faults)
         if others[0].deviance > fits[0].deviance - fit_effort.LEAST_GAIN:
@@ -104,9 +124,12 @@ def _around(
     return refit(context, noise, near, faults)
 
 
-def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
-    """The best of these starts, each moved and descended in turn as long as it gains more than it is behind the best;
-    the best first."""
+def _in_turns(
+    context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None
+) -> list[Refit]:
+    """The best of these starts, each moved and descended in turn as long as it gains more than it
+    is behind the best; the best first.
+    """
     turning = _begun(context, noise, wanted, faults)
     ended: list[Refit] = []
     for _ in range(fit_effort.MOST_TURNS):
@@ -114,9 +137,12 @@ def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: S
         after = _run_descents(context, noise, moved, faults, fit_effort.ROUGH_DESCENT)
         better = [min(pair, key=lambda f: f.deviance) for pair in zip(turning, after, strict=True)]
         best = min(f.deviance for f in (*ended, *better))
-        gains = [before.deviance - now.deviance for before, now in zip(turning, better, strict=True)]
+        gains = [
+            before.deviance - now.deviance for before, now in zip(turning, better, strict=True)
+        ]
         promising = [
-            gain > max(fit_effort.LEAST_GAIN, f.deviance - best) for gain, f in zip(gains, better, strict=True)
+            gain > max(fit_effort.LEAST_GAIN, f.deviance - best)
+            for gain, f in zip(gains, better, strict=True)
         ]
         ended += [f for f, more in zip(better, promising, strict=True) if not more]
         turning = [f for f, more in zip(better, promising, strict=True) if more]
@@ -126,27 +152,42 @@ def _in_turns(context: Context, noise: Noise, wanted: Sequence[Start], faults: S
 
 
 def scatter_starts(context: Context, fit: Refit) -> list[Start]:
-    """Starts around a fit, with all that an effect has beside its sizes moved at once, by little and by much.
+    """Starts around a fit, with all that an effect has beside its sizes moved at once, by little
+    and by much.
 
-    Two relays may each be at its best beside the other and still have each other's times: one parameter at a time
-    leads nowhere then. The points are Roberts' (2018) sequence R_d, the fractional parts of k / phi, k / phi^2, ...
+    Two relays may each be at its best beside the other and still have each other's times: one
+    parameter at a time leads nowhere then. The points are Roberts' (2018) sequence R_d, the
+    fractional parts of k / phi, k / phi^2, ...
     """
     columns = context.coordinates.settings(fit.names)
     phi = 2.0
     for _ in range(50):
         phi = (1 + phi) ** (1 / (len(columns) + 1))
-    parts = np.outer(np.arange(1, fit_effort.SCATTER_POINTS + 1), phi ** -np.arange(1.0, len(columns) + 1)) % 1.0
+    parts = (
+        np.outer(
+            np.arange(1, fit_effort.SCATTER_POINTS + 1), phi ** -np.arange(1.0, len(columns) + 1)
+        )
+        % 1.0
+    )
     units = np.repeat(fit.unit[None], fit_effort.SCATTER_POINTS, axis=0)
-    units[:, columns] = np.clip(units[:, columns] + fit_effort.SCATTER_REACH * (2 * parts - 1) ** 3, 0.0, 1.0)
+    units[:, columns] = np.clip(
+        units[:, columns] + fit_effort.SCATTER_REACH * (2 * parts - 1) ** 3, 0.0, 1.0
+    )
     return [(fit.names, unit) for unit in units]
 
 
 def wide_refits(
-    context: Context, noise: Noise, wanted: Iterable[Sequence[Start]], most: int, others: Iterable[Refit] = ()
-) -> list[Refit]:  # fmt: skip
-    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few iterations.
+    context: Context,
+    noise: Noise,
+    wanted: Iterable[Sequence[Start]],
+    most: int,
+    others: Iterable[Refit] = (),
+) -> list[Refit]:
+    """`wide_refit` of those `most` sets, each with starts of its own, that come nearest in a few
+    iterations.
 
-    What is far behind the best of them and of `others` after these, or after its turns, is given up.
+    What is far behind the best of them and of `others` after these, or after its turns, is given
+    up.
     """
     costs = [fit.cost for fit in others]
 
@@ -154,28 +195,60 @@ def wide_refits(
         best = [fits[0].cost for fits in every] + costs
         return [fits for fits in every if fits[0].cost <= min(best) + _far(best)]
 
-    begun = near(each_apart(lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort))
+    begun = near(
+        each_apart(
+            lambda starts: _begun(context, noise, starts, None), list(wanted), context.effort
+        )
+    )
     begun = sorted(begun, key=lambda fits: fits[0].cost)[:most]
     again = [[(f.names, f.unit) for f in fits] for fits in begun]
-    turned = each_apart(lambda starts: _in_turns(context, noise, starts, None), again, context.effort)
+    turned = each_apart(
+        lambda starts: _in_turns(context, noise, starts, None), again, context.effort
+    )
     ended = lambda fits: _around(context, noise, fits, None, fit_effort.SCATTER_ROUNDS)  # noqa: E731
-    return best_of([*itertools.chain(*turned), *itertools.chain(*each_apart(ended, near(turned), context.effort))])
+    return best_of(
+        [
+            *itertools.chain(*turned),
+            *itertools.chain(*each_apart(ended, near(turned), context.effort)),
+        ]
+    )
 
 
-def _begun(context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None) -> list[Refit]:
-    """The best starts of one set after a few iterations, of those that promise most by one simulation each."""
+def _begun(
+    context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None
+) -> list[Refit]:
+    """The best starts of one set after a few iterations, of those that promise most by one
+    simulation each.
+    """
     names = wanted[0][0]
-    nuisances = [*context.coordinates.base, *context.coordinates.before, *_with_prior(context, [names], faults)[0]]
-    units = select_promising_starts(context, noise, names, np.array([unit for _, unit in wanted]), nuisances, fit_effort.MOST_STARTS)
+    nuisances = [
+        *context.coordinates.base,
+        *context.coordinates.before,
+        *_with_prior(context, [names], faults)[0],
+    ]
+    units = select_promising_starts(
+        context,
+        noise,
+        names,
+        np.array([unit for _, unit in wanted]),
+        nuisances,
+        fit_effort.MOST_STARTS,
+    )
     effort = fit_effort.FIRST_ITERATIONS, fit_effort.ROUGH_DESCENT[1]
     begun = _run_descents(context, noise, [(names, u) for u in units], faults, effort)
     at = np.array([f.unit for f in begun])
-    chosen = best_distinct(at, np.array([f.cost for f in begun]), fit_effort.DISTINCT, fit_effort.STARTS_IN_TURNS)
+    chosen = best_distinct(
+        at, np.array([f.cost for f in begun]), fit_effort.DISTINCT, fit_effort.STARTS_IN_TURNS
+    )
     return [begun[k] for k in chosen]
 
 
-def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None) -> np.ndarray:
-    """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and by any reach."""
+def moved_across(
+    context: Context, noise: Noise, fit: Refit, faults: Sequence[str] | None = None
+) -> np.ndarray:
+    """Coordinates (D,) with what an effect has beside its sizes moved, one parameter at a time and
+    by any reach.
+    """
     columns = context.coordinates.settings(fit.names)
     if not columns:
         return fit.unit
@@ -184,7 +257,9 @@ def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[st
     for _ in range(fit_effort.MOST_MOVES):
         trials = np.repeat(unit[None], 2 * len(columns) * len(fit_effort.MOVE_REACHES), axis=0)
         for k, mine in zip(columns, np.split(trials, len(columns)), strict=True):
-            mine[:, k] = np.clip(mine[:, k] + np.r_[fit_effort.MOVE_REACHES, -fit_effort.MOVE_REACHES], 0.0, 1.0)
+            mine[:, k] = np.clip(
+                mine[:, k] + np.r_[fit_effort.MOVE_REACHES, -fit_effort.MOVE_REACHES], 0.0, 1.0
+            )
         rows = context.rows(trials, noise, prior, [fit.names] * len(trials))
         deviances = np.nan_to_num(np.einsum("nr,nr->n", rows, rows), nan=np.inf)
         if not deviances.min() < deviance - fit_effort.LEAST_GAIN:
@@ -195,7 +270,7 @@ def moved_across(context: Context, noise: Noise, fit: Refit, faults: Sequence[st
 
 def no_worse_than_subsets(
     context: Context, noise: Noise, refits: Mapping[Names, Refit], fits: Sequence[Refit]
-) -> list[Refit]:  # fmt: skip
+) -> list[Refit]:
     """Refit from its best subset any set that came out worse than that subset."""
     again = []
     for fit in fits:
@@ -210,26 +285,37 @@ def no_worse_than_subsets(
 
 
 def _run_descents(
-    context: Context, noise: Noise, wanted: Sequence[Start], faults: Sequence[str] | None, effort: tuple[int, float]
+    context: Context,
+    noise: Noise,
+    wanted: Sequence[Start],
+    faults: Sequence[str] | None,
+    effort: tuple[int, float],
 ) -> list[Refit]:
-    """The end of a descent from each start; of one that was made before, as by a run that was stopped, as it was.
+    """The end of a descent from each start; of one that was made before, as by a run that was
+    stopped, as it was.
 
-    `TOGETHER` of them take their steps in the same calls, whatever the number of cores: a fit's last bits hang on it.
+    `TOGETHER` of them take their steps in the same calls, whatever the number of cores: a fit's
+    last bits hang on it.
     """
     at, spent = context.coordinates, context.effort.total
     measured, prior = _with_prior(context, [names for names, _ in wanted], faults)
     always = [*at.base, *at.before, *measured]
-    columns = [[*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted]
+    columns = [
+        [*always, *(k for k in at.parameters(names) if k not in always)] for names, _ in wanted
+    ]
     table = np.full((len(wanted), max(map(len, columns))), at.dimension)
     for lane, free in enumerate(columns):
         table[lane, : len(free)] = free
-    starts = np.array([np.r_[start, 0.0] for _, start in wanted])  # the last column takes what no lane has
+    # the last column takes what no lane has
+    starts = np.array([np.r_[start, 0.0] for _, start in wanted])
 
     def descended(group: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         def rows(x: np.ndarray, lanes: np.ndarray) -> np.ndarray:
             whole = starts[group[lanes]]
             np.put_along_axis(whole, table[group[lanes]], x, axis=1)
-            return context.rows(whole[:, :-1], noise, prior, [wanted[lane][0] for lane in group[lanes]])
+            return context.rows(
+                whole[:, :-1], noise, prior, [wanted[lane][0] for lane in group[lanes]]
+            )
 
         begin = np.take_along_axis(starts[group], table[group], axis=1)
         done = descend(rows, begin, table[group] == at.dimension, *effort, context.apart)
@@ -238,15 +324,25 @@ def _run_descents(
     def all_descended() -> tuple[np.ndarray, ...]:
         groups = np.array_split(np.arange(len(wanted)), -(-len(wanted) // fit_effort.FITS_AT_ONCE))
         units, deviances = zip(*each_apart(descended, groups, context.effort), strict=True)
-        return np.concatenate(units), np.concatenate(deviances), np.array(context.effort.total - spent)
+        return (
+            np.concatenate(units),
+            np.concatenate(deviances),
+            np.array(context.effort.total - spent),
+        )
 
     wants = [(tuple(names), unit) for names, unit in wanted]
     key = context.digest and store.key(context.digest, noise, wants, prior, effort)
     unit, deviance, simulations = store.DESCENTS.arrays(key, all_descended)
-    context.effort.spend(int(simulations) + spent - context.effort.total)  # of what was made before, what it took then
+    # of what was made before, what it took then
+    context.effort.spend(int(simulations) + spent - context.effort.total)
     np.put_along_axis(starts, table, unit, axis=1)
     return [
-        Refit(tuple(sorted(names)), starts[lane, :-1].copy(), float(deviance[lane]), len(at.parameters(names)))
+        Refit(
+            tuple(sorted(names)),
+            starts[lane, :-1].copy(),
+            float(deviance[lane]),
+            len(at.parameters(names)),
+        )
         for lane, (names, _) in enumerate(wanted)
     ]
 
@@ -254,23 +350,32 @@ def _run_descents(
 def _with_prior(
     context: Context, sets: Iterable[Sequence[str]], faults: Sequence[str] | None
 ) -> tuple[list[int], list[int]]:
-    """The columns of the faults of the measurement that are free, and all that have a prior beside these sets."""
+    """The columns of the faults of the measurement that are free, and all that have a prior beside
+    these sets.
+    """
     at = context.coordinates
     measured = at.parameters(at.catalogue.of_measurement if faults is None else tuple(faults))
     return measured, [*measured, *at.shapes(sorted({name for names in sets for name in names}))]
 
 
 def off_bounds(context: Context, unit: np.ndarray, to: float | None = None) -> list[np.ndarray]:
-    """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`: there it has no
-    slope. None where nothing rests."""
+    """Coordinates (D,) with what rests on a bound of the base model back at its default or at `to`:
+    there it has no slope. None where nothing rests.
+    """
     moved, base = unit.copy(), context.coordinates.base
-    resting = base[(unit[base] <= fit_effort.BOUND_MARGIN) | (unit[base] >= 1 - fit_effort.BOUND_MARGIN)]
+    resting = base[
+        (unit[base] <= fit_effort.BOUND_MARGIN) | (unit[base] >= 1 - fit_effort.BOUND_MARGIN)
+    ]
     moved[resting] = context.coordinates.null[resting] if to is None else to
     return [moved] if len(resting) else []
 
 
-def fit_initial_power(context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]) -> np.ndarray:
-    """Coordinates (D,) with P0 and Q0 of each event fitted where they are free, and nothing else."""
+def fit_initial_power(
+    context: Context, unit: np.ndarray, noise: Noise, names: Sequence[str]
+) -> np.ndarray:
+    """Coordinates (D,) with P0 and Q0 of each event fitted where they are free, and
+    nothing else.
+    """
     before = context.coordinates.before
     if not len(before):
         return unit

@@ -1,7 +1,8 @@
-"""The numbers that a fit may move: parameters, power before each event, sizes of effects, faults of the measurement.
+"""The numbers that a fit may move: parameters, power before each event, sizes of effects, faults of
+the measurement.
 
-Base and extended models are points of the same coordinates with the other candidates at their nulls, nested by
-construction. An identification has those of its model alone.
+Base and extended models are points of the same coordinates with the other candidates at their
+nulls, nested by construction. An identification has those of its model alone.
 """
 
 import functools
@@ -20,23 +21,28 @@ LEAST_POWER = 0.1  # pu: a load that drew less may move as far as one that drew 
 
 @dataclass(frozen=True, eq=False)
 class FreeSet:
-    """Coordinates (D,) of the unit cube: parameters with their bounds, then P0 and Q0 of each event.
+    """Coordinates (D,) of the unit cube: parameters with their bounds, then P0 and Q0 of each
+    event.
 
-    The parameters are the base model's free ones, in columns `base`, those of all candidates, the pushes', and those of
-    the members of families.
+    The parameters are the base model's free ones, in columns `base`, those of all candidates, the
+    pushes', and those of the members of families.
     """
 
     box: Box  # (D,), named
     base: np.ndarray  # columns
-    before: np.ndarray  # (2 E,) columns of P0 and Q0, or none where the powers measured before the events are taken
-    null: np.ndarray  # (D,) every candidate at its null, the base parameters at their defaults, P0 and Q0 as measured
+    # (2 E,) columns of P0 and Q0, or none where the powers measured before the events are taken
+    before: np.ndarray
+    # (D,) every candidate at its null, the base parameters at their defaults, P0 and Q0 as measured
+    null: np.ndarray
     parameter_count: int  # coordinates before the first P0
     catalogue: Catalogue = NOTHING
     prior: float = 1.0  # standard deviation of a fault of the measurement, in its relevant sizes
 
     @classmethod
     def of_problem(cls, problem: Problem, initial_power: bool = True) -> "FreeSet":
-        """Return the free parameters of one problem, with P0 and Q0 of each event where `initial_power` frees them."""
+        """Return the free parameters of one problem, with P0 and Q0 of each event where
+        `initial_power` frees them.
+        """
         base, null = np.arange(problem.space.dimension), problem.space.to_unit(problem.defaults)
         if not initial_power:
             return cls(problem.space, base, np.array([], dtype=int), null, len(base))
@@ -50,11 +56,17 @@ class FreeSet:
         )
 
     @classmethod
-    def of_effects(cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float) -> "FreeSet":
-        """Return those of the problem of everything, `whole`, in which the problem of the base model is `bare`."""
+    def of_effects(
+        cls, bare: Problem, whole: Problem, catalogue: Catalogue, prior: float
+    ) -> "FreeSet":
+        """Return those of the problem of everything, `whole`, in which the problem of the base
+        model is `bare`.
+        """
         members = tuple(p for member in catalogue.members for p in member.effect.parameters)
         parameters, power = join_boxes(whole.space, Box.of(members)), power_before(whole)
-        nulls = {p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)}
+        nulls = {
+            p.name: p.default if p.null is None else p.null for p in (*whole.parameters, *members)
+        }
         null = parameters.to_unit(np.array([nulls[name] for name in parameters.names]))
         return cls(
             box=join_boxes(parameters, power),
@@ -100,13 +112,18 @@ class FreeSet:
         return [self.column[p.name] for p in self.catalogue.parameters(effects)]
 
     def nuisances(self, effects: Sequence[str]) -> list[int]:
-        """Columns of what is free in a fit with these effects, then of the sizes of the faults of the measurement."""
+        """Columns of what is free in a fit with these effects, then of the sizes of the faults of
+        the measurement.
+        """
         free = [*self.base, *self.before, *self.parameters(effects)]
         return free + self.sizes(self.catalogue.of_measurement)
 
     def present(self, unit: np.ndarray) -> tuple[str, ...]:
         """The effects of the load that are not at their null at coordinates (D,)."""
-        off, of_load = unit != self.null, (*self.catalogue.of_load, *(m.name for m in self.catalogue.members))
+        off, of_load = (
+            unit != self.null,
+            (*self.catalogue.of_load, *(m.name for m in self.catalogue.members)),
+        )
         return tuple(name for name in of_load if off[self.sizes([name])].any())
 
     def settings(self, effects: Sequence[str]) -> list[int]:
@@ -116,13 +133,17 @@ class FreeSet:
 
     @functools.cached_property
     def prior_deviation(self) -> dict[int, float]:
-        """Prior standard deviation of each size of a fault of the measurement and of each shape, in the unit cube."""
+        """Prior standard deviation of each size of a fault of the measurement and of each shape, in
+        the unit cube.
+        """
         faults = {
             self.column[p.name]: self.prior * self.catalogue[name].relevant(p) / self.width(p.name)
             for name in self.catalogue.of_measurement
             for p in self.catalogue[name].sizes
         }
-        likely = [pair for member in self.catalogue.members for pair in member.effect.likely.items()]
+        likely = [
+            pair for member in self.catalogue.members for pair in member.effect.likely.items()
+        ]
         return faults | {self.column[name]: spread / self.width(name) for name, spread in likely}
 
     def shapes(self, effects: Sequence[str]) -> list[int]:
@@ -143,10 +164,14 @@ class FreeSet:
         return moved
 
     def at_measured_power(self, unit: np.ndarray) -> np.ndarray:
-        """Coordinates (..., D) from those of these or other events, with P0 and Q0 of each of these as measured."""
+        """Coordinates (..., D) from those of these or other events, with P0 and Q0 of each of these
+        as measured.
+        """
         measured = self.null[self.parameter_count :]
         parameters = unit[..., : self.parameter_count]
-        return np.concatenate([parameters, np.broadcast_to(measured, (*unit.shape[:-1], len(measured)))], axis=-1)
+        return np.concatenate(
+            [parameters, np.broadcast_to(measured, (*unit.shape[:-1], len(measured)))], axis=-1
+        )
 
     def widened(self, unit: np.ndarray) -> np.ndarray:
         """Coordinates (D,) from those of the first of these events, the others as before any fit.
@@ -156,8 +181,12 @@ class FreeSet:
         return np.r_[unit, self.null[len(unit) :]]
 
     def without_faults(self, unit: np.ndarray, free: Sequence[str]) -> np.ndarray:
-        """Coordinates (D,) with the faults of the measurement that are not `free` back at their nulls."""
-        return self.without(unit, [name for name in self.catalogue.of_measurement if name not in free])
+        """Coordinates (D,) with the faults of the measurement that are not `free` back at their
+        nulls.
+        """
+        return self.without(
+            unit, [name for name in self.catalogue.of_measurement if name not in free]
+        )
 
 
 def power_before(problem: Problem) -> Box:
@@ -171,4 +200,6 @@ def power_before(problem: Problem) -> Box:
 
 def join_boxes(one: Box, other: Box) -> Box:
     """Return the box of the coordinates of both, those of the first before those of the other."""
-    return Box(np.r_[one.lower, other.lower], np.r_[one.upper, other.upper], one.names + other.names)
+    return Box(
+        np.r_[one.lower, other.lower], np.r_[one.upper, other.upper], one.names + other.names
+    )

@@ -1,9 +1,10 @@
-"""Goodness of fit: statistics of the whitened, projected residual, and how often chance leaves as much.
+"""Goodness of fit: statistics of the whitened, projected residual, and how often chance leaves as
+much.
 
-Each looks for another kind of thing that a model does not account for. Sums of many parts (b,) have a gamma
-tail, the largest of many (b, k) that of a Gumbel distribution, both with the moments of draws under the null, so that
-the tails reach further than their number. Where noise has heavy tails, so has the largest: that of a generalised
-extreme value distribution.
+Each looks for another kind of thing that a model does not account for. Sums of many parts (b,) have
+a gamma tail, the largest of many (b, k) that of a Gumbel distribution, both with the moments of
+draws under the null, so that the tails reach further than their number. Where noise has heavy
+tails, so has the largest: that of a generalised extreme value distribution.
 """
 
 import itertools
@@ -16,13 +17,15 @@ import numpy as np
 from tractexp.inference.problem import Problem
 
 SMALLEST_P = 1e-300
-HEAVIER = 2.33  # standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
+# standard errors of its shape: once in 100 a Gumbel distribution passes for a heavier one
+HEAVIER = 2.33
 LOUDEST, PER_EVENT = "the loudest window", "parameters of each event"
 LEAST_DISTINCT_SHARE = 1e-3  # of the largest: weaker directions are rounding
 STRIDE = 4  # samples between the instants at which a step is looked for
 SPECTRUM_BINS = 1024  # of the transform in which an oscillation is looked for
 PULSES = (0.01, 0.03, 0.1)  # s, lengths of the pulses that are looked for after the dips
-BURSTS = (0.1, 0.3)  # s, lengths of the stretches after the dips in which an oscillation may come and go
+# s, lengths of the stretches after the dips in which an oscillation may come and go
+BURSTS = (0.1, 0.3)
 FEWEST_OSCILLATION_SAMPLES = 8  # samples of a stretch with an oscillation
 WINDOWS = (0.0, 0.05, 0.1, 0.2, 0.4, 0.8, 1.6)  # s after the end of the dip
 
@@ -45,15 +48,21 @@ class GoodnessOfFit:
 
 
 def compare_with_draws(
-    values: Mapping[str, np.ndarray], draws: Mapping[str, np.ndarray], scales: Mapping[str, "Scale"] | None = None
+    values: Mapping[str, np.ndarray],
+    draws: Mapping[str, np.ndarray],
+    scales: Mapping[str, "Scale"] | None = None,
 ) -> dict[str, float]:
-    """Return how often each statistic, (1,) or (1, k), is as large among its draws, (b,) or (b, k)."""
+    """Return how often each statistic, (1,) or (1, k), is as large among its draws,
+    (b,) or (b, k).
+    """
     scales = scales or {}
     return {name: tail(draws[name], value, scales.get(name)) for name, value in values.items()}
 
 
 def windows(problem: Problem, event: int) -> list[tuple[float, float]]:
-    """The windows [s since the first sample] of one event: before, both halves of the dip, then ever longer ones."""
+    """The windows [s since the first sample] of one event: before, both halves of the dip, then
+    ever longer ones.
+    """
     e = problem.events[event]
     start, end = e.t_start - e.record.t[0], e.t_end - e.record.t[0]
     last = e.record.t[-1] - e.record.t[0]
@@ -84,34 +93,47 @@ class ResidualWindow:
 
 
 def statistics(channels: np.ndarray, problem: Problem) -> dict[str, np.ndarray]:
-    """Statistics of whitened, projected residuals (b, 2, N) by what each looks for, of which the largest counts."""
+    """Statistics of whitened, projected residuals (b, 2, N) by what each looks for, of which the
+    largest counts.
+    """
     after = align_residuals(channels, problem)
     return {
         LOUDEST: energies(channels, problem),
-        "a step or a pulse": np.concatenate([steps(channels, problem), pulses(after, problem)], axis=1),
-        "an oscillation": np.concatenate([tones(channels, problem), bursts(after, problem)], axis=1),
+        "a step or a pulse": np.concatenate(
+            [steps(channels, problem), pulses(after, problem)], axis=1
+        ),
+        "an oscillation": np.concatenate(
+            [tones(channels, problem), bursts(after, problem)], axis=1
+        ),
     }
 
 
 def tail(draws: np.ndarray, value: np.ndarray, scale: Scale | None = None) -> float:
-    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or (b, k).
+    """How often a statistic is at least as large as `value`, (1,) or (1, k), given draws (b,) or
+    (b, k).
 
-    Of many columns the largest counts, each in its own `scale`: any is right, by default the draws' own is taken.
+    Of many columns the largest counts, each in its own `scale`: any is right, by default the draws'
+    own is taken.
     """
     from scipy.special import gammaincc
 
     if draws.ndim == 1:
         mean, variance = draws.mean(), max(draws.var(), 1e-300)
-        return max(float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P)
+        return max(
+            float(gammaincc(mean**2 / variance, max(value[0], 0.0) * mean / variance)), SMALLEST_P
+        )
     scale, largest = extremes(draws) if scale is None else (scale, scale.largest(draws))
-    return max(_compute_exceedance(largest, float(scale.largest(np.atleast_2d(value))[0])), SMALLEST_P)
+    return max(
+        _compute_exceedance(largest, float(scale.largest(np.atleast_2d(value))[0])), SMALLEST_P
+    )
 
 
 def _compute_exceedance(largest: np.ndarray, value: float) -> float:
     """How often the largest of many exceeds a value, given draws (b,) of it.
 
-    By the moments of a Gumbel distribution; by the L-moments of a generalised extreme value distribution where those
-    say that the tail is heavier. Source: Hosking, Wallis and Wood 1985, their estimates and their test.
+    By the moments of a Gumbel distribution; by the L-moments of a generalised extreme value
+    distribution where those say that the tail is heavier. Source: Hosking, Wallis and Wood 1985,
+    their estimates and their test.
     """
     from scipy.special import gamma
 
@@ -133,7 +155,8 @@ def _compute_exceedance(largest: np.ndarray, value: float) -> float:
 def extremes(draws: np.ndarray) -> tuple[Scale, np.ndarray]:
     """The scale of draws (b, k), and the largest of each in it, (b,).
 
-    Each draw is judged by the others: among many columns its own part in their mean and spread would tell.
+    Each draw is judged by the others: among many columns its own part in their mean and spread
+    would tell.
     """
     b, whole, squares = len(draws), draws.sum(axis=0), (draws**2).sum(axis=0)
     mean = (whole - draws) / (b - 1)
@@ -153,27 +176,39 @@ def residual_windows(problem: Problem) -> list[ResidualWindow]:
                 continue
             part = slice(first + i, first + j)
             cells += [
-                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step) for c in problem.drive.spoken
+                ResidualWindow(e, c, part, origin + i * step, origin + (j - 1) * step)
+                for c in problem.drive.spoken
             ]
     return cells
 
 
 def energies(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a sample in quiet."""
+    """Energy of each residual (b, 2, N) in each cell, (b, cells), over that of a
+    sample in quiet.
+    """
     square = channels**2
-    quiet = np.mean(np.concatenate([square[:, :, part] for part in problem.quiet], axis=2), axis=2, keepdims=True)
+    quiet = np.mean(
+        np.concatenate([square[:, :, part] for part in problem.quiet], axis=2),
+        axis=2,
+        keepdims=True,
+    )
     square /= np.where(quiet > 0, quiet, 1.0)  # a current that is not compared is zero throughout
     row = problem.drive.spoken.index
-    return np.stack([square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1)
+    return np.stack(
+        [square[:, row(c.channel), c.part].sum(axis=1) for c in residual_windows(problem)], axis=1
+    )
 
 
 def align_residuals(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit variance.
+    """What follows the dips, summed over the events at the same time after each, (b, 2, n) of unit
+    variance.
 
     Timers and controls answer every dip alike, however little each event shows of it.
     """
     drive = problem.drive
-    after = [channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(problem.events)]
+    after = [
+        channels[:, :, drive.part(e)][:, :, event.end :] for e, event in enumerate(problem.events)
+    ]
     common = min(p.shape[2] for p in after)
     return sum(p[:, :, :common] for p in after) / np.sqrt(len(after))
 
@@ -188,22 +223,32 @@ def steps(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def pulses(after: np.ndarray, problem: Problem) -> np.ndarray:
-    """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b, stretches)."""
+    """Square of the sum over each short stretch of aligned residuals (b, 2, n), in P and in Q, (b,
+    stretches).
+    """
     sums = np.cumsum(np.pad(after, ((0, 0), (0, 0), (1, 0))), axis=2)
     columns = [np.empty((len(after), 0))]
     for length in PULSES:
         n = max(round(length / problem.events[0].record.step), 1)
         if n < sums.shape[2]:
-            columns.append(((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(len(after), -1))
+            columns.append(
+                ((sums[:, :, n:] - sums[:, :, :-n])[:, :, :: -(-n // 4)] ** 2 / n).reshape(
+                    len(after), -1
+                )
+            )
     return np.concatenate(columns, axis=1)
 
 
 def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
-    """Power at each frequency of all events and channels, in the dip, after it and in both, (b, frequencies)."""
+    """Power at each frequency of all events and channels, in the dip, after it and in both, (b,
+    frequencies).
+    """
     power = np.zeros((len(channels), 3, SPECTRUM_BINS // 2 + 1))
     for e, event in enumerate(problem.events):
         own = channels[:, :, problem.drive.part(e)]
-        for k, part in enumerate((slice(event.start, event.end), slice(event.end, None), slice(event.start, None))):
+        for k, part in enumerate(
+            (slice(event.start, event.end), slice(event.end, None), slice(event.start, None))
+        ):
             stretch = own[:, :, part]
             if stretch.shape[2] >= FEWEST_OSCILLATION_SAMPLES:
                 power[:, k] += np.sum(_power(stretch), axis=1) / stretch.shape[2]
@@ -211,7 +256,9 @@ def tones(channels: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
-    """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b, cells)."""
+    """Power of aligned residuals (b, 2, n) by frequency in stretches that overlap by half, (b,
+    cells).
+    """
     columns = [np.empty((len(after), 0))]
     for length in BURSTS:
         n = round(length / problem.events[0].record.step)
@@ -223,6 +270,8 @@ def bursts(after: np.ndarray, problem: Problem) -> np.ndarray:
 
 
 def _power(stretch: np.ndarray) -> np.ndarray:
-    """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's length."""
+    """Power (..., frequencies) of stretches (..., n), of long ones folded onto one transform's
+    length.
+    """
     padded = -(-stretch.shape[-1] // SPECTRUM_BINS) * SPECTRUM_BINS
     return np.abs(np.fft.rfft(stretch, padded, axis=-1)[..., :: padded // SPECTRUM_BINS]) ** 2

@@ -1,4 +1,6 @@
-"""What the records say about each parameter: the information matrix, its directions, and the intervals it gives."""
+"""What the records say about each parameter: the information matrix, its directions, and the
+intervals it gives.
+"""
 
 import functools
 from collections.abc import Sequence
@@ -6,17 +8,20 @@ from dataclasses import dataclass
 
 import numpy as np
 
-STRUCTURAL = 1e-6  # of the largest singular value: below it a direction changes nothing, whatever the noise
-BLIND = 1e-6  # standard deviations per range: what is not known even to a million ranges changes nothing
+# of the largest singular value: below it a direction changes nothing, whatever the noise
+STRUCTURAL = 1e-6
+# standard deviations per range: what is not known even to a million ranges changes nothing
+BLIND = 1e-6
 SHARE = 0.02  # of a direction's largest component: smaller ones do not take part in it
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """The whitened sensitivities `J` (R, d) to the free parameters, in ranges, nuisances projected out.
+    """The whitened sensitivities `J` (R, d) to the free parameters, in ranges, nuisances projected
+    out.
 
-    `values` and `width` (d,) turn ranges into physical and relative changes. Directions whose singular value is below
-    `structural` times the largest change nothing.
+    `values` and `width` (d,) turn ranges into physical and relative changes. Directions whose
+    singular value is below `structural` times the largest change nothing.
     """
 
     names: tuple[str, ...]
@@ -24,40 +29,58 @@ class Information:
     width: np.ndarray
     J: np.ndarray
     structural: float = STRUCTURAL
-    held: tuple[str, ...] = ()  # those that cannot move to either side: a requirement of the model holds them
+    # those that cannot move to either side: a requirement of the model holds them
+    held: tuple[str, ...] = ()
 
     @classmethod
     def of(
-        cls, names: Sequence[str], values: np.ndarray, width: np.ndarray, jacobian: np.ndarray, nuisances: np.ndarray
+        cls,
+        names: Sequence[str],
+        values: np.ndarray,
+        width: np.ndarray,
+        jacobian: np.ndarray,
+        nuisances: np.ndarray,
     ) -> "Information":
-        """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside them."""
+        """`jacobian` (R, d) per range of each parameter; `nuisances` (R, k) are left free beside
+        them.
+        """
         active = nuisances[:, np.any(nuisances != 0, axis=0)]
         basis, _ = np.linalg.qr(active)
         return cls(tuple(names), values, width, jacobian - basis @ (basis.T @ jacobian))
 
     @functools.cached_property
     def _directions(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows, in ranges: those that the records see over their singular values, those they do not; who is blind."""
+        """Rows, in ranges: those that the records see over their singular values, those they do
+        not; who is blind.
+        """
         size = np.linalg.norm(self.J, axis=0)
         scale = np.where(size > 0, size, 1.0)
         _, singular, directions = np.linalg.svd(self.J / scale, full_matrices=False)
-        seen, directions = singular > self.structural * singular.max(initial=0.0), directions / scale
+        seen, directions = (
+            singular > self.structural * singular.max(initial=0.0),
+            directions / scale,
+        )
         return directions[seen] / singular[seen, None], directions[~seen], size == 0
 
     @property
     def blind(self) -> tuple[str, ...]:
         """Parameters that change nothing by themselves."""
-        return tuple(name for name, blind in zip(self.names, self._directions[2], strict=True) if blind)
+        return tuple(
+            name for name, blind in zip(self.names, self._directions[2], strict=True) if blind
+        )
 
     @property
     def covariance(self) -> np.ndarray:
-        """(d, d) physical, of the directions that the records see. See `unseen` for those they do not."""
+        """(d, d) physical, of the directions that the records see. See `unseen` for those they do
+        not.
+        """
         scaled = self._directions[0] * self.width
         return scaled.T @ scaled
 
     @property
     def unseen(self) -> np.ndarray:
-        """Directions (k, d) that change nothing, as relative changes (d value / value), made sparse.
+        """Directions (k, d) that change nothing, as relative changes (d value / value), made
+        sparse.
 
         Each is scaled to a largest component of 1. Where a value is 0 the change is in ranges.
         """
@@ -92,9 +115,11 @@ class Information:
 
 
 def free_standard_errors(root: np.ndarray) -> np.ndarray:
-    """Return the standard error (d,) of each coordinate, all others free: in ranges, inf of one that changes nothing.
+    """Return the standard error (d,) of each coordinate, all others free: in ranges, inf of one
+    that changes nothing.
 
-    `root` (R, d) are rows whose inverse products are the covariance: whitened sensitivities, or what stands for them.
+    `root` (R, d) are rows whose inverse products are the covariance: whitened sensitivities, or
+    what stands for them.
     """
     seen = np.where(np.linalg.norm(root, axis=0) > BLIND, root, 0.0)
     ranges = np.ones(root.shape[1])
@@ -103,7 +128,9 @@ def free_standard_errors(root: np.ndarray) -> np.ndarray:
 
 
 def _echelon(rows: np.ndarray) -> np.ndarray:
-    """Reduced row echelon form by full pivoting: the same row space with as many zeros as it allows."""
+    """Reduced row echelon form by full pivoting: the same row space with as many zeros as it
+    allows.
+    """
     rows, done = rows.copy(), 0
     used: list[int] = []
     while done < len(rows):

@@ -1,7 +1,8 @@
 """What an unknown effect could look like: a push into one equation during one window of time.
 
-Not an effect of the catalogue but the yardstick of adequacy: if pushes of no catalogued origin still help after an
-effect was added, the effect is not the explanation. Source: score test of a variance component (Lin 1997).
+Not an effect of the catalogue but the yardstick of adequacy: if pushes of no catalogued origin
+still help after an effect was added, the effect is not the explanation. Source: score test of a
+variance component (Lin 1997).
 """
 
 from typing import TYPE_CHECKING
@@ -21,10 +22,11 @@ EDGE_SECONDS = 0.002  # s: how sharp a window starts and ends
 
 
 class Injection(Effect):
-    """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first sample].
+    """Adds push_k to the k-th balance between `window_on` and `window_off` [s since the first
+    sample].
 
-    Of waveforms what is pushed in place of P and Q is the current's component along the voltage before the event, and
-    that which lags it by a quarter of a cycle: at that voltage, the same.
+    Of waveforms what is pushed in place of P and Q is the current's component along the voltage
+    before the event, and that which lags it by a quarter of a cycle: at that voltage, the same.
     """
 
     name = PUSHES
@@ -35,7 +37,9 @@ class Injection(Effect):
     order = 2
     parameters = (
         *(
-            Parameter(0.0, (-1.0, 1.0), "pu", f"push into {what}", SOURCE, null=0.0, name=f"push_{what}")
+            Parameter(
+                0.0, (-1.0, 1.0), "pu", f"push into {what}", SOURCE, null=0.0, name=f"push_{what}"
+            )
             for what in ("flux_d", "flux_q", "speed", "P", "Q")
         ),
         Parameter(0.0, (-1e3, 1e3), "s", "start of the window", SOURCE, name="window_on"),
@@ -50,7 +54,8 @@ class Injection(Effect):
         ramp = lambda at: sympy.Max(0, sympy.Min(1, (eq.t - at) / EDGE_SECONDS))  # noqa: E731
         gate = ramp(window_on) - ramp(window_off)
         pushes = {"flux": push_flux_d + I * push_flux_q, "speed": push_speed}
-        for state in eq.states.values():  # of the motor itself: a twin that an effect adds follows it
+        # of the motor itself: a twin that an effect adds follows it
+        for state in eq.states.values():
             if state.writer == OWN and state.role in pushes:
                 state.derivative += gate * pushes[state.role]
         if eq.waves:
@@ -64,7 +69,9 @@ PUSH = 1e-3  # how hard
 
 
 def perturbations(context: "Context", unit: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (c, D) with a push into one balance in one window of the union of the events', and which balance."""
+    """Points (c, D) with a push into one balance in one window of the union of the events', and
+    which balance.
+    """
     at = context.coordinates
     spans = sorted({w for e in range(len(context.events)) for w in windows(context.problem, e)})
     points, groups = [], []

@@ -15,8 +15,8 @@ INTERVAL_LEVEL = 0.95
 def interval_factor(freedom: float = np.inf) -> float:
     """Return half of a 95 % interval over the standard error: Student's t at 97.5 %.
 
-    `freedom` counts what the error stands on: samples less what was fitted, or blocks less one. By default the error is
-    known, as that of a forecast.
+    `freedom` counts what the error stands on: samples less what was fitted, or blocks less one. By
+    default the error is known, as that of a forecast.
     """
     from scipy.special import stdtrit
 
@@ -27,7 +27,8 @@ def interval_factor(freedom: float = np.inf) -> float:
 class ParameterEstimate:
     """One parameter at a fit.
 
-    `error` is its standard error: nan where it rests on a bound or is not computed. `freedom` is that of the error.
+    `error` is its standard error: nan where it rests on a bound or is not computed. `freedom` is
+    that of the error.
     """
 
     parameter: Parameter
@@ -53,4 +54,6 @@ class ParameterEstimate:
 
     def plain(self) -> dict[str, Any]:
         """As `discrepancy.json` has it."""
-        return files.plain({"value": self.value, "standard_error": self.error, "interval": self.interval})
+        return files.plain(
+            {"value": self.value, "standard_error": self.error, "interval": self.interval}
+        )

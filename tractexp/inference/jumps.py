@@ -1,9 +1,10 @@
 """What a recorder's filter makes of a jump that an effect puts into the currents, of waveforms.
 
-Voltage and currents pass the same anti-alias filter, which a linear load does not notice: what it makes of the filtered
-voltage is the filtered current. A contactor that opens is not linear. Its jump is recorded over two or three samples,
-with an overshoot of a few per cent, by a filter that nobody told us, while it is calculated between two samples. So the
-samples at a jump tell of its size and time, but nothing by how steep it is.
+Voltage and currents pass the same anti-alias filter, which a linear load does not notice: what it
+makes of the filtered voltage is the filtered current. A contactor that opens is not linear. Its
+jump is recorded over two or three samples, with an overshoot of a few per cent, by a filter that
+nobody told us, while it is calculated between two samples. So the samples at a jump tell of its
+size and time, but nothing by how steep it is.
 """
 
 import functools
@@ -15,19 +16,23 @@ from tractexp.inference.context import Context
 
 MOST_JUMPS = 4  # samples of one channel and event that are the least smooth
 AROUND = 3  # samples on either side that a filter may spread a jump over
-SPREAD = 1.0  # of how far a sample lies off its neighbors: what may be wrong with it and with those around it
-LEAST_JUMP = 0.02  # of the most that the effects change: from there a sample off its neighbors is a jump
+# of how far a sample lies off its neighbors: what may be wrong with it and with those around it
+SPREAD = 1.0
+# of the most that the effects change: from there a sample off its neighbors is a jump
+LEAST_JUMP = 0.02
 
 
 def jumps(context: Context, unit: np.ndarray) -> np.ndarray | None:
-    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation: (k, C, N) [pu].
+    """What may be wrong at the jumps that effects make at coordinates (D,), one standard deviation:
+    (k, C, N) [pu].
 
     None where samples are averages over a window, in which no jump stays.
     """
     return None if context.domain.windowed else _jumps(context, unit.tobytes())
 
 
-@functools.lru_cache(maxsize=2)  # of the two fits that are examined side by side; it holds their context
+# of the two fits that are examined side by side; it holds their context
+@functools.lru_cache(maxsize=2)
 def _jumps(context: Context, key: bytes) -> np.ndarray:
     at, unit = context.coordinates, np.frombuffer(key)
     there = at.present(unit)
@@ -48,7 +53,9 @@ def _jumps(context: Context, key: bytes) -> np.ndarray:
 
 
 def _at_jumps(added: np.ndarray) -> list[tuple[int, float]]:
-    """The samples around the jumps of one channel (N,), each with what may be wrong with it [pu]."""
+    """The samples around the jumps of one channel (N,), each with what may be wrong
+    with it [pu].
+    """
     off, least = np.abs(off_neighbors(added)), LEAST_JUMP * np.abs(added).max(initial=0.0)
     doubt: dict[int, float] = {}
     for k in np.argsort(-off)[:MOST_JUMPS].tolist():

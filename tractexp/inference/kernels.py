@@ -1,8 +1,9 @@
 """Which kernel simulates which set of effects.
 
-A set is fitted by a kernel of its own, no larger than it needs. What it leaves is tested by kernels that have further
-effects beside it: one for all that are cheap, the same for all sets of them, one for the pushes, and one for each
-effect that makes every other dear. All give the same response up to rounding.
+A set is fitted by a kernel of its own, no larger than it needs. What it leaves is tested by kernels
+that have further effects beside it: one for all that are cheap, the same for all sets of them, one
+for the pushes, and one for each effect that makes every other dear. All give the same response up
+to rounding.
 """
 
 import functools
@@ -23,8 +24,8 @@ from tractexp.model.model import Model, compose
 from tractexp.model.parts import Effect
 from tractexp.record import Event
 
-# Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and often no machine;
-# and none longer than effects answer in [s].
+# Runge-Kutta steps of a search: as many as this share of the box needs, for the rest is stiff, and
+# often no machine; and none longer than effects answer in [s].
 STEP_SHARE, LONGEST_STEP = 0.95, 1e-3
 Key = tuple[frozenset[str], frozenset[str]]  # load effects, and what is tested beside them
 
@@ -37,10 +38,19 @@ class Family:
     catalogue: Catalogue
 
     def with_effects(self, names: Iterable[str]) -> Model:
-        """The model with these load effects, every fault of the measurement and, where they are named, the pushes."""
+        """The model with these load effects, every fault of the measurement and, where they are
+        named, the pushes.
+        """
         effects = [self._effect(name) for name in {*names, *self.catalogue.of_measurement}]
         base = self.model
-        model = compose(base.motor, base.static, [*base.effects, *effects], base.integration, base.domain, base.window)
+        model = compose(
+            base.motor,
+            base.static,
+            [*base.effects, *effects],
+            base.integration,
+            base.domain,
+            base.window,
+        )
         return model.behind(base.recorder)
 
     def _effect(self, name: str) -> Effect:
@@ -54,10 +64,14 @@ class Family:
     @functools.cached_property
     def cheap(self) -> frozenset[str]:
         """The textbook effects of the load that one kernel may have side by side."""
-        return frozenset(name for name in self.catalogue.of_load if not self.catalogue[name].effect.iterates)
+        return frozenset(
+            name for name in self.catalogue.of_load if not self.catalogue[name].effect.iterates
+        )
 
     def key(self, names: Iterable[str], beside: str = "") -> Key:
-        """The kernel that fits a set of names, or that tells what one more effect, or the pushes, change beside it."""
+        """The kernel that fits a set of names, or that tells what one more effect, or the pushes,
+        change beside it.
+        """
         load = frozenset(names) - {*self.catalogue.of_measurement}
         tested = frozenset[str]()
         if beside:
@@ -65,7 +79,9 @@ class Family:
         return load - tested, tested
 
     def of(self, key: Key) -> Model:
-        """The model of a kernel. An effect that a member of a family does not take beside it is not tested there."""
+        """The model of a kernel. An effect that a member of a family does not take beside it is not
+        tested there.
+        """
         names, tested = key
         model = self.with_effects(names | tested)
         try:
@@ -99,17 +115,22 @@ class Kernels:
             within = math.ceil(max(event.record.step for event in events) / LONGEST_STEP - 1e-9)
             own = max(int(self.bare.step.substeps.max()), min(within, self.box_substeps))
             self.substeps = max(own, self._fewest())
-        self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)  # of all coordinates
+        # of all coordinates
+        self.whole = Problem(family.whole, events, bounds, fixed, self.substeps)
         members = [p.name for member in family.catalogue.members for p in member.effect.parameters]
         self._column = {name: k for k, name in enumerate((*self.whole.space.names, *members))}
         self._fit_problems: dict[Key, tuple[FitProblem, np.ndarray]] = {}
 
     def too_coarse(self, values: np.ndarray) -> bool:
-        """Whether fits of the base model's free values (n, d) lie where the steps are longer than in the whole box."""
+        """Whether fits of the base model's free values (n, d) lie where the steps are longer than
+        in the whole box.
+        """
         return self.substeps < self.box_substeps and self.substeps < self.bare.steps_at(values)
 
     def _fewest(self) -> int:
-        """Steps that the models need by which effects are tested, every effect at its null: some are stiff."""
+        """Steps that the models need by which effects are tested, every effect at its null: some
+        are stiff.
+        """
         domain, family = domain_of(self.family.model), self.family
         if not domain.stiff:
             return 1
@@ -117,7 +138,9 @@ class Kernels:
         most = 1
         for problem in (self._problem(key, 1) for key in keys):
             null = np.array([p.default if p.null is None else p.null for p in problem.parameters])
-            most = max(most, int(problem.model.substeps(problem.drive, null, domain.finest)[0].max()))
+            most = max(
+                most, int(problem.model.substeps(problem.drive, null, domain.finest)[0].max())
+            )
         return most
 
     def residuals(self, key: Key, unit: np.ndarray) -> np.ndarray:
@@ -131,7 +154,9 @@ class Kernels:
         return fit_problem.problem, fit_problem.values(unit[..., columns])
 
     def simulate(self, names: Iterable[str], unit: np.ndarray, drive: Drive) -> np.ndarray:
-        """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates (n, D)."""
+        """What is compared (n, C, N) [pu] under other voltages, with these effects at coordinates
+        (n, D).
+        """
         problem, free = self.at(names, unit)
         return problem.model.simulate(drive, problem.full(free), self.substeps).by_candidate
 
@@ -139,9 +164,15 @@ class Kernels:
         """The fit problem of one kernel, and where its coordinates stand among all."""
         if key not in self._fit_problems:
             problem = self._problem(key, self.substeps)
-            own, before = [self._column[n] for n in problem.space.names], np.arange(2 * len(self.events))
+            own, before = (
+                [self._column[n] for n in problem.space.names],
+                np.arange(2 * len(self.events)),
+            )
             columns = np.r_[own, len(self._column) + before].astype(int)
-            self._fit_problems[key] = FitProblem(problem=problem, valid=problem.drive.weights > 0), columns
+            self._fit_problems[key] = (
+                FitProblem(problem=problem, valid=problem.drive.weights > 0),
+                columns,
+            )
         return self._fit_problems[key]
 
     def _problem(self, key: Key, substeps: int) -> Problem:

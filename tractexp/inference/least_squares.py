@@ -1,7 +1,9 @@
-"""Damped least squares of many problems at once: every lane takes its step in the same two simulation calls.
+"""Damped least squares of many problems at once: every lane takes its step in the same two
+simulation calls.
 
-Profiles, starts and subsets of events are lanes. A call with the differences of all lanes and a call with several
-dampings of all steps replace hundreds of single simulations, which cost as much to call as to run.
+Profiles, starts and subsets of events are lanes. A call with the differences of all lanes and a
+call with several dampings of all steps replace hundreds of single simulations, which cost as much
+to call as to run.
 """
 
 from dataclasses import dataclass
@@ -19,7 +21,9 @@ MOST_NUMBERS = 8_000_000  # of all differences held at once
 
 @dataclass(frozen=True, eq=False)
 class Descent:
-    """Where each lane ended: `unit` (n, D) in the unit cube, `deviance` (n,) its sum of squares (inf: never begun)."""
+    """Where each lane ended: `unit` (n, D) in the unit cube, `deviance` (n,) its sum of squares
+    (inf: never begun).
+    """
 
     unit: np.ndarray
     deviance: np.ndarray
@@ -32,7 +36,10 @@ class Descent:
 
     def joined(self, more: "Descent") -> "Descent":
         """These ends and further ones."""
-        unit, deviance = np.concatenate([self.unit, more.unit]), np.concatenate([self.deviance, more.deviance])
+        unit, deviance = (
+            np.concatenate([self.unit, more.unit]),
+            np.concatenate([self.deviance, more.deviance]),
+        )
         return Descent(unit, deviance, self.simulations + more.simulations)
 
 
@@ -45,9 +52,11 @@ def normal(
     *,
     central: bool = False,
 ) -> tuple[np.ndarray, NormalMatrix]:
-    """Gradient (n, D) and Gauss-Newton matrix of half the sum of squares; `base` (n, R) are the rows there.
+    """Gradient (n, D) and Gauss-Newton matrix of half the sum of squares; `base` (n, R) are the
+    rows there.
 
-    Lanes are taken in groups, so that their differences stay in memory however long the records are.
+    Lanes are taken in groups, so that their differences stay in memory however long the records
+    are.
     """
     n, parts = len(unit), []
     together = max(1, MOST_NUMBERS // (len(apart.moves(unit.shape[1])) * base.shape[1]))
@@ -62,8 +71,12 @@ def normal(
     return gradient, NormalMatrix(shared, cross, own, apart.shared(unit.shape[1]), apart)
 
 
-def _products(J: np.ndarray, base: np.ndarray, size: int, apart: SeparableColumns) -> tuple[np.ndarray, ...]:
-    """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the differences have them."""
+def _products(
+    J: np.ndarray, base: np.ndarray, size: int, apart: SeparableColumns
+) -> tuple[np.ndarray, ...]:
+    """Gradient (n, D) and the blocks of a `NormalMatrix`, of derivatives (n, k + m, R) as the
+    differences have them.
+    """
     shared, m = apart.shared(size), apart.count
     n, k, events = len(J), len(shared), len(apart.rows)
     gradient, own = np.zeros((n, size)), J[:, :k]
@@ -88,16 +101,19 @@ def descend(
     *,
     central: bool = False,
 ) -> Descent:
-    """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is True do not move.
+    """Levenberg-Marquardt in the unit cube from `start` (n, D); columns where `frozen` (n, D) is
+    True do not move.
 
-    A lane ends when a step lowers its deviance by less than `tolerance` (absolute: rows are whitened, so that
-    1 is one squared standard deviation) or when no damping helps. A coordinate on a wall that would leave the
-    box rests for that step. Source: Marquardt 1963, with several dampings per step.
+    A lane ends when a step lowers its deviance by less than `tolerance` (absolute: rows are
+    whitened, so that 1 is one squared standard deviation) or when no damping helps. A coordinate on
+    a wall that would leave the box rests for that step. Source: Marquardt 1963, with several
+    dampings per step.
 
-    Forward differences are enough for an estimate, whose standard errors are far wider than what they truncate. The
-    minimum itself, to more than four digits, takes `central` ones.
+    Forward differences are enough for an estimate, whose standard errors are far wider than what
+    they truncate. The minimum itself, to more than four digits, takes `central` ones.
 
-    Not `polish.least_squares_from`: that is SciPy's, from one start, counted and stopped by the search loop.
+    Not `polish.least_squares_from`: that is SciPy's, from one start, counted and stopped by the
+    search loop.
     """
     unit = np.clip(start, 0.0, 1.0)
     n = len(unit)
@@ -115,35 +131,55 @@ def descend(
         rest = frozen[lanes] | ((x <= 0) & (gradient > 0)) | ((x >= 1) & (gradient < 0))
         tried = damping[lanes, None] * DAMPINGS
         trials = np.clip(x[:, None, :] + _steps(H, gradient, rest, tried), 0.0, 1.0)
-        spent += (len(lanes) + 2 * x.size if central else x.size) + trials.shape[0] * trials.shape[1]
+        spent += (len(lanes) + 2 * x.size if central else x.size) + trials.shape[0] * trials.shape[
+            1
+        ]
         best, outcome, ends = _best(rows, trials, lanes, base.shape[1])
         pick = np.arange(len(lanes))
         gain = deviance[lanes] - outcome
         better = gain > 0
         won = lanes[better]
-        unit[won], base[won], deviance[won] = trials[pick, best][better], ends[better], outcome[better]
-        damping[lanes] = np.clip(np.where(better, tried[pick, best], tried[:, -1] * 10), LEAST_DAMPING, MOST_DAMPING)
+        unit[won], base[won], deviance[won] = (
+            trials[pick, best][better],
+            ends[better],
+            outcome[better],
+        )
+        damping[lanes] = np.clip(
+            np.where(better, tried[pick, best], tried[:, -1] * 10), LEAST_DAMPING, MOST_DAMPING
+        )
         hopeless = ~better & (damping[lanes] >= MOST_DAMPING)
-        done = (better & (gain < tolerance)) | hopeless | (~better & _flat(H, gradient, rest, tolerance))
+        done = (
+            (better & (gain < tolerance))
+            | hopeless
+            | (~better & _flat(H, gradient, rest, tolerance))
+        )
         active[lanes] = ~done
     return Descent(unit, deviance, spent)
 
 
-def _best(rows: Rows, trials: np.ndarray, lanes: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Which of q trials (n, q, D) of each lane leaves the least, its sum of squares (n,) and its rows (n, `size`)."""
+def _best(
+    rows: Rows, trials: np.ndarray, lanes: np.ndarray, size: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Which of q trials (n, q, D) of each lane leaves the least, its sum of squares (n,) and its
+    rows (n, `size`).
+    """
     n, width, d = trials.shape
     best, outcome, ends = np.empty(n, dtype=int), np.empty(n), np.empty((n, size))
     together = max(1, MOST_NUMBERS // (width * size))
     for first in range(0, n, together):
         part = slice(first, first + together)
-        candidates = rows(trials[part].reshape(-1, d), np.repeat(lanes[part], width)).reshape(-1, width, size)
+        candidates = rows(trials[part].reshape(-1, d), np.repeat(lanes[part], width)).reshape(
+            -1, width, size
+        )
         squares = _squares(candidates)
         best[part], outcome[part] = squares.argmin(axis=1), squares.min(axis=1)
         ends[part] = candidates[np.arange(len(candidates)), best[part]]
     return best, outcome, ends
 
 
-def _steps(H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, damping: np.ndarray) -> np.ndarray:
+def _steps(
+    H: NormalMatrix, gradient: np.ndarray, rest: np.ndarray, damping: np.ndarray
+) -> np.ndarray:
     """Damped Newton steps (n, k, D) for k dampings; resting coordinates stay."""
     free = ~rest
     diagonal = H.diagonal * free

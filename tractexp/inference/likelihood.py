@@ -1,9 +1,10 @@
 """Whitened residuals of a problem: those of Eq. (8), and those of the likelihood of the noise.
 
-Eq. (8) counts every sample alike and holds P0 and Q0 at the means before the dip. Nothing has to be known of the noise
-for that, and a model's own error cannot ruin it. The likelihood whitens by the noise and leaves P0 and Q0 free: where
-nothing but noise is left its least squares are the most precise estimate there is. Coordinates are the free parameters
-followed, in the likelihood, by P0 and Q0 of each event, in the unit cube.
+Eq. (8) counts every sample alike and holds P0 and Q0 at the means before the dip. Nothing has to be
+known of the noise for that, and a model's own error cannot ruin it. The likelihood whitens by the
+noise and leaves P0 and Q0 free: where nothing but noise is left its least squares are the most
+precise estimate there is. Coordinates are the free parameters followed, in the likelihood, by P0
+and Q0 of each event, in the unit cube.
 """
 
 from dataclasses import dataclass, replace
@@ -23,17 +24,22 @@ from tractexp.record import Event
 
 
 def before_the_event(event: Event) -> Pair:
-    """Level and color of each channel's noise before the dip: what is known of it before anything is fitted."""
+    """Level and color of each channel's noise before the dip: what is known of it before anything
+    is fitted.
+    """
     pair = []
     for quiet, level in zip(event.calm, event.levels, strict=True):
-        color = fit_autoregression(stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order)
+        color = fit_autoregression(
+            stretches(quiet, np.isfinite(quiet)), domain_of(event).quiet_order
+        )
         pair.append(color.scaled(max(level, SMALLEST_DEVIATION) / color.deviation[0]))
     return tuple(pair)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Likelihood(FitProblem):
-    """A fit problem under a noise. `prior` is the weight of rows that hold the motor to what machines usually are.
+    """A fit problem under a noise. `prior` is the weight of rows that hold the motor to what
+    machines usually are.
 
     These rows come last; 0 is without.
     """
@@ -43,16 +49,22 @@ class Likelihood(FitProblem):
 
     @classmethod
     def of(cls, problem: Problem, noise: Noise | None = None) -> "Likelihood":
-        """The likelihood under `noise`, by default that of the samples before each dip; gaps do not count."""
+        """The likelihood under `noise`, by default that of the samples before each dip; gaps do not
+        count.
+        """
         noise = noise or Noise(tuple(before_the_event(e) for e in problem.events))
         return cls(problem=problem, valid=problem.drive.weights > 0, noise=noise)
 
     @classmethod
     def of_squares(cls, problem: Problem, deviation: float) -> "Likelihood":
-        """Eq. (8), with the weights of the problem's objective, over `deviation`² [pu²]: all samples count alike."""
+        """Eq. (8), with the weights of the problem's objective, over `deviation`² [pu²]: all
+        samples count alike.
+        """
         weights = problem.drive.weights.max(axis=1)
         white = Noise.white(*(deviation / np.sqrt(np.where(weights > 0, weights, 1.0))).tolist())
-        return cls(problem=problem, valid=problem.drive.weights > 0, noise=white, initial_power=False)
+        return cls(
+            problem=problem, valid=problem.drive.weights > 0, noise=white, initial_power=False
+        )
 
     @property
     def with_initial_power(self) -> "Likelihood":
@@ -69,16 +81,22 @@ class Likelihood(FitProblem):
         return replace(self, prior=0.0)
 
     def whiten(self, residuals: np.ndarray) -> np.ndarray:
-        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not count are 0."""
+        """Residuals (n, 2, N) as rows (n, 2 N) of independent unit variance; samples that do not
+        count are 0.
+        """
         return self.noise.whiten(residuals, self.problem.drive, self.valid)
 
     def rows(self, unit: np.ndarray, lanes: np.ndarray | None = None) -> np.ndarray:
-        """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the lane."""
+        """Whitened residuals (n, 2 N); their sum of squares is the deviance. Does not depend on the
+        lane.
+        """
         rows = self.whiten(self.residuals(unit))
         return np.concatenate([rows, self.prior_rows(unit)], axis=1) if self.prior else rows
 
     def prior_rows(self, unit: np.ndarray) -> np.ndarray:
-        """How far coordinates (n, D) are from what machines usually are, (n, k); none where nothing holds them."""
+        """How far coordinates (n, D) are from what machines usually are, (n, k); none where nothing
+        holds them.
+        """
         if not self.prior:
             return np.empty((len(unit), 0))
         return self.prior * departures(self.problem, self.values(unit))
@@ -89,7 +107,11 @@ class Likelihood(FitProblem):
         return rows[0], Sensitivities(J[0], self.free, self.apart.rows)
 
     def descent(
-        self, start: np.ndarray, frozen: np.ndarray | None = None, iterations: int = 40, tolerance: float = 1e-4
+        self,
+        start: np.ndarray,
+        frozen: np.ndarray | None = None,
+        iterations: int = 40,
+        tolerance: float = 1e-4,
     ) -> Descent:
         """The ends of descents of the deviance from coordinates (n, D); see `descend`."""
         return descend(self.rows, start, frozen, iterations, tolerance, self.apart)

@@ -1,4 +1,6 @@
-"""The linearised problem around a fit: what each parameter, candidate and push would change, in one batch."""
+"""The linearised problem around a fit: what each parameter, candidate and push would change, in one
+batch.
+"""
 
 import functools
 from collections.abc import Sequence
@@ -17,22 +19,28 @@ from tractexp.noise.span import compute_basis
 
 CANDIDATE_STEP = 0.5  # smallest relevant sizes: the step of a candidate's difference quotient
 LARGEST_MOVE_AT_BOUND = 1e-6  # of it: how far a parameter that rests on a wall may move
-LEAST_VARIANCE = 0.2  # of a residual's variance: where columns explain more, it tells nothing of the noise
+# of a residual's variance: where columns explain more, it tells nothing of the noise
+LEAST_VARIANCE = 0.2
 
 
 @dataclass(frozen=True, eq=False)
 class Linearization:
-    """Raw residuals and differences at a fit; `whitened` turns them into a `ScoreTest` under a noise model."""
+    """Raw residuals and differences at a fit; `whitened` turns them into a `ScoreTest` under a
+    noise model.
+    """
 
     context: Context
     unit: np.ndarray  # (D,) coordinates of the fit
     residual: np.ndarray  # (C, N)
     nuisance: np.ndarray  # (k, C, N)
     prior: np.ndarray  # (k, k) prior rows of the nuisances, whitened
-    estimate: np.ndarray  # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
+    # (k,) the nuisances' departure from their prior mean, in its standard deviations (or 0)
+    estimate: np.ndarray
     faults: dict[str, list[int]]  # which nuisances belong to which fault of the measurement
     columns: tuple[CandidateColumn, ...]
-    split: np.ndarray  # (e, C, N) differences of the fitted parameters but thresholds and times, each in one event only
+    # (e, C, N) differences of the fitted parameters but thresholds and times, each in one event
+    # only
+    split: np.ndarray
     perturbed: np.ndarray  # (c, C, N) responses to injections
     groups: np.ndarray  # (c,) which balance an injection pushes
     held: tuple[int, ...]  # columns of the base model's parameters that rest on a wall
@@ -43,8 +51,16 @@ class Linearization:
         return np.concatenate([self.nuisance, *(c.raw for c in self.columns)])
 
     def whitened(self, noise: Noise) -> ScoreTest:
-        """Project under this noise; `ScoreTest.of` puts other residuals in place of the fit's own."""
-        raw = [self.nuisance, self.residual[None], *(c.raw for c in self.columns), self.split, self.perturbed]
+        """Project under this noise; `ScoreTest.of` puts other residuals in place of
+        the fit's own.
+        """
+        raw = [
+            self.nuisance,
+            self.residual[None],
+            *(c.raw for c in self.columns),
+            self.split,
+            self.perturbed,
+        ]
         ends = np.cumsum([len(part) for part in raw])
         white = self.context.whiten(noise, np.concatenate(raw))
         rows = np.concatenate([white, np.zeros((len(white), len(self.prior)))], axis=1)
@@ -57,15 +73,27 @@ class Linearization:
         rest -= along @ Q.T
         r, *blocks, split, perturbed = np.split(rest, ends[1:-1] - ends[0])
         return ScoreTest(
-            self.columns, self.faults, self.groups, Q, R, r, along[:1], self.estimate, blocks, split, perturbed
+            self.columns,
+            self.faults,
+            self.groups,
+            Q,
+            R,
+            r,
+            along[:1],
+            self.estimate,
+            blocks,
+            split,
+            perturbed,
         )
 
 
 def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
-    """Differences of everything at a fit, in one batch. What is fitted, and faults of the measurement, are nuisances.
+    """Differences of everything at a fit, in one batch. What is fitted, and faults of the
+    measurement, are nuisances.
 
-    A parameter of the base model on a wall that would leave the box is held there: what only values beyond its bounds
-    explain is left. Those of effects are not: they belong to a formula, not to the load.
+    A parameter of the base model on a wall that would leave the box is held there: what only values
+    beyond its bounds explain is left. Those of effects are not: they belong to a formula, not to
+    the load.
     """
     at = context.coordinates
     faults = {name: at.sizes([name]) for name in context.catalogue.of_measurement}
@@ -84,25 +112,46 @@ def tangent(context: Context, fit: Refit, noise: Noise) -> Linearization:
     columns = tuple(CandidateColumn(c, s, further[a:b]) for c, s, a, b in labels)
     members = {name: [nuisances.index(c) for c in cols] for name, cols in faults.items()}
     white = context.whiten(noise, np.concatenate([nuisance, base[None]]))
-    held = set(np.flatnonzero(find_active_bounds(context, fit.unit, nuisances, white[:k] @ white[k])).tolist())
+    held = set(
+        np.flatnonzero(
+            find_active_bounds(context, fit.unit, nuisances, white[:k] @ white[k])
+        ).tolist()
+    )
     rows = sorted({*held, *(i for i, c in enumerate(nuisances) if c in at.prior_deviation)})
     prior = np.zeros((len(rows), k))
     departure = np.zeros(k)
     for row, i in enumerate(rows):
-        prior[row, i] = 1 / (LARGEST_MOVE_AT_BOUND if i in held else at.prior_deviation[nuisances[i]])
+        prior[row, i] = 1 / (
+            LARGEST_MOVE_AT_BOUND if i in held else at.prior_deviation[nuisances[i]]
+        )
         departure[i] = 0.0 if i in held else fit.unit[nuisances[i]] - at.null[nuisances[i]]
-    fitted = {*at.base, *at.sizes(fit.names)}  # a relay's instants hang on the voltage's noise, which no draw has
-    split = _by_event(context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]])
+    # a relay's instants hang on the voltage's noise, which no draw has
+    fitted = {*at.base, *at.sizes(fit.names)}
+    split = _by_event(
+        context, nuisance[[i for i, c in enumerate(nuisances) if c in fitted and i not in held]]
+    )
     active_bounds = tuple(nuisances[i] for i in sorted(held))
     return Linearization(
-        context, fit.unit, base, nuisance, prior, departure, members, columns, split, perturbed, groups, active_bounds
+        context,
+        fit.unit,
+        base,
+        nuisance,
+        prior,
+        departure,
+        members,
+        columns,
+        split,
+        perturbed,
+        groups,
+        active_bounds,
     )
 
 
 def find_active_bounds(
     context: Context, unit: np.ndarray, columns: Sequence[int] | np.ndarray, gradient: np.ndarray
 ) -> np.ndarray:
-    """Which of the columns are parameters of the base model on a wall beyond which the deviance falls.
+    """Which of the columns are parameters of the base model on a wall beyond which the deviance
+    falls.
 
     `gradient` of the deviance is needed for its sign only.
     """
@@ -121,7 +170,9 @@ def _by_event(context: Context, columns: np.ndarray) -> np.ndarray:
 
 
 def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndarray, list]:
-    """One point per size and setting of each candidate outside the fit, and how far it steps [unit of the size]."""
+    """One point per size and setting of each candidate outside the fit, and how far it steps [unit
+    of the size].
+    """
     at = context.coordinates
     points, spans, labels = [], [], []
     for candidate in context.catalogue.candidates:
@@ -138,9 +189,11 @@ def _candidate_points(context: Context, fit: Refit) -> tuple[np.ndarray, np.ndar
 
 
 def rich_residuals(t: Linearization, residuals: np.ndarray) -> np.ndarray:
-    """Residuals (b, C, N) with everything any column explains taken away, unweighted: what noise is estimated from.
+    """Residuals (b, C, N) with everything any column explains taken away, unweighted: what noise is
+    estimated from.
 
-    Each is divided by what is left of its variance then, so that the noise does not come out too small.
+    Each is divided by what is left of its variance then, so that the noise does not come out too
+    small.
     """
     right = compute_basis(t.explaining.reshape(-1, residuals[0].size), 1e-6)
     flat = residuals.reshape(len(residuals), -1)

@@ -11,7 +11,8 @@ from tractexp.model.drive import Drive
 from tractexp.plugin import Plugin
 from tractexp.record import Event
 
-REFUSED = 1e12  # objectives from here up mark candidates that could not be simulated, ranked by how far they miss
+# objectives from here up mark candidates that could not be simulated, ranked by how far they miss
+REFUSED = 1e12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,14 +31,18 @@ class Loss(Plugin):
         for name in ("weight_P", "weight_Q"):
             check_range(f"objective.{name}", getattr(self, name), 0.0)
         if self.weight_P == self.weight_Q == 0:
-            raise UserError("objective.weight_P and objective.weight_Q are both 0: nothing would be fitted")
+            raise UserError(
+                "objective.weight_P and objective.weight_Q are both 0: nothing would be fitted"
+            )
 
     def rho(self, z: np.ndarray) -> np.ndarray:
         """The loss of squared residuals `z`, in squared scales; z itself where z is small."""
         return z
 
     def scales(self, events: Sequence[Event], drive: Drive) -> np.ndarray:
-        """The usual residual of each sample of P and Q (C, N) [pu]. Raises `UserError` where it is not known."""
+        """The usual residual of each sample of P and Q (C, N) [pu]. Raises `UserError` where it is
+        not known.
+        """
         if self.quadratic:
             return np.ones((2, 1))
         given = getattr(self, "scale", None)
@@ -47,8 +52,10 @@ class Loss(Plugin):
                 level = given or event.levels[c]
                 if not level > 0:
                     raise UserError(
-                        f"{event.record.where}: {channel} shows no noise before the dip, so that a robust objective"
-                        " cannot tell an outlier; give the usual residual as objective.scale [pu], or take"
+                        f"{event.record.where}: {channel} shows no noise before the dip, so that a"
+                        " robust objective"
+                        " cannot tell an outlier; give the usual residual as objective.scale [pu],"
+                        " or take"
                         " objective=squares"
                     )
                 usual[c, drive.part(e)] = level

@@ -1,11 +1,12 @@
-r"""The size of a model's error: what it leaves of a load's response beyond the noise, both in apparent power.
+r"""The size of a model's error: what it leaves of a load's response beyond the noise, both in
+apparent power.
 
     e² = (sum |S_calculated - S|² - n s²) / (sum |S - S_0|² - n s²)
 
-over the n samples from each dip on, S = P + jQ, S_0 its mean before, s² the variance of the noise before the dip, its
-slow part left out: that is drift. Its interval is that of the delete-a-block jackknife; a second of records and more
-has blocks of a tenth of a second, less has as many as that. A test of significance says whether something is left; this
-says how much it matters.
+over the n samples from each dip on, S = P + jQ, S_0 its mean before, s² the variance of the noise
+before the dip, its slow part left out: that is drift. Its interval is that of the delete-a-block
+jackknife; a second of records and more has blocks of a tenth of a second, less has as many as that.
+A test of significance says whether something is left; this says how much it matters.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,9 +27,11 @@ LARGEST_TOLD_PERCENT = 10_000  # percent: more tells no more
 
 @dataclass(frozen=True)
 class ModelError:
-    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent power.
+    """A model's error as a share of the response, its 95 % interval, and as a share of the apparent
+    power.
 
-    `square` is the square of it as reckoned, below zero where less is left than noise leaves in the mean.
+    `square` is the square of it as reckoned, below zero where less is left than noise leaves in the
+    mean.
     """
 
     value: float
@@ -67,14 +70,19 @@ def model_error(played: Sequence[Playback]) -> ModelError:
     without = (left - sums[:, 0]) / np.maximum(response - sums[:, 1], 1e-30)
     half = reach(without, ratio)
     root = lambda square: float(np.sqrt(max(square, 0.0)))  # noqa: E731
-    return ModelError(root(ratio), (root(ratio - half), root(ratio + half)), root(left / max(power, 1e-30)), ratio)
+    return ModelError(
+        root(ratio), (root(ratio - half), root(ratio + half)), root(left / max(power, 1e-30)), ratio
+    )
 
 
 def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndarray]:
-    """Squares of what is left, of the response, both less those of the noise, and of the power: (b, 3) by the blocks of
-    each event. Blocks are shortened, to a cycle at most, until `sharing` of them share the response: the inverse of the
-    sum of squares of their shares."""
-    seconds = sum((one.event.record.samples - one.event.start) * one.event.record.step for one in played)
+    """Squares of what is left, of the response, both less those of the noise, and of the power: (b,
+    3) by the blocks of each event. Blocks are shortened, to a cycle at most, until `sharing` of
+    them share the response: the inverse of the sum of squares of their shares.
+    """
+    seconds = sum(
+        (one.event.record.samples - one.event.start) * one.event.record.step for one in played
+    )
     length = min(LENGTH, seconds / BLOCKS)
     while True:
         sums = [_block_sums(one, length) for one in played]
@@ -87,16 +95,22 @@ def block_sums(played: Sequence[Playback], sharing: float = 0.0) -> list[np.ndar
 def _block_sums(played: Playback, length: float) -> np.ndarray:
     event, record = played.event, played.event.record
     S, S_0 = record.P + 1j * record.Q, event.P0 + 1j * event.Q0
-    squares = np.stack([np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2])
+    squares = np.stack(
+        [np.abs(played.P + 1j * played.Q - S) ** 2, np.abs(S - S_0) ** 2, np.abs(S) ** 2]
+    )
     squares[:2] -= noise_variance(event)
     valid = np.isfinite(S)
     squares[0, valid & ~np.isfinite(squares[0])] = np.inf  # what diverged
     squares = np.where(valid, squares, 0.0)[:, event.start :]
-    return np.add.reduceat(squares, np.arange(0, squares.shape[1], max(1, round(length / record.step))), axis=1).T
+    return np.add.reduceat(
+        squares, np.arange(0, squares.shape[1], max(1, round(length / record.step))), axis=1
+    ).T
 
 
 def noise_variance(event: Event) -> float:
-    """Variance of P plus that of Q before the dip [pu²], without mean, slope and slow part: drift."""
+    """Variance of P plus that of Q before the dip [pu²], without mean, slope and slow
+    part: drift.
+    """
     total = 0.0
     for row in event.calm:
         quiet = row[np.isfinite(row)]

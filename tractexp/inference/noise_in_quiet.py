@@ -1,7 +1,7 @@
 """The noise of one context, estimated from what its fits leave where little happens.
 
-Of waveforms it is white but for what noise of the voltage causes (`tractexp.noise.waves`), does not wander within so
-short a record, and has the offsets that the channels may have kept.
+Of waveforms it is white but for what noise of the voltage causes (`tractexp.noise.waves`), does not
+wander within so short a record, and has the offsets that the channels may have kept.
 """
 
 from collections.abc import Sequence
@@ -14,16 +14,19 @@ from tractexp.inference.jumps import jumps
 from tractexp.inference.observed import Observed, estimate_noise
 from tractexp.noise import Noise
 
-# Twice the log-likelihood from which a load is said to wander before its events, and twice that by what the events
-# show. Half a chi-square of one degree is beyond it in 8 % of channels; a wandering that is not there costs little.
+# Twice the log-likelihood from which a load is said to wander before its events, and twice that by
+# what the events show. Half a chi-square of one degree is beyond it in 8 % of channels; a wandering
+# that is not there costs little.
 WALK_SEEN = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class QuietNoise:
-    """Estimates noise. `input_modes` (k, C, N) [pu] are what errors of the record do to what is compared.
+    """Estimates noise. `input_modes` (k, C, N) [pu] are what errors of the record do to what is
+    compared.
 
-    Those of the voltage's noise, None where it has none; of waveforms those of the channels' offsets.
+    Those of the voltage's noise, None where it has none; of waveforms those of the channels'
+    offsets.
     """
 
     context: Context
@@ -33,7 +36,10 @@ class QuietNoise:
     def at(cls, context: Context, unit: np.ndarray) -> "QuietNoise":
         """Where errors of the record act as they do on the base model at coordinates (D,)."""
         observed = Observed(context.kernels.bare, context.records.smoothed)
-        return cls(context, observed.input_errors(observed.problem.space.from_unit(unit[context.coordinates.base])))
+        return cls(
+            context,
+            observed.input_errors(observed.problem.space.from_unit(unit[context.coordinates.base])),
+        )
 
     def of_fit(self, unit: np.ndarray, names: Sequence[str] = ()) -> Noise:
         """The noise of the quiet residuals at coordinates (D,), of a fit with these effects."""
@@ -48,17 +54,27 @@ class QuietNoise:
     ) -> Noise:
         """The noise of one residual (C, N) in quiet stretches, at coordinates (D,).
 
-        What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of how the load wanders.
-        Of waveforms the model there tells how noise of the voltage is passed on.
+        What a fit leaves (C, N), and columns of all that could explain it (k, C, N), tell more of
+        how the load wanders. Of waveforms the model there tells how noise of the voltage is passed
+        on.
         """
         context, problem = self.context, self.context.problem
-        errors = [shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None]
+        errors = [
+            shapes for shapes in (self.input_modes, jumps(context, unit)) if shapes is not None
+        ]
         shapes = np.concatenate(errors) if errors else None
         there = context.kernels.at(context.coordinates.present(unit), unit)
         return estimate_noise(
-            problem, residual, context.valid, problem.quiet, there, shapes, left, columns,
+            problem,
+            residual,
+            context.valid,
+            problem.quiet,
+            there,
+            shapes,
+            left,
+            columns,
             seen=WALK_SEEN,
-        )  # fmt: skip
+        )
 
 
 def white(context: Context) -> Noise:

@@ -1,7 +1,9 @@
-"""Records as an identification looks at them: the voltage's own noise smoothed out, the noise of P and Q told from it.
+"""Records as an identification looks at them: the voltage's own noise smoothed out, the noise of P
+and Q told from it.
 
-The noise is that of an investigation (`tractexp.noise`): P and Q correlated with each other and in time, a load that
-wanders, and what is left of the voltage's noise, which enters the model and leaves it in P and Q at once.
+The noise is that of an investigation (`tractexp.noise`): P and Q correlated with each other and in
+time, a load that wanders, and what is left of the voltage's noise, which enters the model and
+leaves it in P and Q at once.
 """
 
 import functools
@@ -20,9 +22,10 @@ from tractexp.noise.random_walk import walk_of_load, without_slow
 from tractexp.noise.voltage import SmoothedEvent
 from tractexp.record import Event
 
-LEAST_REST = 0.2  # of a residual's variance: where the fit takes more, it tells nothing of the noise
-# Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a wandering that is not
-# there costs it little, and an estimate a third of its precision.
+# of a residual's variance: where the fit takes more, it tells nothing of the noise
+LEAST_REST = 0.2
+# Twice the log-likelihood from which a load is said to wander. An investigation asks for less: a
+# wandering that is not there costs it little, and an estimate a third of its precision.
 LEAST_WANDERING = 5.0
 MOST_SAMPLES = 2_000_000  # of voltages with an error that are simulated at once
 
@@ -49,40 +52,64 @@ class Observed:
         return self.problem.drive
 
     def noise(
-        self, residuals: np.ndarray, valid: np.ndarray, J: Sensitivities, values: np.ndarray,
-        input_errors: np.ndarray | None, whole: bool,
-    ) -> Noise | None:  # fmt: skip
-        """Noise from what a fit leaves (C, N) in quiet, or of the `whole` records; None where too few samples are.
+        self,
+        residuals: np.ndarray,
+        valid: np.ndarray,
+        J: Sensitivities,
+        values: np.ndarray,
+        input_errors: np.ndarray | None,
+        whole: bool,
+    ) -> Noise | None:
+        """Noise from what a fit leaves (C, N) in quiet, or of the `whole` records; None where too
+        few samples are.
 
         `J` is what each coordinate could still change at free `values` (d,).
         """
-        rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(residuals.shape)  # the fit took the others
+        # the fit took the others
+        rest = np.maximum(1 - J.basis().leverage, LEAST_REST).reshape(residuals.shape)
         columns = J.columns.reshape(-1, *residuals.shape)
-        where = [self.drive.part(e) for e in range(self.drive.events)] if whole else self._noisy(residuals, valid)
+        where = (
+            [self.drive.part(e) for e in range(self.drive.events)]
+            if whole
+            else self._noisy(residuals, valid)
+        )
         try:
             return estimate_noise(
-                self.problem, residuals / np.sqrt(rest), valid, where, (self.problem, values), input_errors,
-                residuals, columns, seen=LEAST_WANDERING,
-            )  # fmt: skip
+                self.problem,
+                residuals / np.sqrt(rest),
+                valid,
+                where,
+                (self.problem, values),
+                input_errors,
+                residuals,
+                columns,
+                seen=LEAST_WANDERING,
+            )
         except UserError:
             return None
 
     def _noisy(self, residuals: np.ndarray, valid: np.ndarray) -> list[slice]:
-        """The quiet stretches whose residual (C, N) is noise: those after a dip only where no louder than before it.
+        """The quiet stretches whose residual (C, N) is noise: those after a dip only where no
+        louder than before it.
 
-        Where a record has less noise than the model has error, what is left at its end is the model's.
+        Where a record has less noise than the model has error, what is left at its end is the
+        model's.
         """
         starts = [int(self.drive.first[e]) + event.start for e, event in enumerate(self.events)]
         before = [part for part in self.problem.quiet if part.stop in starts]
         after = [part for part in self.problem.quiet if part.stop not in starts]
         for c in np.flatnonzero(valid.any(axis=1)):
-            calm, late = ([without_slow(residuals[c, p][valid[c, p]]) for p in parts] for parts in (before, after))
+            calm, late = (
+                [without_slow(residuals[c, p][valid[c, p]]) for p in parts]
+                for parts in (before, after)
+            )
             if louder(late, calm):
                 return before
         return self.problem.quiet
 
     def input_errors(self, values: np.ndarray) -> np.ndarray | None:
-        """What errors of the record do to what is compared at free values (d,): (k, C, N) [pu], None where it has none.
+        """What errors of the record do to what is compared at free values (d,): (k, C, N) [pu],
+        None where it has none.
 
         Those of the voltage's noise, or what the domain says.
         """
@@ -93,12 +120,16 @@ class Observed:
             return None
         together = max(1, MOST_SAMPLES // self.drive.samples)
         shapes = [None, *range(most)]
-        parts = [self._driven(values, shapes[k : k + together]) for k in range(0, len(shapes), together)]
+        parts = [
+            self._driven(values, shapes[k : k + together]) for k in range(0, len(shapes), together)
+        ]
         power = np.concatenate(parts)
         return np.nan_to_num(power[1:] - power[0])
 
     def _driven(self, values: np.ndarray, shapes: Sequence[int | None]) -> np.ndarray:
-        """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one simulation."""
+        """Power (shapes, 2, N) under the smoothed voltages, each with one of its errors; all in one
+        simulation.
+        """
         problem, count = self.problem, len(shapes)
         events = [s.event if k is None else s.off_by(k) for k in shapes for s in self.smoothed]
         drive = Drive.of([problem.domain.excitation(event, problem.model) for event in events])
@@ -108,16 +139,23 @@ class Observed:
 
 
 def estimate_noise(
-    records: Problem, residual: np.ndarray, valid: np.ndarray, quiet: Sequence[slice],
-    model: tuple[Problem, np.ndarray], input_errors: np.ndarray | None,
-    left: np.ndarray | None, columns: np.ndarray | None, *, seen: float,
-) -> Noise:  # fmt: skip
+    records: Problem,
+    residual: np.ndarray,
+    valid: np.ndarray,
+    quiet: Sequence[slice],
+    model: tuple[Problem, np.ndarray],
+    input_errors: np.ndarray | None,
+    left: np.ndarray | None,
+    columns: np.ndarray | None,
+    *,
+    seen: float,
+) -> Noise:
     """Return the noise of a residual (C, N) in the quiet stretches of the records.
 
-    `model` with its free values (d,) tells how noise of the voltage is passed on, `input_errors` (k, C, N) what errors
-    of the record do. What the fit leaves, `left` (C, N), and the columns of all that could explain it (k, C, N) tell
-    more of how the load wanders; it does where twice the log-likelihood gains `seen`. Raises `UserError` where too few
-    samples are quiet.
+    `model` with its free values (d,) tells how noise of the voltage is passed on, `input_errors`
+    (k, C, N) what errors of the record do. What the fit leaves, `left` (C, N), and the columns of
+    all that could explain it (k, C, N) tell more of how the load wanders; it does where twice the
+    log-likelihood gains `seen`. Raises `UserError` where too few samples are quiet.
     """
     walk = functools.partial(
         walk_of_load, records.events, records.drive, records.power, left, columns, valid, seen=seen

@@ -1,8 +1,9 @@
 """Weak priors: what machines usually are, as rows of the least squares beside those of the records.
 
-What a wrong model leaves is no noise, and its samples are not independent. Taken for independent, two thousand of them
-would break any prior for the last percent of an error that has other reasons. So a block of samples, as long as the
-residual remembers (`blocks`), counts as much as one row of the prior.
+What a wrong model leaves is no noise, and its samples are not independent. Taken for independent,
+two thousand of them would break any prior for the last percent of an error that has other reasons.
+So a block of samples, as long as the residual remembers (`blocks`), counts as much as one row of
+the prior.
 """
 
 import numpy as np
@@ -11,13 +12,17 @@ from tractexp.inference.problem import Problem
 
 
 def departures(problem: Problem, values: np.ndarray) -> np.ndarray:
-    """How far free values (n, d) are from what the model's motor usually is, (n, k), in standard deviations."""
+    """How far free values (n, d) are from what the model's motor usually is, (n, k), in standard
+    deviations.
+    """
     by_name = dict(zip(problem.model.names, problem.full(values).T, strict=True))
     motor = problem.model.motor
     with np.errstate(divide="ignore", invalid="ignore"):  # of what no machine has
         rows = [
             np.log(quantity / median) / np.log(factor)
-            for quantity, median, factor in motor.usual(**{p.name: by_name[p.name] for p in motor.parameters})
+            for quantity, median, factor in motor.usual(
+                **{p.name: by_name[p.name] for p in motor.parameters}
+            )
         ]
     return np.stack(rows, axis=1) if rows else np.empty((len(np.atleast_2d(values)), 0))
 

@@ -1,8 +1,9 @@
 """Which of many starts of a set of effects are worth a descent, by one simulation each.
 
-A descent of a few iterations costs a simulation for every free parameter in each of them. One simulation at the start
-tells what its thresholds and times change; how far a multiple of that, with what the base model and the faults of the
-measurement can take in one linear step, lowers the deviance ranks the starts as the first iterations would.
+A descent of a few iterations costs a simulation for every free parameter in each of them. One
+simulation at the start tells what its thresholds and times change; how far a multiple of that, with
+what the base model and the faults of the measurement can take in one linear step, lowers the
+deviance ranks the starts as the first iterations would.
 """
 
 from collections.abc import Sequence
@@ -17,7 +18,12 @@ LEAST_DEVIANCE_SHARE = 1e-9  # of the deviance: a change below that is none
 
 
 def select_promising_starts(
-    context: Context, noise: Noise, names: Sequence[str], units: np.ndarray, nuisances: Sequence[int], most: int
+    context: Context,
+    noise: Noise,
+    names: Sequence[str],
+    units: np.ndarray,
+    nuisances: Sequence[int],
+    most: int,
 ) -> np.ndarray:
     """The starts (n, D) of one set of effects that promise most, at most so many, in their order.
 
@@ -41,7 +47,9 @@ def _expect_deviance(
     units: np.ndarray,
     nuisances: Sequence[int],
 ) -> np.ndarray:
-    """The deviance (n,) of a linear step from each start, which differ from `ground` (D,) by their effects alone."""
+    """The deviance (n,) of a linear step from each start, which differ from `ground` (D,) by their
+    effects alone.
+    """
     raw, rows = context.linearize(ground, noise, nuisances, ())
     Q = np.linalg.qr(rows[1:].T)[0]
     r = rows[0] - Q @ (rows[0] @ Q)

@@ -1,4 +1,6 @@
-"""A recorder's own window as an investigation looks for it; what one does is told in `tractexp.record.window`."""
+"""A recorder's own window as an investigation looks for it; what one does is told in
+`tractexp.record.window`.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -17,7 +19,8 @@ CYCLES = (1, 2, 3, 4, 5, 6)
 
 @dataclass(frozen=True, eq=False)
 class RecorderWindow(Measurement):
-    """A recorder that forms phasors over a window [s]: a plain mean, or the weights of an estimator.
+    """A recorder that forms phasors over a window [s]: a plain mean, or the weights of an
+    estimator.
 
     `said`: the records say that it is this one.
     """
@@ -65,8 +68,8 @@ class RecorderWindow(Measurement):
 
 
 def windows_of(events: Sequence[Event]) -> list[RecorderWindow]:
-    """The windows that recorders of these events may have: the one they say, else whole cycles and those of the
-    estimators, shortest first.
+    """The windows that recorders of these events may have: the one they say, else whole cycles and
+    those of the estimators, shortest first.
 
     None is longer than what came before the dip, or too short for the sampling to show.
     """

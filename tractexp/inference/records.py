@@ -1,6 +1,8 @@
-"""The events of an investigation as the load saw them: the voltage's noise smoothed out, a recorder's window undone.
+"""The events of an investigation as the load saw them: the voltage's noise smoothed out, a
+recorder's window undone.
 
-Waveforms drive a simulation as they were recorded: within a cycle nothing tells noise of the voltage from the voltage.
+Waveforms drive a simulation as they were recorded: within a cycle nothing tells noise of the
+voltage from the voltage.
 """
 
 import functools
@@ -20,7 +22,8 @@ class Records:
 
     recorded: tuple[Event, ...]
     smoothed: tuple[SmoothedEvent, ...]
-    window: RecorderWindow | None = None  # over which the recorder forms phasors, where that is known
+    # over which the recorder forms phasors, where that is known
+    window: RecorderWindow | None = None
 
     @classmethod
     def of(cls, events: Sequence[Event], window: RecorderWindow | None = None) -> "Records":
@@ -41,7 +44,8 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
     for event in train:
         if event.record.where in held:
             raise UserError(
-                f"{event.record.where} is both in {DATA.train} and in {DATA.validate}; hold out another event"
+                f"{event.record.where} is both in {DATA.train} and in {DATA.validate}; hold out"
+                " another event"
             )
     for event in (*train, *validate):
         for channel in ("f", "U2"):
@@ -49,6 +53,7 @@ def check_events(train: Sequence[Event], validate: Sequence[Event]) -> None:
             if has != (getattr(first.record, channel) is not None):
                 one, other = (event, first) if has else (first, event)
                 raise UserError(
-                    f"{one.record.where} has the channel {channel} and {other.record.where} has not: events of one"
+                    f"{one.record.where} has the channel {channel} and {other.record.where} has"
+                    " not: events of one"
                     " investigation need the same channels; remove the column or add it"
                 )

@@ -27,7 +27,8 @@ def autocorrelation(rows: np.ndarray, lags: int) -> np.ndarray:
 
 
 def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
-    """Whether `rows` (n,) are uncorrelated; `fitted` autoregressive coefficients cost as many degrees of freedom.
+    """Whether `rows` (n,) are uncorrelated; `fitted` autoregressive coefficients cost as many
+    degrees of freedom.
 
     Source: Ljung and Box 1978.
     """
@@ -38,14 +39,20 @@ def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
     r = autocorrelation(rows, lags)
     statistic = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     p = float(chdtrc(lags - fitted, statistic))
-    return ResidualTest("whiteness (Ljung-Box)", statistic, lags - fitted, p, "colored" if p < REJECTED else "white")
+    return ResidualTest(
+        "whiteness (Ljung-Box)", statistic, lags - fitted, p, "colored" if p < REJECTED else "white"
+    )
 
 
 def jarque_bera(rows: np.ndarray) -> ResidualTest:
-    """Whether `rows` (n,) have the skewness and kurtosis of a normal distribution. Source: Jarque and Bera 1987."""
+    """Whether `rows` (n,) have the skewness and kurtosis of a normal distribution. Source: Jarque
+    and Bera 1987.
+    """
     from scipy.special import chdtrc
 
     z = (rows - rows.mean()) / (rows.std() or 1.0)
     statistic = len(z) / 6 * float(np.mean(z**3) ** 2 + (np.mean(z**4) - 3) ** 2 / 4)
     p = float(chdtrc(2, statistic))
-    return ResidualTest("normality (Jarque-Bera)", statistic, 2, p, "not normal" if p < REJECTED else "normal")
+    return ResidualTest(
+        "normality (Jarque-Bera)", statistic, 2, p, "not normal" if p < REJECTED else "normal"
+    )

@@ -1,16 +1,18 @@
 r"""How far an estimate by least squares scatters where what it leaves is no noise.
 
-With the sensitivities J and the residual r in blocks b, the estimate without block b is, to first order,
+With the sensitivities J and the residual r in blocks b, the estimate without block b is, to first
+order,
 
     theta_(-b) - theta = (J'J - J_b'J_b)^-1 J_b' r_b
 
-and the covariance is (G - 1)/G times the sum of their outer products over the G blocks: the sandwich
-(J'J)^-1 (sum_b J_b' r_b r_b' J_b) (J'J)^-1 of White (1982) for residuals that are correlated within blocks, with each
-residual given back what the fit took of it. P0 and Q0 are means before the dip; leaving out a block of that moves them,
-and the estimate with them. In no direction is the variance less than that of independent residuals.
+and the covariance is (G - 1)/G times the sum of their outer products over the G blocks: the
+sandwich (J'J)^-1 (sum_b J_b' r_b r_b' J_b) (J'J)^-1 of White (1982) for residuals that are
+correlated within blocks, with each residual given back what the fit took of it. P0 and Q0 are means
+before the dip; leaving out a block of that moves them, and the estimate with them. In no direction
+is the variance less than that of independent residuals.
 
-Source: White 1982; Bell and McCaffrey 2002 (CR3); MacKinnon, Nielsen and Webb 2023.
-It holds the scatter and not the bias: what a missing effect moves a parameter by is told by rival structures.
+Source: White 1982; Bell and McCaffrey 2002 (CR3); MacKinnon, Nielsen and Webb 2023. It holds the
+scatter and not the bias: what a missing effect moves a parameter by is told by rival structures.
 """
 
 from collections.abc import Sequence
@@ -25,16 +27,19 @@ from tractexp.inference.interval import interval_factor
 from tractexp.inference.likelihood import Likelihood
 from tractexp.inference.separable import Sensitivities
 
-SINGULAR_ROUNDING = 1e-13  # of the largest singular value of a covariance's root: what the records do not see is 0 there
-WALL = 1e-3  # of a range: what rests on a bound stays there when a block is left out, and takes nothing from a residual
+# of the largest singular value of a covariance's root: what the records do not see is 0 there
+SINGULAR_ROUNDING = 1e-13
+# of a range: what rests on a bound stays there when a block is left out, and takes nothing from a
+# residual
+WALL = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
     """The scatter of least squares: its `information`, and beside it what intervals need.
 
-    `quantile` is Student's t at 97.5 %; `ratio` (d,) is each standard error over that of independent residuals, and
-    `spread` their geometric mean over all directions.
+    `quantile` is Student's t at 97.5 %; `ratio` (d,) is each standard error over that of
+    independent residuals, and `spread` their geometric mean over all directions.
     """
 
     information: Information
@@ -46,8 +51,8 @@ class Scatter:
 def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     """Of a fit by Eq. (8) at coordinates (d,), whose rows are in units of what it leaves.
 
-    Parameters inside their bounds are told with those on a bound held there; one on a bound as if all were free,
-    beyond the bounds, too.
+    Parameters inside their bounds are told with those on a bound held there; one on a bound as if
+    all were free, beyond the bounds, too.
     """
     problem, whole = likelihood.problem, likelihood.of_records.with_initial_power
     rows, J = whole.jacobian(whole.placed(unit[None])[0])
@@ -55,7 +60,10 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
     blocks = blocks_of(problem.events, drive, free)
     held_by = _prior_jacobian(likelihood, unit)
     rows, power = rows.reshape(drive.channels, -1), _of_power(whole, blocks)
-    influences = lambda columns: _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)  # noqa: E731
+
+    def influences(columns: np.ndarray) -> np.ndarray:
+        return _influences(J, rows, columns, blocks, power, held_by, likelihood.prior)
+
     shared = np.concatenate([J.shared, held_by])
     every = np.arange(free)
     inside = every[off_walls(unit[:free])]
@@ -71,7 +79,11 @@ def scatter(likelihood: Likelihood, unit: np.ndarray) -> Scatter:
         seen = errors > 0  # what changes nothing has no error, and stays out of what is known
         root[len(own) + np.flatnonzero(seen), held[seen]] = 1 / errors[seen]
     information = Information(
-        problem.space.names, likelihood.values(unit), problem.upper - problem.lower, root, SINGULAR_ROUNDING
+        problem.space.names,
+        likelihood.values(unit),
+        problem.upper - problem.lower,
+        root,
+        SINGULAR_ROUNDING,
     )
     return Scatter(information, interval_factor(len(blocks) - 1), ratio, spread)
 
@@ -83,20 +95,27 @@ def off_walls(unit: np.ndarray) -> np.ndarray:
 
 def _prior_jacobian(likelihood: Likelihood, unit: np.ndarray) -> np.ndarray:
     """Derivatives (k, d) of the rows of a prior, per range of each parameter."""
-    _, J = central_differences(lambda at, _: likelihood.prior_rows(at), unit[None], np.zeros(1, dtype=int))
+    _, J = central_differences(
+        lambda at, _: likelihood.prior_rows(at), unit[None], np.zeros(1, dtype=int)
+    )
     return J[0].T
 
 
 def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int, np.ndarray]]:
-    """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is left out of their
-    means."""
+    """The event of each block, and the change (2,) of its P0 and Q0 in ranges when the block is
+    left out of their means.
+    """
     drive, changes = likelihood.problem.drive, list[tuple[int, np.ndarray]]()
     width = likelihood.free_set.box.width[likelihood.free :].reshape(drive.events, 2)
     means = likelihood.problem.steady or [slice(0, 0)] * drive.events  # of waves there are none
     for block in blocks:
         e = int(np.searchsorted(drive.first, block.start, "right")) - 1
         steady, change = means[e], np.zeros(2)
-        a, z, n = max(block.start, steady.start), min(block.stop, steady.stop), steady.stop - steady.start
+        a, z, n = (
+            max(block.start, steady.start),
+            min(block.stop, steady.stop),
+            steady.stop - steady.start,
+        )
         if 0 < z - a < n:
             off = np.nanmean(drive.measured[:, a:z], axis=1) - drive.before[e]
             change = -np.nan_to_num(off) * (z - a) / (n - (z - a))
@@ -105,13 +124,18 @@ def _of_power(likelihood: Likelihood, blocks: Sequence[slice]) -> list[tuple[int
 
 
 def _influences(
-    J: Sensitivities, rows: np.ndarray, columns: np.ndarray, blocks: Sequence[slice],
-    power: Sequence[tuple[int, np.ndarray]], held_by: np.ndarray, weight: float,
-) -> np.ndarray:  # fmt: skip
+    J: Sensitivities,
+    rows: np.ndarray,
+    columns: np.ndarray,
+    blocks: Sequence[slice],
+    power: Sequence[tuple[int, np.ndarray]],
+    held_by: np.ndarray,
+    weight: float,
+) -> np.ndarray:
     """The change (G + k, columns) of the estimate when each block of J and rows (C, N) is left out.
 
-    `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left out; each moves the
-    estimate by what one standard deviation of it does.
+    `held_by` (k, d) are derivatives of the rows of a prior, of this weight. They are never left
+    out; each moves the estimate by what one standard deviation of it does.
     """
     flat, prior = J.shared[:, columns], held_by[:, columns]
     cross = [flat[mine].T @ J.own(e) for e, mine in enumerate(J.rows)]
@@ -122,27 +146,37 @@ def _influences(
 
 
 def moves_without_blocks(
-    J: np.ndarray, rows: np.ndarray, blocks: Sequence[slice], whole: np.ndarray,
+    J: np.ndarray,
+    rows: np.ndarray,
+    blocks: Sequence[slice],
+    whole: np.ndarray,
     shifts: Sequence[np.ndarray | float] | None = None,
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """The change (G, k) of an estimate when each block of J (C, N, k) and rows (C, N) is left out.
 
-    `whole` (k, k) is J'J with all that is never left out, such as a prior; `shifts` are what else moves J'r then.
+    `whole` (k, k) is J'J with all that is never left out, such as a prior; `shifts` are what else
+    moves J'r then.
     """
     k, scale = len(whole), np.sqrt(np.maximum(np.diag(whole), 1e-300))
     moves = []
     for block, shift in zip(blocks, shifts or [0.0] * len(blocks), strict=True):
         a, r = J[:, block].reshape(-1, k), rows[:, block].ravel()
         rest = (whole - a.T @ a) / np.outer(scale, scale)
-        moves.append(np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True) @ ((a.T @ r - shift) / scale) / scale)
+        moves.append(
+            np.linalg.pinv(rest, STRUCTURAL**2, hermitian=True)
+            @ ((a.T @ r - shift) / scale)
+            / scale
+        )
     return np.clip(moves, -1.0, 1.0)  # no estimate leaves its box
 
 
 def robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Rows (k, d) whose inverse products are the covariance of what J (R, d) sees, and how that compares with J's own.
+    """Rows (k, d) whose inverse products are the covariance of what J (R, d) sees, and how that
+    compares with J's own.
 
-    `moved` (G, d) are the estimates without each block. Along the directions of J, in which independent residuals of
-    unit variance have unit variance, less is raised to it. The ratios are those of `Scatter`.
+    `moved` (G, d) are the estimates without each block. Along the directions of J, in which
+    independent residuals of unit variance have unit variance, less is raised to it. The ratios are
+    those of `Scatter`.
     """
     size = np.linalg.norm(J, axis=0)
     scale = np.where(size > 0, size, 1.0)
@@ -153,7 +187,9 @@ def robust_root(J: np.ndarray, moved: np.ndarray) -> tuple[np.ndarray, np.ndarra
     values, vectors = np.linalg.eigh((len(moved) - 1) / len(moved) * z.T @ z)
     values = np.maximum(values, 1.0)
     back = np.linalg.pinv(along)
-    plain, whole = (np.sqrt(((back @ v) ** 2).sum(axis=1)) for v in (vectors, vectors * np.sqrt(values)))
+    plain, whole = (
+        np.sqrt(((back @ v) ** 2).sum(axis=1)) for v in (vectors, vectors * np.sqrt(values))
+    )
     ratio = np.divide(whole, plain, out=np.ones_like(whole), where=plain > 0)
     return (
         (vectors / np.sqrt(values)).T @ along,

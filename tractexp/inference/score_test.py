@@ -1,8 +1,10 @@
-"""A tangent under one noise, all nuisances projected out: what each candidate, push or event of its own would gain.
+"""A tangent under one noise, all nuisances projected out: what each candidate, push or event of its
+own would gain.
 
-Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance columns with
-their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the candidate lowers the deviance by
-(s'r)^2/s's; the one-step estimate of its size is -s'r/s's with standard deviation 1/|s|.
+Notation of the score test with nuisances (Rao 1948; Neyman 1959): r whitened residuals, N nuisance
+columns with their prior, M = I - N (N'N)^-1 N', s = M W dy/deta of a candidate. Adding the
+candidate lowers the deviance by (s'r)^2/s's; the one-step estimate of its size is -s'r/s's with
+standard deviation 1/|s|.
 """
 
 import functools
@@ -21,7 +23,9 @@ from tractexp.noise.span import compute_basis
 
 @dataclass(frozen=True, eq=False)
 class CandidateColumn:
-    """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of each size."""
+    """A candidate with one setting of its scanned parameters: differences (k, C, N) per unit of
+    each size.
+    """
 
     candidate: Candidate
     setting: dict[str, float]
@@ -42,7 +46,9 @@ class Score:
 
 @dataclass(frozen=True, eq=False)
 class ScoreTest:
-    """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the bootstrap's)."""
+    """Whitened and with the nuisances projected out; `r` has one row per residual (one, or the
+    bootstrap's).
+    """
 
     columns: tuple[CandidateColumn, ...]
     faults: Mapping[str, list[int]]  # which nuisances belong to which fault of the measurement
@@ -57,7 +63,9 @@ class ScoreTest:
     perturbed: np.ndarray  # (c, R)
 
     def of(self, white: np.ndarray) -> "ScoreTest":
-        """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no prior mean."""
+        """The same columns with other whitened residuals (b, C N) in place of the fit's own, off no
+        prior mean.
+        """
         rows = np.concatenate([white, np.zeros((len(white), len(self.Q) - white.shape[1]))], axis=1)
         along = rows @ self.Q
         rows -= along @ self.Q.T
@@ -65,7 +73,9 @@ class ScoreTest:
 
     @functools.cached_property
     def drops(self) -> tuple[np.ndarray, np.ndarray]:
-        """Drop of the deviance (columns, b) by adding each column, sizes in their allowed direction, and its p."""
+        """Drop of the deviance (columns, b) by adding each column, sizes in their allowed
+        direction, and its p.
+        """
         drops, ps = [], []
         for column, block in zip(self.columns, self.blocks, strict=True):
             signs = np.array([column.candidate.sign(p) for p in column.candidate.sizes])
@@ -86,8 +96,12 @@ class ScoreTest:
             size = -inverse @ (block @ self.r[0])
             spread = np.where(np.diag(gram) > 0, np.sqrt(np.maximum(np.diag(inverse), 0.0)), np.inf)
             labels, name = [p.name for p in column.candidate.sizes], column.candidate.name
-            sizes, deviations = (dict(zip(labels, row.tolist(), strict=True)) for row in (size, spread))
-            by_name.setdefault(name, []).append(Score(name, drop, p, sizes, deviations, column.setting))
+            sizes, deviations = (
+                dict(zip(labels, row.tolist(), strict=True)) for row in (size, spread)
+            )
+            by_name.setdefault(name, []).append(
+                Score(name, drop, p, sizes, deviations, column.setting)
+            )
         return {name: sorted(scores, key=lambda s: -s.drop) for name, scores in by_name.items()}
 
     def scores(self) -> list[Score]:
@@ -95,19 +109,25 @@ class ScoreTest:
         return sorted((scores[0] for scores in self.ranked.values()), key=lambda s: (s.p, -s.drop))
 
     def fault_p(self) -> dict[str, np.ndarray]:
-        """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior included."""
+        """p of each fault of the measurement, (b,): its estimate over its standard deviation, prior
+        included.
+        """
         result = {}
         inverse = np.linalg.pinv(self.R, rcond=1e-12)  # N'N = R'R
         estimate = -self.along @ inverse.T  # departures of the nuisances, (b, k)
         covariance = inverse @ inverse.T
         for name, members in self.faults.items():
             whole = estimate[:, members] + self.departure[members]
-            inner = np.linalg.pinv(covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True)
+            inner = np.linalg.pinv(
+                covariance[np.ix_(members, members)], rcond=1e-12, hermitian=True
+            )
             result[name] = chdtrc(len(members), np.einsum("bi,ij,bj->b", whole, inner, whole))
         return result
 
     def variance_component(self) -> np.ndarray:
-        """How much injections of all balances and windows still find, (b,): the structured test of adequacy."""
+        """How much injections of all balances and windows still find, (b,): the structured test of
+        adequacy.
+        """
         power = np.einsum("cr,cr->c", self.perturbed, self.perturbed)
         counted = power > 1e-8 * power.max(initial=1e-300)
         z = (self.r @ self.perturbed[counted].T) ** 2
@@ -126,21 +146,29 @@ class ScoreTest:
         return self.r[:, : drive.measured.size].reshape(len(self.r), drive.channels, -1)
 
     def statistics(self, problem: Problem) -> dict[str, np.ndarray]:
-        """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest of many (b, k)."""
+        """What no candidate accounts for, by what each test looks for: a sum (b,), or the largest
+        of many (b, k).
+        """
         by_test = {
             "pushes into the balances": self.variance_component(),
             "a further effect": -np.log(self.least_p)[:, None],
             **goodness_of_fit.statistics(self.channels(problem), problem),
         }
         if len(problem.events) > 1:
-            by_test[PER_EVENT] = ((self.r @ compute_basis(self.split, LEAST_DISTINCT_SHARE, 1e-12).T) ** 2).sum(axis=1)
+            by_test[PER_EVENT] = (
+                (self.r @ compute_basis(self.split, LEAST_DISTINCT_SHARE, 1e-12).T) ** 2
+            ).sum(axis=1)
         return by_test
 
 
-def signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs, and its p.
+def signed_drop(
+    block: np.ndarray, r: np.ndarray, signs: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Drop (b,) of |r|^2 by a least-squares multiple of the rows of `block` that keeps the signs,
+    and its p.
 
-    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang 1987).
+    A size on its bound loses half of its chi-square: p is that of a chi-bar-square (Self and Liang
+    1987).
     """
     gram = block @ block.T
     top = np.diag(gram).max(initial=0.0)
@@ -157,6 +185,8 @@ def signed_drop(block: np.ndarray, r: np.ndarray, signs: np.ndarray) -> tuple[np
         return drop, chdtrc(1, drop)
     wrong = ((size * signs) < 0).any(axis=1)
     if wrong.any():
-        single = np.where((-side * signs >= 0) | (signs == 0), side**2 / np.maximum(np.diag(gram), 1e-300), 0.0)
+        single = np.where(
+            (-side * signs >= 0) | (signs == 0), side**2 / np.maximum(np.diag(gram), 1e-300), 0.0
+        )
         drop = np.where(wrong, single.max(axis=1), drop)
     return drop, chdtrc(len(signs), drop)

@@ -1,9 +1,11 @@
-"""Derivatives that fall apart by event: P0 and Q0 of an event move its own rows, the parameters move all rows.
+"""Derivatives that fall apart by event: P0 and Q0 of an event move its own rows, the parameters
+move all rows.
 
-A matrix of R rows and k + m E coordinates then has R (k + m) numbers that are not zero, its normal equations E small
-blocks beside one of the parameters. Time and memory grow with the records, and not with their number of events, too.
-The coordinates of an event are taken out of the others by themselves (Frisch and Waugh 1933), and the blocks of the
-normal equations out of the parameters' (Schur's complement).
+A matrix of R rows and k + m E coordinates then has R (k + m) numbers that are not zero, its normal
+equations E small blocks beside one of the parameters. Time and memory grow with the records, and
+not with their number of events, too. The coordinates of an event are taken out of the others by
+themselves (Frisch and Waugh 1933), and the blocks of the normal equations out of the parameters'
+(Schur's complement).
 """
 
 from collections.abc import Sequence
@@ -17,7 +19,8 @@ from tractexp.noise.span import compute_basis
 
 @dataclass(frozen=True, eq=False)
 class SeparableColumns:
-    """Coordinates (E, m) of E events, each of which acts on `rows[e]` (R_e,) only, the indices of its event's rows.
+    """Coordinates (E, m) of E events, each of which acts on `rows[e]` (R_e,) only, the indices of
+    its event's rows.
 
     One simulation moves a coordinate of every event at once and has the differences of all of them.
     """
@@ -27,11 +30,15 @@ class SeparableColumns:
 
     @classmethod
     def of_power(cls, drive: Drive, first: int | None) -> "SeparableColumns":
-        """P0 and Q0 of each event, coordinates from `first` on in the order of the events; None where they are held."""
+        """P0 and Q0 of each event, coordinates from `first` on in the order of the events; None
+        where they are held.
+        """
         index = np.arange(drive.measured.size).reshape(drive.measured.shape)
         rows = tuple(index[:, drive.part(e)].ravel() for e in range(drive.events))
         count = 0 if first is None else 2
-        return cls((first or 0) + np.arange(count * drive.events).reshape(drive.events, count), rows)
+        return cls(
+            (first or 0) + np.arange(count * drive.events).reshape(drive.events, count), rows
+        )
 
     @property
     def count(self) -> int:
@@ -45,7 +52,9 @@ class SeparableColumns:
         return np.flatnonzero(shared)
 
     def moves(self, size: int) -> np.ndarray:
-        """Which of so many coordinates move in each simulation, (k + m, size): first those that act on all rows."""
+        """Which of so many coordinates move in each simulation, (k + m, size): first those that act
+        on all rows.
+        """
         shared = self.shared(size)
         moves = np.zeros((len(shared) + self.count, size))
         moves[np.arange(len(shared)), shared] = 1
@@ -59,7 +68,8 @@ NOT_SEPARABLE = SeparableColumns(np.empty((0, 0), dtype=int), ())
 
 @dataclass(frozen=True, eq=False)
 class Sensitivities:
-    """Derivatives `columns` (k + m, R) of rows to `k` coordinates of all rows, then to the m of each row's own event.
+    """Derivatives `columns` (k + m, R) of rows to `k` coordinates of all rows, then to the m of
+    each row's own event.
 
     Coordinates stand in this order: the k shared ones, then the m of each event.
     """
@@ -80,7 +90,9 @@ class Sensitivities:
     def only(self, coordinates: np.ndarray) -> "Sensitivities":
         """Those to the coordinates that a mask (k + m E,) has; of an event the others are zero."""
         own = self.columns[self.k :].copy()
-        for rows, mine in zip(self.rows, coordinates[self.k :].reshape(len(self.rows), -1), strict=True):
+        for rows, mine in zip(
+            self.rows, coordinates[self.k :].reshape(len(self.rows), -1), strict=True
+        ):
             own[np.ix_(~mine, rows)] = 0.0
         shared = self.columns[: self.k][coordinates[: self.k]]
         return replace(self, columns=np.concatenate([shared, own]), k=len(shared))
@@ -94,7 +106,9 @@ class Sensitivities:
         return changes
 
     def fit(self, rows: np.ndarray) -> np.ndarray:
-        """Changes (b, k + m E) of the coordinates whose changes of the rows are nearest to those of `rows` (b, R)."""
+        """Changes (b, k + m E) of the coordinates whose changes of the rows are nearest to those of
+        `rows` (b, R).
+        """
         free = self._own_basis().without_own(self.columns[: self.k])
         shared = np.linalg.lstsq(free.T, rows.T, rcond=None)[0].T
         left = rows - shared @ self.columns[: self.k]
@@ -107,9 +121,13 @@ class Sensitivities:
         return self._own_basis().without_own(self.columns[: self.k]).T
 
     def basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
-        """Of the rows that they can reach; see `spanned` for what is left out of each event's own."""
+        """Of the rows that they can reach; see `spanned` for what is left out of each
+        event's own.
+        """
         alone = self._own_basis(distinct, least)
-        return replace(alone, shared=compute_basis(alone.without_own(self.columns[: self.k]), distinct, least))
+        return replace(
+            alone, shared=compute_basis(alone.without_own(self.columns[: self.k]), distinct, least)
+        )
 
     def _own_basis(self, distinct: float = 0.0, least: float = 0.0) -> "SeparableBasis":
         own = tuple(compute_basis(self.own(e).T, distinct, least) for e in range(len(self.rows)))
@@ -156,7 +174,8 @@ class SeparableBasis:
 
 @dataclass(frozen=True, eq=False)
 class NormalMatrix:
-    """Gauss-Newton matrices of n lanes: `shared` (n, k, k), `cross` (n, E, m, k) and `own` (n, E, m, m).
+    """Gauss-Newton matrices of n lanes: `shared` (n, k, k), `cross` (n, E, m, k) and `own` (n, E,
+    m, m).
 
     `positions` (k,) and `columns` say which coordinates these are.
     """
@@ -176,7 +195,8 @@ class NormalMatrix:
         return whole
 
     def solve(self, side: np.ndarray, kept: np.ndarray, added: Sequence[np.ndarray]) -> np.ndarray:
-        """Solutions (n, q, D) for a `side` (n, D) and q diagonals, the sum of the `added` (n, q, D).
+        """Solutions (n, q, D) for a `side` (n, D) and q diagonals, the sum of the `added` (n, q,
+        D).
 
         Rows and columns that are not `kept` (n, D) are those of the diagonals alone.
         """

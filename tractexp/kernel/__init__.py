@@ -1,1 +1,3 @@
-"""Kernels: lowered equations as LLVM IR that is written here, compiled, kept, and called with checked arrays."""
+"""Kernels: lowered equations as LLVM IR that is written here, compiled, kept, and called with
+checked arrays.
+"""

@@ -1,18 +1,28 @@
-"""The arithmetic of kernels on arrays of NumPy: what expressions give at some points, without compiling anything."""
+"""The arithmetic of kernels on arrays of NumPy: what expressions give at some points, without
+compiling anything.
+"""
 
 from typing import Any
 
 import numpy as np
 
 COMPARISONS = {
-    "olt": np.less, "ole": np.less_equal, "ogt": np.greater, "oge": np.greater_equal, "oeq": np.equal,
+    "olt": np.less,
+    "ole": np.less_equal,
+    "ogt": np.greater,
+    "oge": np.greater_equal,
+    "oeq": np.equal,
     "une": np.not_equal,
-}  # fmt: skip
+}
 LOGIC = {"and": np.logical_and, "or": np.logical_or, "xor": np.logical_xor}
 INTEGERS = {
-    "add": np.add, "sub": np.subtract, "shl": np.left_shift, "ashr": np.right_shift, "and": np.bitwise_and,
+    "add": np.add,
+    "sub": np.subtract,
+    "shl": np.left_shift,
+    "ashr": np.right_shift,
+    "and": np.bitwise_and,
     "xor": np.bitwise_xor,
-}  # fmt: skip
+}
 CALLS = {"fabs": np.abs, "floor": np.floor, "ceil": np.ceil, "sqrt": np.sqrt}
 
 
@@ -46,7 +56,9 @@ class Arrays:
     def fused(self, a: np.ndarray, b: np.ndarray, c: np.ndarray, flags: str = "") -> np.ndarray:
         return a * b + c
 
-    def polynomial(self, x: np.ndarray, coefficients: tuple[float, ...], flags: str = "") -> np.ndarray:
+    def polynomial(
+        self, x: np.ndarray, coefficients: tuple[float, ...], flags: str = ""
+    ) -> np.ndarray:
         return np.polyval(coefficients, x)
 
     def compare(self, how: str, a: np.ndarray, b: np.ndarray) -> np.ndarray:

@@ -1,12 +1,14 @@
-"""A kernel's IR from lowered equations: many candidates simulated over events, their squared errors summed.
+"""A kernel's IR from lowered equations: many candidates simulated over events, their squared errors
+summed.
 
-Candidates are lanes of vectors. What does not differ between lanes, the inputs at the points in time that a step looks
-at and what follows from them, is computed once an event, many samples at once. Then, block by block of lanes that fit
-the cache, sample by sample and step by step, each group of lanes takes its outputs, its errors and its step, without
-a branch between lanes. Nothing per sample is stored unless asked for.
+Candidates are lanes of vectors. What does not differ between lanes, the inputs at the points in
+time that a step looks at and what follows from them, is computed once an event, many samples at
+once. Then, block by block of lanes that fit the cache, sample by sample and step by step, each
+group of lanes takes its outputs, its errors and its step, without a branch between lanes. Nothing
+per sample is stored unless asked for.
 
-Work space, a group of lanes: a row of `width` doubles each for states, memories, what is constant over an event,
-outputs, sums of squared errors, and by how much the steady state is missed.
+Work space, a group of lanes: a row of `width` doubles each for states, memories, what is constant
+over an event, outputs, sums of squared errors, and by how much the steady state is missed.
 """
 
 import json
@@ -22,11 +24,24 @@ from tractexp.kernel.layout import EVENT, INPUTS, SMOOTH, VECTOR_LANES
 from tractexp.kernel.lowered import Lowered, symbols
 from tractexp.kernel.numbers import Numbers
 
-HALF_WAY = {"classical": 0.5, "printed": 1 / 6}  # of a step: how far the two stages in the middle go along a slope
+# of a step: how far the two stages in the middle go along a slope
+HALF_WAY = {"classical": 0.5, "printed": 1 / 6}
 ARRAYS = (
-    "candidates", "event", "first", "inputs", "measured", "weights", "substeps", "sums", "miss", "outputs", "starts",
-    "work", "points", "signals",
-)  # fmt: skip
+    "candidates",
+    "event",
+    "first",
+    "inputs",
+    "measured",
+    "weights",
+    "substeps",
+    "sums",
+    "miss",
+    "outputs",
+    "starts",
+    "work",
+    "points",
+    "signals",
+)
 SIZES = ("events", "n", "samples", "block", "stored", "started")
 Values = Mapping[Symbol, str]
 Samples = Callable[[str], str]  # an input by its name as a vector of the samples from one on
@@ -50,7 +65,9 @@ class _Emitter:
     def __init__(self, lowered: Lowered, integration: str, width: int):
         self.lowered, self.half_way, self.width = lowered, HALF_WAY[integration], width
         self.given = [*lowered.parameters, _real("P0"), _real("Q0")]
-        self.used = {name: symbols(getattr(lowered, name)) for name in ("derivative", "renewal", "output")}
+        self.used = {
+            name: symbols(getattr(lowered, name)) for name in ("derivative", "renewal", "output")
+        }
         sampled = self.used["renewal"] | self.used["output"]
         lane = [*self.given, *lowered.starts, *lowered.constants]
         self.carried = [s for s in lane if s in sampled | self.used["derivative"]]
@@ -66,9 +83,15 @@ class _Emitter:
 
     def text(self, title: str) -> str:
         room = Room(
-            width=self.width, given=len(self.given), event=len(EVENT), outputs=len(self.lowered.outputs),
-            starts=len(self.lowered.starts), rows=len(self.rows), points=len(self.moving), signals=len(self.signals),
-        )  # fmt: skip
+            width=self.width,
+            given=len(self.given),
+            event=len(EVENT),
+            outputs=len(self.lowered.outputs),
+            starts=len(self.lowered.starts),
+            rows=len(self.rows),
+            points=len(self.moving),
+            signals=len(self.signals),
+        )
         bodies = [*([self._rest()] if self.solves else []), self._run()]
         intrinsics = {name: line for f in self.functions for name, line in f.intrinsics.items()}
         head = [f"; {title}", PREFIX + json.dumps(asdict(room))]
@@ -87,14 +110,22 @@ class _Emitter:
         f, lanes, scalars = self._function()
         lowered, phase = self.lowered, self.lowered.rest
         assert phase is not None
-        scope = {_real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)}
+        scope = {
+            _real(s): lanes.everywhere(scalars.load(f.at("%event", k))) for k, s in enumerate(EVENT)
+        }
         memories = lowered.starts[len(lowered.states) :]
-        scope |= {s: lanes.load(f.at("%given", k * self.width)) for k, s in enumerate((*self.given, *memories))}
+        scope |= {
+            s: lanes.load(f.at("%given", k * self.width))
+            for k, s in enumerate((*self.given, *memories))
+        }
         states = enumerate(lowered.starts[: len(lowered.states)])
         scope |= {s: lanes.load(f.at("%x", k * self.width)) for k, s in states}
         for k, balance in enumerate(Expressions(lanes, scope).of(phase)):
             lanes.store(balance, f.at("%balances", k * self.width))
-        return f.text("define internal void @rest(ptr %event, ptr %given, ptr %x, ptr noalias %balances) nounwind")
+        return f.text(
+            "define internal void @rest(ptr %event, ptr %given, ptr %x, ptr noalias %balances)"
+            " nounwind"
+        )
 
     # All events
 
@@ -104,17 +135,25 @@ class _Emitter:
         self.reachable = f.room("i64", 8)
         memories, states = len(self.lowered.memories), len(self.lowered.states)
         self.copied = f.room(f"[{(len(self.given) + memories) * self.width} x double]")
-        self.solved = f.room(f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]")
+        self.solved = f.room(
+            f"[{(steady.room(states) + len(self.lowered.starts) + 1) * self.width} x double]"
+        )
         with f.loop(0, "%events") as e:
             self.event_at = f.at("%event", f.integer("mul", e, len(EVENT)))
-            self.event = {_real(s): scalars.part(f.at(self.event_at, k), "") for k, s in enumerate(EVENT)}
+            self.event = {
+                _real(s): scalars.part(f.at(self.event_at, k), "") for k, s in enumerate(EVENT)
+            }
             self.begin, self.end = f.count("%first", e), f.count("%first", f.integer("add", e, 1))
             self.substeps = f.count("%substeps", e)
             self._point_pass()
             self._signal_pass()
             with f.loop(0, "%n", "%block") as first:
                 self._block(e, first)
-        arguments = (*(f"ptr noalias %{a}" for a in ARRAYS), "ptr %steady", *(f"i64 %{s}" for s in SIZES))
+        arguments = (
+            *(f"ptr noalias %{a}" for a in ARRAYS),
+            "ptr %steady",
+            *(f"i64 %{s}" for s in SIZES),
+        )
         return f.text(f"define void @run({', '.join(arguments)}) nounwind")
 
     def _block(self, e: str, first: str) -> None:
@@ -165,13 +204,17 @@ class _Emitter:
             f.passage("points"),
         ):
             here, there = self._samples(i), self._samples(i, 1)
-            share = scalars.divide(f.value(f"sitofp i64 {q} to double"), f.value(f"sitofp i64 {per_sample} to double"))
+            share = scalars.divide(
+                f.value(f"sitofp i64 {q} to double"), f.value(f"sitofp i64 {per_sample} to double")
+            )
             x, scope = self.lanes.everywhere(share), dict(event)
             for symbol in self.lowered.inputs:
                 scope[symbol] = self._between(symbol.name, here, there, x, step)
             values = Expressions(self.lanes, scope)
             scope |= {s: values(e) for s, e in self.lowered.derivative.signals}
-            place = f.integer("add", f.integer("mul", f.integer("sub", i, self.begin), per_sample), q)
+            place = f.integer(
+                "add", f.integer("mul", f.integer("sub", i, self.begin), per_sample), q
+            )
             self._scatter([scope[s] for s in self.moving], "%points", place, per_sample, count)
 
     def _signal_pass(self) -> None:
@@ -186,8 +229,12 @@ class _Emitter:
             signals = [values(e) for e in self.signals.values()]
             self._scatter(signals, "%signals", f.integer("sub", i, self.begin), 1, len(signals))
 
-    def _scatter(self, values: Sequence[str], array: str, place: str, apart: object, count: int) -> None:
-        """Lanes of values written side by side: those of sample k at the row `place` + k `apart` of `count` each."""
+    def _scatter(
+        self, values: Sequence[str], array: str, place: str, apart: object, count: int
+    ) -> None:
+        """Lanes of values written side by side: those of sample k at the row `place` + k `apart` of
+        `count` each.
+        """
         f = self.f
         for k in range(self.width):
             row = f.integer("add", place, f.integer("mul", apart, k)) if k else place
@@ -196,7 +243,9 @@ class _Emitter:
                 f.do(f"store double {self.lanes.lane(value, k)}, ptr {f.at(address, j)}, align 8")
 
     def _between(self, name: str, here: Samples, there: Samples, x: str, step: str) -> str:
-        """An input by x from one sample to the next: on the cubic of its slopes, or on a straight line."""
+        """An input by x from one sample to the next: on the cubic of its slopes, or on a straight
+        line.
+        """
         n = self.lanes
         rates = {rate: smooth for smooth, rate in SMOOTH.items()}
         smooth = rates.get(name, name)
@@ -205,7 +254,9 @@ class _Emitter:
         a, b = here(smooth), there(smooth)
         da, db = (n.multiply(step, end(SMOOTH[smooth])) for end in (here, there))
         rise = n.subtract(b, a)
-        square = n.subtract(n.subtract(n.multiply(n.constant(3.0), rise), n.multiply(n.constant(2.0), da)), db)
+        square = n.subtract(
+            n.subtract(n.multiply(n.constant(3.0), rise), n.multiply(n.constant(2.0), da)), db
+        )
         cube = n.subtract(n.add(da, db), n.multiply(n.constant(2.0), rise))
         if name == smooth:
             return n.fused(x, n.fused(x, n.fused(x, cube, square), da), a)
@@ -215,7 +266,9 @@ class _Emitter:
     # Before an event
 
     def _start(self, e: str, first: str, group: str) -> None:
-        """States, constants and misses of a group of lanes, the last candidate repeated where lanes are left over."""
+        """States, constants and misses of a group of lanes, the last candidate repeated where lanes
+        are left over.
+        """
         f, n, lowered = self.f, self.lanes, self.lowered
         self._copy_candidates(e, first)
         scope = {s: n.everywhere(value) for s, value in self.event.items()}
@@ -229,8 +282,14 @@ class _Emitter:
         scope |= zip(lowered.starts, starts, strict=True)
         scope |= zip(lowered.constants, Expressions(n, scope).of(lowered.constant), strict=True)
         zero = n.constant(0.0)
-        begin: dict[object, str] = dict(zip((*lowered.states, *lowered.memories), starts, strict=True))
-        begin |= {s: scope[s] for s in self.carried} | {f"_sum_{o}": zero for o in lowered.outputs} | {"_miss": miss}
+        begin: dict[object, str] = dict(
+            zip((*lowered.states, *lowered.memories), starts, strict=True)
+        )
+        begin |= (
+            {s: scope[s] for s in self.carried}
+            | {f"_sum_{o}": zero for o in lowered.outputs}
+            | {"_miss": miss}
+        )
         for name, value in begin.items():
             n.store(value, self._row(group, name))
         good = f.value(f"zext i1 {n.some(n.compare('ole', miss, zero))} to i64")
@@ -242,7 +301,10 @@ class _Emitter:
         last = f.integer("sub", "%n", 1)
         source = f.at("%candidates", f.integer("mul", f.integer("mul", e, count), "%n"))
         with f.loop(0, self.width, always=True) as lane:
-            candidate, target = f.at(source, f.smaller(f.integer("add", first, lane), last)), f.at(self.copied, lane)
+            candidate, target = (
+                f.at(source, f.smaller(f.integer("add", first, lane), last)),
+                f.at(self.copied, lane),
+            )
             for k in range(count):
                 value = self._double(f.at(candidate, f.integer("mul", "%n", k)))
                 f.do(f"store double {value}, ptr {f.at(target, k * self.width)}, align 8")
@@ -268,16 +330,21 @@ class _Emitter:
         for k, value in enumerate(starts[:states]):
             n.store(value, f.at(x, k * self.width))
         f.do(
-            f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr {left}, ptr {work},"
+            f"call void %steady(ptr @rest, ptr {self.event_at}, ptr {self.copied}, ptr {x}, ptr"
+            f" {left}, ptr {work},"
             f" i64 {states})"
         )
         solution = [n.load(f.at(x, k * self.width)) for k in range(states)]
-        return [*solution, *starts[states:]], n.smaller(n.add(miss, n.load(left)), n.constant(steady.LARGEST_MISS))
+        return [*solution, *starts[states:]], n.smaller(
+            n.add(miss, n.load(left)), n.constant(steady.LARGEST_MISS)
+        )
 
     # A sample and its steps
 
     def _sample(self, i: str) -> None:
-        """Outputs and errors at sample i, and the steps to the next; the last one's step is computed in vain."""
+        """Outputs and errors at sample i, and the steps to the next; the last one's step is
+        computed in vain.
+        """
         f, states = self.f, bool(self.lowered.states)
         self.i, local = i, f.integer("sub", i, self.begin)
         self.signal_at = f.at("%signals", f.integer("mul", local, len(self.signals)))
@@ -287,13 +354,21 @@ class _Emitter:
             return
         last = f.value(f"icmp eq i64 {f.integer('add', i, 1)}, {self.end}")
         steps = f.value(f"select i1 {last}, i64 1, i64 {self.substeps}")
-        length = self.scalars.divide(self.event[_real("step")], f.value(f"sitofp i64 {self.substeps} to double"))
+        length = self.scalars.divide(
+            self.event[_real("step")], f.value(f"sitofp i64 {self.substeps} to double")
+        )
         with f.loop(0, steps, always=True) as j:
-            row = f.integer("mul", f.integer("add", f.integer("mul", local, self.substeps), j), 2 * len(self.moving))
+            row = f.integer(
+                "mul",
+                f.integer("add", f.integer("mul", local, self.substeps), j),
+                2 * len(self.moving),
+            )
             points = self._points(f.at("%points", row))
             first = f.value(f"icmp eq i64 {j}, 0")
             ahead = {
-                share: self.lanes.everywhere(self.scalars.multiply(self.scalars.constant(share), length))
+                share: self.lanes.everywhere(
+                    self.scalars.multiply(self.scalars.constant(share), length)
+                )
                 for share in (self.half_way, 1.0, 1 / 6)
             }
             with f.loop(0, self.groups, always=True) as g, f.passage("step"):
@@ -302,7 +377,10 @@ class _Emitter:
     def _points(self, address: str) -> list[dict[Symbol, str]]:
         """What is the same in all lanes at the beginning, the middle and the end of a step."""
         count = len(self.moving)
-        return [{s: self._wide(self.f.at(address, k * count + j)) for j, s in enumerate(self.moving)} for k in range(3)]
+        return [
+            {s: self._wide(self.f.at(address, k * count + j)) for j, s in enumerate(self.moving)}
+            for k in range(3)
+        ]
 
     def _wide(self, address: str) -> str:
         return self.lanes.everywhere(self._double(address))
@@ -310,8 +388,12 @@ class _Emitter:
     def _double(self, address: str) -> str:
         return self.f.fresh(f"load double, ptr {address}, align 8")
 
-    def _step(self, group: str, first: str, points: Sequence[Values], ahead: Mapping[float, str]) -> None:
-        """A step of four stages, Eq. (4), by shares `ahead` of its length; before the first of a sample its outputs."""
+    def _step(
+        self, group: str, first: str, points: Sequence[Values], ahead: Mapping[float, str]
+    ) -> None:
+        """A step of four stages, Eq. (4), by shares `ahead` of its length; before the first of a
+        sample its outputs.
+        """
         f, n, lowered = self.f, self.lanes, self.lowered
         y = [n.load(self._row(group, s)) for s in lowered.states]
         scope = self._read(group, (s for s in self.carried if s in self.used["derivative"]))
@@ -322,14 +404,18 @@ class _Emitter:
             return Expressions(n, at).of(lowered.derivative)
 
         def along(states: Sequence[str], share: float, slopes: Sequence[str]) -> list[str]:
-            return [n.fused(ahead[share], slope, s) for s, slope in zip(states, slopes, strict=True)]
+            return [
+                n.fused(ahead[share], slope, s) for s, slope in zip(states, slopes, strict=True)
+            ]
 
         a, b, c = points
         k1 = [] if lowered.memories else slope("slope at the beginning", y, a)
         with f.when(first), f.passage("outputs"):
             self._outputs(group, scope | dict(zip(lowered.states, y, strict=True)))
         if lowered.memories:
-            scope |= self._read(group, (m for m in lowered.memories if m in self.used["derivative"]))
+            scope |= self._read(
+                group, (m for m in lowered.memories if m in self.used["derivative"])
+            )
             k1 = slope("slope at the beginning", y, a)
         k2 = slope("first slope in the middle", along(y, self.half_way, k1), b)
         k3 = slope("second slope in the middle", along(y, self.half_way, k2), b)
@@ -350,18 +436,24 @@ class _Emitter:
         for s in lowered.inputs:
             if s in used:
                 scope[s] = self._wide(f.at(self._input(s.name), self.i))
-        scope |= {s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used}
+        scope |= {
+            s: self._wide(f.at(self.signal_at, j)) for j, s in enumerate(self.signals) if s in used
+        }
         if lowered.memories:
             renewed = Expressions(n, scope).of(lowered.renewal)
             scope |= zip(lowered.memories, renewed, strict=True)
             for symbol, value in zip(lowered.memories, renewed, strict=True):
                 n.store(value, self._row(group, symbol))
-        for c, (name, value) in enumerate(zip(lowered.outputs, Expressions(n, scope).of(lowered.output), strict=True)):
+        for c, (name, value) in enumerate(
+            zip(lowered.outputs, Expressions(n, scope).of(lowered.output), strict=True)
+        ):
             n.store(value, self._row(group, f"_{name}"))
             place = f.integer("add", f.integer("mul", "%samples", c), self.i)
             off = n.subtract(self._wide(f.at("%measured", place)), value)
             row = self._row(group, f"_sum_{name}")
-            n.store(n.fused(n.multiply(self._wide(f.at("%weights", place)), off), off, n.load(row)), row)
+            n.store(
+                n.fused(n.multiply(self._wide(f.at("%weights", place)), off), off, n.load(row)), row
+            )
 
     def _input(self, name: str) -> str:
         return self.f.at("%inputs", self.f.integer("mul", "%samples", INPUTS.index(name)))
@@ -380,15 +472,25 @@ class _Emitter:
         f = self.f
         for c, name in enumerate(self.lowered.outputs):
             row = f.integer("add", f.integer("mul", "%n", c), f.integer("add", first, lane))
-            self._copy(lane, f"_{name}", f.at("%outputs", f.integer("add", f.integer("mul", row, "%samples"), i)))
+            self._copy(
+                lane,
+                f"_{name}",
+                f.at("%outputs", f.integer("add", f.integer("mul", row, "%samples"), i)),
+            )
 
     def _store_sums(self, e: str, first: str, lane: str) -> None:
         """sums (E, C, n) and miss (E, n)."""
         f, count, candidate = self.f, len(self.lowered.outputs), self.f.integer("add", first, lane)
         for c, name in enumerate(self.lowered.outputs):
             row = f.integer("add", f.integer("mul", e, count), c)
-            self._copy(lane, f"_sum_{name}", f.at("%sums", f.integer("add", f.integer("mul", row, "%n"), candidate)))
-        self._copy(lane, "_miss", f.at("%miss", f.integer("add", f.integer("mul", e, "%n"), candidate)))
+            self._copy(
+                lane,
+                f"_sum_{name}",
+                f.at("%sums", f.integer("add", f.integer("mul", row, "%n"), candidate)),
+            )
+        self._copy(
+            lane, "_miss", f.at("%miss", f.integer("add", f.integer("mul", e, "%n"), candidate))
+        )
 
     def _store_starts(self, e: str, first: str, starts: Sequence[str]) -> None:
         """starts (E, K, n)."""

@@ -14,11 +14,17 @@ from tractexp.kernel.graph import Symbol
 from tractexp.kernel.lowered import Phase
 
 RELATIONS = {
-    sympy.StrictLessThan: "olt", sympy.LessThan: "ole", sympy.StrictGreaterThan: "ogt", sympy.GreaterThan: "oge",
-    sympy.Equality: "oeq", sympy.Unequality: "une",
-}  # fmt: skip
+    sympy.StrictLessThan: "olt",
+    sympy.LessThan: "ole",
+    sympy.StrictGreaterThan: "ogt",
+    sympy.GreaterThan: "oge",
+    sympy.Equality: "oeq",
+    sympy.Unequality: "une",
+}
 NAMES = ("exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "atan2", "sinh", "cosh", "tanh")
-OURS: dict[type, Callable[..., Any]] = {getattr(sympy, name): getattr(lanes, name) for name in NAMES}
+OURS: dict[type, Callable[..., Any]] = {
+    getattr(sympy, name): getattr(lanes, name) for name in NAMES
+}
 LLVMS = {sympy.Abs: "fabs", sympy.floor: "floor", sympy.ceiling: "ceil"}
 HALF = sympy.Rational(1, 2)
 
@@ -77,19 +83,24 @@ class Expressions:
             return n.select(n.compare("ogt", x, zero), n.constant(above), rest)
         functions = ", ".join(sorted(kind.__name__ for kind in (*OURS, *LLVMS)))
         raise UserError(
-            f"the equations contain {type(e).__name__}, in {e}, which kernels cannot compute; write it by sums,"
+            f"the equations contain {type(e).__name__}, in {e}, which kernels cannot compute; write"
+            " it by sums,"
             f" products, powers, Max, Min, Piecewise, sign, Heaviside or {functions}"
         )
 
     # Sums, products, powers
 
     def _sum(self, terms: Sequence[sympy.Basic]) -> Any:
-        """Single terms first, then the products one by one: each a fused multiplication and addition."""
+        """Single terms first, then the products one by one: each a fused multiplication and
+        addition.
+        """
         single, products = [], []
         for term in terms:
             coefficient, rest = term.as_coeff_Mul()  # type: ignore[attr-defined]
             item = bool(coefficient < 0), abs(coefficient), rest
-            fuses = isinstance(rest, sympy.Mul) or (coefficient not in (1, -1) and rest is not sympy.S.One)
+            fuses = isinstance(rest, sympy.Mul) or (
+                coefficient not in (1, -1) and rest is not sympy.S.One
+            )
             (products if fuses else single).append(item)
         items = sorted(single, key=itemgetter(0)) + sorted(products, key=itemgetter(0))
         first = next((k for k, item in enumerate(items) if not item[0]), 0)
@@ -107,7 +118,11 @@ class Expressions:
         """A coefficient times factors, over the product of those that divide."""
         n, above, below = self.numbers, [], []
         for factor in sympy.Mul.make_args(rest):
-            if isinstance(factor, sympy.Pow) and isinstance(factor.exp, sympy.Number) and factor.exp.is_negative:
+            if (
+                isinstance(factor, sympy.Pow)
+                and isinstance(factor.exp, sympy.Number)
+                and factor.exp.is_negative
+            ):
                 below.append((factor.base, -factor.exp))
             elif factor is not sympy.S.One:
                 above.append(factor)
@@ -132,7 +147,9 @@ class Expressions:
         if base == sympy.E:
             return lanes.exp(n, self(exponent))
         if not isinstance(exponent, sympy.Number):
-            raise UserError(f"{base}**({exponent}) reached a kernel; powers of symbols are exponentials there")
+            raise UserError(
+                f"{base}**({exponent}) reached a kernel; powers of symbols are exponentials there"
+            )
         if exponent.is_negative:
             return n.divide(n.constant(1.0), self._power(base, -exponent))
         x, whole = self(base), math.floor(exponent)
@@ -170,7 +187,9 @@ class Expressions:
             expression, condition = piece.args
             there = self(expression)
             always = condition == sympy.true
-            value = there if always else self.numbers.select(self._condition(condition), there, value)
+            value = (
+                there if always else self.numbers.select(self._condition(condition), there, value)
+            )
         return value
 
     def _condition(self, condition: Boolean | sympy.Basic) -> Any:
@@ -183,10 +202,13 @@ class Expressions:
             return n.logic("xor", self._condition(condition.args[0]), n.truth(True))
         if isinstance(condition, sympy.And | sympy.Or):
             operation = "and" if isinstance(condition, sympy.And) else "or"
-            first, *others = (self._condition(a) for a in sorted(condition.args, key=sympy.default_sort_key))
+            first, *others = (
+                self._condition(a) for a in sorted(condition.args, key=sympy.default_sort_key)
+            )
             for other in others:
                 first = n.logic(operation, first, other)
             return first
         raise UserError(
-            f"the equations contain the condition {condition}, which kernels cannot decide; compare numbers"
+            f"the equations contain the condition {condition}, which kernels cannot decide; compare"
+            " numbers"
         )

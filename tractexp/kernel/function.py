@@ -1,7 +1,8 @@
 """The text of one function in LLVM IR while it is written, its values numbered.
 
-What was computed before on every way to a place is not computed twice there: values are known by their operation, in
-scopes that open and close with loops and branches. So no expression has to be searched for common parts beforehand.
+What was computed before on every way to a place is not computed twice there: values are known by
+their operation, in scopes that open and close with loops and branches. So no expression has to be
+searched for common parts beforehand.
 """
 
 from collections.abc import Iterator
@@ -27,7 +28,9 @@ class Function:
     # Values
 
     def value(self, operation: str) -> str:
-        """The value of an operation that depends on its operands alone: the one already there, or a new one."""
+        """The value of an operation that depends on its operands alone: the one already there, or a
+        new one.
+        """
         for scope in reversed(self._scopes):
             if operation in scope:
                 return scope[operation]
@@ -35,7 +38,9 @@ class Function:
         return name
 
     def fresh(self, operation: str) -> str:
-        """A new value, of an operation that may give another one each time, such as reading memory."""
+        """A new value, of an operation that may give another one each time, such as
+        reading memory.
+        """
         name = self._name("v")
         self.lines.append(f"  {name} = {operation}")
         return name
@@ -71,21 +76,34 @@ class Function:
 
     def at(self, address: str, index: object) -> str:
         """The address `index` doubles further."""
-        return address if index == 0 else self.value(f"getelementptr double, ptr {address}, i64 {index}")
+        return (
+            address
+            if index == 0
+            else self.value(f"getelementptr double, ptr {address}, i64 {index}")
+        )
 
     def count(self, address: str, index: object) -> str:
         """The integer there, of an array that does not change."""
-        return self.value(f"load i64, ptr {self.value(f'getelementptr i64, ptr {address}, i64 {index}')}, align 8")
+        return self.value(
+            f"load i64, ptr {self.value(f'getelementptr i64, ptr {address}, i64 {index}')}, align 8"
+        )
 
     def address(self, addresses: str, index: int) -> str:
         """The address there, of an array that does not change."""
-        return self.value(f"load ptr, ptr {self.value(f'getelementptr ptr, ptr {addresses}, i64 {index}')}, align 8")
+        return self.value(
+            f"load ptr, ptr {self.value(f'getelementptr ptr, ptr {addresses}, i64 {index}')}, align"
+            " 8"
+        )
 
     # Control
 
     @contextmanager
-    def loop(self, start: object, stop: object, step: object = 1, always: bool = False) -> Iterator[str]:
-        """A loop over integers from `start` to below `stop`; `always`: the first time without asking."""
+    def loop(
+        self, start: object, stop: object, step: object = 1, always: bool = False
+    ) -> Iterator[str]:
+        """A loop over integers from `start` to below `stop`; `always`: the first time without
+        asking.
+        """
         i, after, head, end = self._name("i"), self._name("i"), self._label(), self._label()
         before = self._block
         self.do(f"br label %{head}")
@@ -94,7 +112,9 @@ class Function:
         self.lines.append("")
         if not always:
             inside = self._label()
-            self.do(f"br i1 {self.fresh(f'icmp slt i64 {i}, {stop}')}, label %{inside}, label %{end}")
+            self.do(
+                f"br i1 {self.fresh(f'icmp slt i64 {i}, {stop}')}, label %{inside}, label %{end}"
+            )
             self._begin(inside)
         self._scopes.append({})
         yield i
@@ -102,7 +122,9 @@ class Function:
         self.do(f"{after} = add nsw i64 {i}, {step}")
         last = self._block
         if always:
-            self.do(f"br i1 {self.fresh(f'icmp slt i64 {after}, {stop}')}, label %{head}, label %{end}")
+            self.do(
+                f"br i1 {self.fresh(f'icmp slt i64 {after}, {stop}')}, label %{head}, label %{end}"
+            )
         else:
             self.do(f"br label %{head}")
         self.lines[phi] = f"  {i} = phi i64 [ {start}, %{before} ], [ {after}, %{last} ]"

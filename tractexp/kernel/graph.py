@@ -1,14 +1,15 @@
 """Expressions as graphs: what occurs a thousand times in a nested expression is looked at once.
 
-SymPy walks an expression as a tree. The steady state of a double cage, Newton's steps put into each other, is a small
-graph and a tree of millions.
+SymPy walks an expression as a tree. The steady state of a double cage, Newton's steps put into each
+other, is a small graph and a tree of millions.
 """
 
 from collections.abc import Iterator
 
 import sympy
 
-Basic = sympy.Basic  # by name: type checkers take what is imported from an untyped package for unknown
+# by name: type checkers take what is imported from an untyped package for unknown
+Basic = sympy.Basic
 Symbol = sympy.Symbol
 
 

@@ -1,4 +1,6 @@
-"""A kernel to call: the arrays it is given are looked at first, since machine code looks at none."""
+"""A kernel to call: the arrays it is given are looked at first, since machine code
+looks at none.
+"""
 
 import ctypes
 import functools
@@ -12,7 +14,8 @@ import numpy as np
 from tractexp.kernel import objects, steady
 from tractexp.kernel.layout import INPUTS, LANES
 
-FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 15, *[ctypes.c_int64] * 6)  # releases Python's lock
+# releases Python's lock
+FUNCTION = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 15, *[ctypes.c_int64] * 6)
 VECTOR = 64  # bytes: a vector across two cache lines would take twice the time
 NOTHING = np.empty((0, 0, 0))
 NUMBERS, WHOLE = np.dtype(np.float64), np.dtype(np.int64)
@@ -21,7 +24,9 @@ PREFIX = "; room "  # of the line of a kernel's text that tells its `Room`
 
 @dataclass(frozen=True)
 class Room:
-    """What a call needs beside its arrays: numbers of each candidate, of each event, and of the work space."""
+    """What a call needs beside its arrays: numbers of each candidate, of each event, and of the
+    work space.
+    """
 
     width: int  # lanes of a vector
     given: int  # of each candidate: its parameters, then P0 and Q0
@@ -66,16 +71,18 @@ class Kernel:
     ) -> None:
         """Simulate candidates over events and sum their weighted squared errors.
 
-        candidates (E, given, n): parameters, then P0 and Q0; event (E, columns as in EVENT); first (E + 1,) where each
-        event begins in the samples; inputs (rows as in INPUTS or its first five, N); measured, weights (C, N);
-        substeps (E,) Runge-Kutta steps a sample. Written are sums (E, C, n), miss (E, n), and, unless they are empty,
-        outputs (C, n, N) and starts (E, K, n): states and memories before the event. All are C-contiguous, of
-        float64, `first` and `substeps` of int64. Raises `ValueError` for anything else.
+        candidates (E, given, n): parameters, then P0 and Q0; event (E, columns as in EVENT); first
+        (E + 1,) where each event begins in the samples; inputs (rows as in INPUTS or its first
+        five, N); measured, weights (C, N); substeps (E,) Runge-Kutta steps a sample. Written are
+        sums (E, C, n), miss (E, n), and, unless they are empty, outputs (C, n, N) and starts (E, K,
+        n): states and memories before the event. All are C-contiguous, of float64, `first` and
+        `substeps` of int64. Raises `ValueError` for anything else.
         """
         room = self.room
         if candidates.ndim != 3 or inputs.ndim != 2 or inputs.shape[0] not in (5, len(INPUTS)):
             raise ValueError(
-                f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events, {room.given},"
+                f"candidates {candidates.shape} and inputs {inputs.shape} must have shapes (events,"
+                f" {room.given},"
                 f" n) and (5 or {len(INPUTS)}, samples)"
             )
         (events, _, n), samples = candidates.shape, inputs.shape[1]
@@ -99,26 +106,50 @@ class Kernel:
         further = _address(outputs) if stored else 0, _address(starts) if started else 0
         function, _, newton = self._function
         function(
-            *map(_address, arrays), *further, work, points, signals, newton,
-            events, n, samples, block, stored, started,
-        )  # fmt: skip
+            *map(_address, arrays),
+            *further,
+            work,
+            points,
+            signals,
+            newton,
+            events,
+            n,
+            samples,
+            block,
+            stored,
+            started,
+        )
         del space  # not before the call has ended
 
     def starts(self, candidates: np.ndarray, event: np.ndarray) -> np.ndarray:
-        """States and memories before the events (E, K, n); candidates and event as `run` takes them."""
+        """States and memories before the events (E, K, n); candidates and event as `run` takes
+        them.
+        """
         events, _, n = candidates.shape
         none, whole = np.empty((0, 0)), np.zeros(events + 1, dtype=np.int64)
         room = self.room
         starts = np.empty((events, room.starts, n))
         self.run(
-            candidates, event, whole, none.reshape(len(INPUTS), 0), none.reshape(room.outputs, 0),
-            none.reshape(room.outputs, 0), whole[1:] + 1, np.empty((events, room.outputs, n)), np.empty((events, n)),
-            NOTHING, starts,
-        )  # fmt: skip
+            candidates,
+            event,
+            whole,
+            none.reshape(len(INPUTS), 0),
+            none.reshape(room.outputs, 0),
+            none.reshape(room.outputs, 0),
+            whole[1:] + 1,
+            np.empty((events, room.outputs, n)),
+            np.empty((events, n)),
+            NOTHING,
+            starts,
+        )
         return starts
 
-    def _space(self, n: int, lengths: list[tuple[int, int]]) -> tuple[int, int, int, int, np.ndarray]:
-        """Lanes of a block, addresses of work space, points and signals, and the array in which they lie."""
+    def _space(
+        self, n: int, lengths: list[tuple[int, int]]
+    ) -> tuple[int, int, int, int, np.ndarray]:
+        """Lanes of a block, addresses of work space, points and signals, and the array in which
+        they lie.
+        """
         room, width = self.room, self.room.width
         groups = -(-n // width)
         blocks = max(-(-groups * width // LANES), 1)
@@ -127,7 +158,10 @@ class Kernel:
         points = signals = 0
         for length, steps in lengths:
             whole = -(-length // width) * width
-            points, signals = max(points, room.points * (2 * steps * whole + 1)), max(signals, room.signals * whole)
+            points, signals = (
+                max(points, room.points * (2 * steps * whole + 1)),
+                max(signals, room.signals * whole),
+            )
         space = np.empty(work + points + signals + VECTOR // 8)
         address = -(-_address(space) // VECTOR) * VECTOR
         return block, address, address + 8 * work, address + 8 * (work + points), space
@@ -138,12 +172,15 @@ def _check(name: str, array: np.ndarray, shape: tuple[int, ...], kind: np.dtype 
         return
     order = "" if array.flags.c_contiguous else ", not C-contiguous"
     raise ValueError(
-        f"a kernel's {name} is {array.dtype} {array.shape}{order}; it must be {kind} {shape}, C-contiguous"
+        f"a kernel's {name} is {array.dtype} {array.shape}{order}; it must be {kind} {shape},"
+        " C-contiguous"
     )
 
 
 def _address(array: np.ndarray) -> int:
-    """Where its first element lies; a third of the time that `array.ctypes` takes, where the array can be written."""
+    """Where its first element lies; a third of the time that `array.ctypes` takes, where the array
+    can be written.
+    """
     try:
         return ctypes.addressof(ctypes.c_char.from_buffer(array))  # pyright: ignore[reportArgumentType] # it is a buffer
     except (TypeError, ValueError):  # of what is empty or must not be written
@@ -151,10 +188,14 @@ def _address(array: np.ndarray) -> int:
 
 
 def _lengths(first: list[int], substeps: list[int], samples: int) -> list[tuple[int, int]]:
-    """Samples and steps a sample of each event. Raises `ValueError` where they point outside the arrays."""
+    """Samples and steps a sample of each event. Raises `ValueError` where they point outside the
+    arrays.
+    """
     lengths = [end - begin for begin, end in itertools.pairwise(first)]
     if first[0] < 0 or first[-1] > samples or any(length < 0 for length in lengths):
-        raise ValueError(f"a kernel's first = {first} must rise from 0 at least to at most the {samples} samples")
+        raise ValueError(
+            f"a kernel's first = {first} must rise from 0 at least to at most the {samples} samples"
+        )
     if any(steps < 1 for steps in substeps):
         raise ValueError(f"a kernel's substeps = {substeps}: each must be 1 or more")
     return list(zip(lengths, substeps, strict=True))

@@ -15,10 +15,16 @@ def equations(lowered: "Lowered") -> Iterator[str]:
     """The equations as they were lowered, a line each, by when they are computed."""
     yield from _phase("before the event", [f"{s}" for s in lowered.starts], lowered.start)
     if lowered.rest is not None:
-        yield from _phase("zero before the event", [f"balance {s}" for s in lowered.states], lowered.rest)
+        yield from _phase(
+            "zero before the event", [f"balance {s}" for s in lowered.states], lowered.rest
+        )
     yield from _phase("over an event", [f"{s}" for s in lowered.constants], lowered.constant)
-    yield from _phase("in each stage of a step", [f"d {s}/dt" for s in lowered.states], lowered.derivative)
-    yield from _phase("at each sample, memories", [f"{s}" for s in lowered.memories], lowered.renewal)
+    yield from _phase(
+        "in each stage of a step", [f"d {s}/dt" for s in lowered.states], lowered.derivative
+    )
+    yield from _phase(
+        "at each sample, memories", [f"{s}" for s in lowered.memories], lowered.renewal
+    )
     yield from _phase("at each sample", list(lowered.outputs), lowered.output)
 
 
@@ -28,7 +34,10 @@ def _phase(when: str, names: Sequence[str], phase: "Phase") -> Iterator[str]:
     yield f"{when}:"
     yield from (f"  {s} = {_print_expression(e)}" for s, e in (*phase.signals, *phase.steps))
     slacks = (f"slack {k}" for k in range(1, len(phase.expressions) - len(names) + 1))
-    yield from (f"  {name} = {_print_expression(e)}" for name, e in zip((*names, *slacks), phase.expressions, strict=True))
+    yield from (
+        f"  {name} = {_print_expression(e)}"
+        for name, e in zip((*names, *slacks), phase.expressions, strict=True)
+    )
 
 
 def _print_expression(expression: "sympy.Expr") -> str:

@@ -1,4 +1,6 @@
-"""What a kernel is made of: lowered equations, in real arithmetic, by when they must be computed."""
+"""What a kernel is made of: lowered equations, in real arithmetic, by when they must
+be computed.
+"""
 
 from dataclasses import dataclass
 
@@ -29,7 +31,8 @@ class Lowered:
     memories: tuple[Symbol, ...]
     starts: tuple[Symbol, ...]  # states and memories before the event
     start: Phase  # states and memories before the event, then the slack of each requirement
-    rest: Phase | None  # what vanishes before the event, where the start is only a guess: always with an effect
+    # what vanishes before the event, where the start is only a guess: always with an effect
+    rest: Phase | None
     constants: tuple[Symbol, ...]
     constant: Phase  # their values, which hold for a whole event
     derivative: Phase

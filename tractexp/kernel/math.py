@@ -1,7 +1,8 @@
 """Elementary functions on lanes: without a branch, without a call, the same bits in every lane.
 
-Errors are relative unless said otherwise, and tested against the C library's. `n` is the arithmetic, of lanes
-(`numbers.Numbers`) or of arrays (`arrays.Arrays`), and arguments and results are its values.
+Errors are relative unless said otherwise, and tested against the C library's. `n` is the
+arithmetic, of lanes (`numbers.Numbers`) or of arrays (`arrays.Arrays`), and arguments and results
+are its values.
 """
 
 import math
@@ -9,16 +10,27 @@ from typing import Any
 
 from tractexp.kernel.numbers import ORDERED
 
-ROUNDING_ADDEND = 6755399441055744.0  # 1.5 * 2**52: added, it rounds, and leaves the integer in the lowest bits
+# 1.5 * 2**52: added, it rounds, and leaves the integer in the lowest bits
+ROUNDING_ADDEND = 6755399441055744.0
 ROUNDING_ADDEND_BITS = 0x4338000000000000  # its bits
-EXP = (  # 1 + x and eight terms more, of the least relative error, 1.7e-14, between -ln(2)/2 and ln(2)/2
-    2.749308719602412e-06, 2.4880795102015093e-05, 0.00019841538962672454, 0.0013888811173253205,
-    0.008333333095244361, 0.0416666669620825, 0.1666666666726472, 0.49999999999664546, 1.0, 1.0,
-)  # fmt: skip
+# 1 + x and eight terms more, of the least relative error, 1.7e-14, between -ln(2)/2 and ln(2)/2
+EXP = (
+    2.749308719602412e-06,
+    2.4880795102015093e-05,
+    0.00019841538962672454,
+    0.0013888811173253205,
+    0.008333333095244361,
+    0.0416666669620825,
+    0.1666666666726472,
+    0.49999999999664546,
+    1.0,
+    1.0,
+)
 ATANH = tuple(1.0 / k for k in range(17, 0, -2))
 ROOT_HALF = 0x3FE6A09E667F3BCD  # bits of sqrt(1/2)
 ONE = 1023 << 52  # bits of 1
-# pi/2 in three parts, the first two of 33 bits: their products with whole numbers below 2**20 are exact
+# pi/2 in three parts, the first two of 33 bits: their products with whole numbers below 2**20 are
+# exact
 QUARTER = (1.5707963267341256, 6.077100506303966e-11, 2.0222662487959506e-21)
 SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(8, 0, -1))
 COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in range(8, 1, -1))
@@ -36,14 +48,19 @@ def exp(n: Any, x: Any) -> Any:
 
 
 def log(n: Any, x: Any) -> Any:
-    """ln x, error below 1e-14 of the larger of 1 and itself; -709 at 0, nan stays nan. Of x < 0 it has no meaning."""
+    """ln x, error below 1e-14 of the larger of 1 and itself; -709 at 0, nan stays nan. Of x < 0 it
+    has no meaning.
+    """
     c = n.constant
     bits = n.as_bits(x)
     two = n.integer("ashr", n.integer("sub", bits, n.whole(ROOT_HALF)), n.whole(52))
-    m = n.of_bits(n.integer("sub", bits, n.integer("shl", two, n.whole(52))))  # from sqrt(1/2) to sqrt(2)
+    # from sqrt(1/2) to sqrt(2)
+    m = n.of_bits(n.integer("sub", bits, n.integer("shl", two, n.whole(52))))
     s = n.divide(n.subtract(m, c(1.0)), n.add(m, c(1.0)))
     odd = n.multiply(n.multiply(c(2.0), s), n.polynomial(n.multiply(s, s), ATANH))
-    exponent = n.subtract(n.of_bits(n.integer("add", two, n.whole(ROUNDING_ADDEND_BITS))), c(ROUNDING_ADDEND), ORDERED)
+    exponent = n.subtract(
+        n.of_bits(n.integer("add", two, n.whole(ROUNDING_ADDEND_BITS))), c(ROUNDING_ADDEND), ORDERED
+    )
     spoilt = n.subtract(x, x, ORDERED)  # nan of nan and infinity, else 0
     return n.add(n.fused(exponent, c(math.log(2)), odd), spoilt, ORDERED)
 
@@ -82,9 +99,23 @@ def _wave(n: Any, x: Any, ahead: int) -> Any:
     return n.of_bits(n.integer("xor", n.as_bits(n.select(odd, cosine, sine)), sign))
 
 
-ARCTANGENT = (  # numerator and denominator of (atan x - x)/x^3 in x^2 for |x| <= 0.66 (Moshier, Cephes)
-    (-0.8750608600031904, -16.157537187333652, -75.00855792314705, -122.88666844901361, -64.85021904942025),
-    (1.0, 24.858464901423062, 165.02700983169885, 432.88106049129027, 485.3903996359137, 194.5506571482614),
+# numerator and denominator of (atan x - x)/x^3 in x^2 for |x| <= 0.66 (Moshier, Cephes)
+ARCTANGENT = (
+    (
+        -0.8750608600031904,
+        -16.157537187333652,
+        -75.00855792314705,
+        -122.88666844901361,
+        -64.85021904942025,
+    ),
+    (
+        1.0,
+        24.858464901423062,
+        165.02700983169885,
+        432.88106049129027,
+        485.3903996359137,
+        194.5506571482614,
+    ),
 )
 FURTHER = 2.414213562373095  # tan(3 pi/8)
 

@@ -1,7 +1,9 @@
-"""Arithmetic on numbers of one type, written into a function: doubles, or vectors of them, one lane a candidate.
+"""Arithmetic on numbers of one type, written into a function: doubles, or vectors of them, one lane
+a candidate.
 
-`FAST` lets LLVM fuse and reorder, as vectors and scalars gain by it; nan and infinity keep their meaning, since they
-mark candidates that diverged. `ORDERED` does not reorder: where the order of operations is the point.
+`FAST` lets LLVM fuse and reorder, as vectors and scalars gain by it; nan and infinity keep their
+meaning, since they mark candidates that diverged. `ORDERED` does not reorder: where the order of
+operations is the point.
 """
 
 import struct
@@ -13,7 +15,9 @@ COMMUTES = {"fadd", "fmul", "and", "or", "xor", "add"}
 
 
 class Numbers:
-    """Operations on doubles (width 1) or vectors of `width` doubles; operands and results are names of values."""
+    """Operations on doubles (width 1) or vectors of `width` doubles; operands and results are names
+    of values.
+    """
 
     def __init__(self, function: Function, width: int):
         self.f, self.width = function, width
@@ -105,7 +109,9 @@ class Numbers:
     def call(self, name: str, *arguments: str) -> str:
         """An intrinsic of LLVM."""
         full = f"llvm.{name}.{self._suffix}"
-        self.f.intrinsics[full] = f"declare {self.kind} @{full}({', '.join([self.kind] * len(arguments))})"
+        self.f.intrinsics[full] = (
+            f"declare {self.kind} @{full}({', '.join([self.kind] * len(arguments))})"
+        )
         given = ", ".join(f"{self.kind} {a}" for a in arguments)
         return self.f.value(f"call {FAST} {self.kind} @{full}({given})")
 
@@ -134,7 +140,8 @@ class Numbers:
             return scalar
         first = self.f.value(f"insertelement {self.kind} poison, double {scalar}, i64 0")
         return self.f.value(
-            f"shufflevector {self.kind} {first}, {self.kind} poison, <{self.width} x i32> zeroinitializer"
+            f"shufflevector {self.kind} {first}, {self.kind} poison, <{self.width} x i32>"
+            " zeroinitializer"
         )
 
     def lane(self, a: str, k: int) -> str:
@@ -150,35 +157,47 @@ class Numbers:
     def ramp(self, first: str) -> str:
         """The doubles `first` (an integer), `first` + 1, ... in the lanes."""
         return self.f.value(
-            f"sitofp {self.integers} {self.integer('add', self._splat(first), self._indices)} to {self.kind}"
+            f"sitofp {self.integers} {self.integer('add', self._splat(first), self._indices)} to"
+            f" {self.kind}"
         )
 
     def prefix_sums(self, a: str) -> str:
         """The sum of each lane and all before it."""
         k = 1
         while k < self.width:
-            lanes = ", ".join(f"i32 {self.width + lane - k if lane >= k else lane}" for lane in range(self.width))
-            moved = f"shufflevector {self.kind} zeroinitializer, {self.kind} {a}, <{self.width} x i32> <{lanes}>"
+            lanes = ", ".join(
+                f"i32 {self.width + lane - k if lane >= k else lane}" for lane in range(self.width)
+            )
+            moved = (
+                f"shufflevector {self.kind} zeroinitializer, {self.kind} {a}, <{self.width} x i32>"
+                f" <{lanes}>"
+            )
             a = self.add(a, self.f.value(moved), ORDERED)
             k *= 2
         return a
 
     def part(self, address: str, left: str) -> str:
-        """The next samples of an array that does not change, wherever they lie: those that are `left`, at most all."""
+        """The next samples of an array that does not change, wherever they lie: those that are
+        `left`, at most all.
+        """
         if self.width == 1:
             return self.f.value(f"load double, ptr {address}, align 8")
         name = f"llvm.masked.load.{self._suffix}.p0"
         self.f.intrinsics[name] = f"declare {self.kind} @{name}(ptr, i32, {self.bits}, {self.kind})"
         counted = self._counted(left)
         return self.f.value(
-            f"call {self.kind} @{name}(ptr {address}, i32 8, {self.bits} {counted}, {self.kind} zeroinitializer)"
+            f"call {self.kind} @{name}(ptr {address}, i32 8, {self.bits} {counted}, {self.kind}"
+            " zeroinitializer)"
         )
 
     def store_part(self, a: str, address: str, left: str) -> None:
         """The first `left` lanes, at most all, to wherever they lie."""
         name = f"llvm.masked.store.{self._suffix}.p0"
         self.f.intrinsics[name] = f"declare void @{name}({self.kind}, ptr, i32, {self.bits})"
-        self.f.do(f"call void @{name}({self.kind} {a}, ptr {address}, i32 8, {self.bits} {self._counted(left)})")
+        self.f.do(
+            f"call void @{name}({self.kind} {a}, ptr {address}, i32 8, {self.bits}"
+            f" {self._counted(left)})"
+        )
 
     def _counted(self, left: str) -> str:
         """The first `left` lanes."""
@@ -191,4 +210,6 @@ class Numbers:
     def _splat(self, integer: str) -> str:
         kind = self.integers
         first = self.f.value(f"insertelement {kind} poison, i64 {integer}, i64 0")
-        return self.f.value(f"shufflevector {kind} {first}, {kind} poison, <{self.width} x i32> zeroinitializer")
+        return self.f.value(
+            f"shufflevector {kind} {first}, {kind} poison, <{self.width} x i32> zeroinitializer"
+        )

@@ -1,6 +1,8 @@
-"""Object code of kernels: compiled from IR, stored under all that it depends on, loaded once a process.
+"""Object code of kernels: compiled from IR, stored under all that it depends on, loaded once a
+process.
 
-An entry is executed, so it is read through `tractexp.store`, which takes nothing that was not written there whole.
+An entry is executed, so it is read through `tractexp.store`, which takes nothing that was not
+written there whole.
 """
 
 import functools
@@ -32,7 +34,9 @@ def load(text: str) -> MachineCode:
 
     code = object_code(text)
     with _one_at_a_time:
-        library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
+        library = (
+            llvm.JITLibraryBuilder().add_object_img(code).add_current_process().export_symbol(name)
+        )
         return MachineCode(library.link(_linker(), f"{name}_{next(_numbers)}"), name)
 
 
@@ -44,8 +48,8 @@ def object_code(text: str) -> bytes:
 def machine_code(text: str, machine: Any = None) -> bytes:
     """Object code of IR, for this machine or another that LLVM knows.
 
-    Of LLVM's passes over IR only the one that reorders sums and products is of use: the text has its common values once
-    and its loops as they shall be.
+    Of LLVM's passes over IR only the one that reorders sums and products is of use: the text has
+    its common values once and its loops as they shall be.
     """
     chosen = machine or target.machine()
     with _one_at_a_time:
@@ -75,8 +79,8 @@ def _ready(text: str, machine: Any) -> Any:
 def _linker() -> Any:
     """LLVM's linker that places all sections of an object in one piece of memory.
 
-    Code finds its constants within 2 GB. The older linker places each section where the system has room, and where a
-    process has much memory mapped that can be further: it then ends the process.
+    Code finds its constants within 2 GB. The older linker places each section where the system has
+    room, and where a process has much memory mapped that can be further: it then ends the process.
     """
     from llvmlite import binding as llvm
 

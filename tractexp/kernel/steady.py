@@ -1,7 +1,9 @@
-"""The steady state before an event: Newton's method on lanes, one function for the kernels of all models.
+"""The steady state before an event: Newton's method on lanes, one function for the kernels of all
+models.
 
-Each lane ends by itself, so that its bits do not depend on its neighbors; what is computed for it afterwards is not
-taken. The Jacobian is by differences, its equations solved by Gaussian elimination with partial pivoting.
+Each lane ends by itself, so that its bits do not depend on its neighbors; what is computed for it
+afterwards is not taken. The Jacobian is by differences, its equations solved by Gaussian
+elimination with partial pivoting.
 """
 
 from tractexp.kernel.function import Function
@@ -10,7 +12,8 @@ from tractexp.kernel.numbers import Numbers
 NEWTON_ITERATIONS = 40
 STATE_DIFFERENCE = 1e-7  # of 1 + |x|
 LARGEST_SETTLED_MOVE = 1e-12  # of 1 + |x|: a lane that moves less has ended
-SETTLED, BALANCED = 1e-9, 1e-6  # of what has ended: how far it moved last, and what is left of its balances
+# of what has ended: how far it moved last, and what is left of its balances
+SETTLED, BALANCED = 1e-9, 1e-6
 LARGEST_MISS = 1e6  # by which a steady state is missed
 ARGUMENTS = "ptr %rest, ptr %event, ptr %given, ptr %x, ptr %missed, ptr %work, i64 %n"
 
@@ -21,7 +24,8 @@ def room(states: int) -> int:
 
 
 def text(width: int) -> str:
-    """IR of `@steady`: solves rest(event, given, x, balances) = 0 for n states x; `missed` is 0 where it is solved.
+    """IR of `@steady`: solves rest(event, given, x, balances) = 0 for n states x; `missed` is 0
+    where it is solved.
 
     x (n, width) holds the first guess and then the solution; `work` has room for n (n + 2) vectors.
     """
@@ -57,7 +61,9 @@ class _Newton:
         return self.f.at(address, self.f.integer("mul", k, self.n.width))
 
     def cell(self, row: str, column: str) -> str:
-        return self.at(self.jacobian, self.f.integer("add", self.f.integer("mul", row, "%n"), column))
+        return self.at(
+            self.jacobian, self.f.integer("add", self.f.integer("mul", row, "%n"), column)
+        )
 
     def rest(self, balances: str) -> None:
         self.f.do(f"call void %rest(ptr %event, ptr %given, ptr %x, ptr {balances})")
@@ -82,7 +88,9 @@ class _Newton:
         with f.loop(0, "%n", always=True) as k:
             below = f.integer("add", k, 1)
             with f.loop(below, "%n") as r:
-                larger = n.compare("ogt", n.size(n.load(self.cell(r, k))), n.size(n.load(self.cell(k, k))))
+                larger = n.compare(
+                    "ogt", n.size(n.load(self.cell(r, k))), n.size(n.load(self.cell(k, k)))
+                )
                 with f.loop(k, "%n", always=True) as c:
                     self.exchange(larger, self.cell(k, c), self.cell(r, c))
                 self.exchange(larger, self.at(self.balance, k), self.at(self.balance, r))
@@ -127,7 +135,11 @@ class _Newton:
         f, n = self.f, self.n
         size, before = n.load(self.size), n.load(self.moved)
         active = n.compare("ogt", before, n.constant(LARGEST_SETTLED_MOVE))
-        short = n.select(n.compare("olt", size, n.constant(0.5)), n.constant(1.0), n.divide(n.constant(0.5), size))
+        short = n.select(
+            n.compare("olt", size, n.constant(0.5)),
+            n.constant(1.0),
+            n.divide(n.constant(0.5), size),
+        )
         with f.loop(0, "%n", always=True) as k:
             place = self.at("%x", k)
             x = n.load(place)
@@ -149,5 +161,9 @@ class _Newton:
         still = n.compare("ole", moved, n.constant(SETTLED))
         settled = n.logic("and", still, n.compare("olt", left, n.constant(BALANCED)))
         finite = n.compare("oge", left, n.constant(0.0))
-        far = n.select(finite, n.smaller(n.add(n.constant(1.0), left), n.constant(LARGEST_MISS)), n.constant(LARGEST_MISS))
+        far = n.select(
+            finite,
+            n.smaller(n.add(n.constant(1.0), left), n.constant(LARGEST_MISS)),
+            n.constant(LARGEST_MISS),
+        )
         n.store(n.select(settled, n.constant(0.0), far), "%missed")

@@ -1,6 +1,8 @@
-"""What kernels are compiled for: this processor, as LLVM tells it, or the most general one of its kind.
+"""What kernels are compiled for: this processor, as LLVM tells it, or the most general one of its
+kind.
 
-LLVM is loaded where it is first needed, which takes longer than what a command without a simulation does.
+LLVM is loaded where it is first needed, which takes longer than what a command without a simulation
+does.
 """
 
 import functools
@@ -9,7 +11,8 @@ from typing import Any
 
 from tractexp.errors import check_choice
 
-CHOICE, GENERIC = "TRACTEXP_CPU", "generic"  # the environment's; set to `generic` results do not hang on the processor
+# the environment's; set to `generic` results do not hang on the processor
+CHOICE, GENERIC = "TRACTEXP_CPU", "generic"
 
 
 @functools.cache
@@ -41,8 +44,12 @@ def machine() -> Any:
 
 @functools.cache
 def key() -> str:
-    """All that object code hangs on beside its text: system, processor, features, and the versions of LLVM."""
+    """All that object code hangs on beside its text: system, processor, features, and the versions
+    of LLVM.
+    """
     import llvmlite
     from llvmlite import binding as llvm
 
-    return repr((llvm.get_process_triple(), processor(), llvm.llvm_version_info, llvmlite.__version__))
+    return repr(
+        (llvm.get_process_triple(), processor(), llvm.llvm_version_info, llvmlite.__version__)
+    )

@@ -14,10 +14,11 @@ if TYPE_CHECKING:
 
 
 class Apart:
-    """A view of `Equations` that ends every name in a suffix: what a second motor declares is a second motor.
+    """A view of `Equations` that ends every name in a suffix: what a second motor declares is a
+    second motor.
 
-    What it puts at sites are quantities with a name like any other, for a site belongs to the first; what it only reads
-    (voltages, speeds, the words of the equations) is everyone's.
+    What it puts at sites are quantities with a name like any other, for a site belongs to the
+    first; what it only reads (voltages, speeds, the words of the equations) is everyone's.
     """
 
     def __init__(self, eq: "Equations", suffix: str):
@@ -49,11 +50,17 @@ class Apart:
     def place(self, site: Site, expression: sympy.Expr, latex: str | None = None) -> Symbol:
         return self.define(site.name, expression, latex or site.latex)
 
-    def compute(self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None) -> Symbol:
+    def compute(
+        self, name: str, expression: sympy.Expr, before: sympy.Expr | None = None
+    ) -> Symbol:
         return self._eq.compute(name + self._suffix, expression, before)
 
-    def edit(self, site: Site | str, change: Callable[[sympy.Expr], sympy.Expr], shown: object = None) -> None:
-        raise UserError(f"a motor edits the site {site}; of several motor groups only effects edit sites")
+    def edit(
+        self, site: Site | str, change: Callable[[sympy.Expr], sympy.Expr], shown: object = None
+    ) -> None:
+        raise UserError(
+            f"a motor edits the site {site}; of several motor groups only effects edit sites"
+        )
 
     def flux(self, name: str, latex: str) -> Symbol:
         return self._eq.flux(name + self._suffix, self._latex(latex))
@@ -70,7 +77,9 @@ class Apart:
     def speed(self, latex: str = r"\omega") -> Symbol:
         return self._eq.speed(self._latex(latex), "omega" + self._suffix)
 
-    def branch(self, name: str, latex: str, *circuit: sympy.Expr, **behind: sympy.Expr) -> sympy.Expr:
+    def branch(
+        self, name: str, latex: str, *circuit: sympy.Expr, **behind: sympy.Expr
+    ) -> sympy.Expr:
         return self._eq.branch(name + self._suffix, self._latex(latex), *circuit, **behind)
 
     def require(self, slack: sympy.Expr, sentence: str, shown: sympy.Expr | None = None) -> None:

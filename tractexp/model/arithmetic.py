@@ -1,4 +1,6 @@
-"""Quantities as a text of arithmetic: read back from the store, it takes no symbols, which take a second to load."""
+"""Quantities as a text of arithmetic: read back from the store, it takes no symbols, which take a
+second to load.
+"""
 
 import math
 from collections.abc import Mapping
@@ -7,12 +9,16 @@ from types import SimpleNamespace
 import numpy as np
 
 # NumPy's, which overflow to infinity where Python's raise
-FUNCTIONS = SimpleNamespace(**{name: getattr(np, name, getattr(math, name)) for name in dir(math) if name[0] != "_"})
+FUNCTIONS = SimpleNamespace(
+    **{name: getattr(np, name, getattr(math, name)) for name in dir(math) if name[0] != "_"}
+)
 VALUES = "at"  # what holds the numbers in such a text: at['T_m']
 
 
 def evaluate_texts(texts: Mapping[str, str], numbers: Mapping[str, float]) -> dict[str, float]:
-    """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE 754 has it."""
+    """What is known, and after it each quantity of what stands before it; infinite or nan as IEEE
+    754 has it.
+    """
     values = {name: np.float64(value) for name, value in numbers.items()}
     with np.errstate(all="ignore"):
         for name, text in texts.items():

@@ -1,4 +1,6 @@
-"""What the parts of a load return, written into one declaration: the framework's half of every part."""
+"""What the parts of a load return, written into one declaration: the framework's half of every
+part.
+"""
 
 import inspect
 from collections.abc import Mapping, Sequence
@@ -27,8 +29,10 @@ class Refused(UserError):
 
 def declare_equations(
     motor: Motor, static: Static, effects: Sequence[Effect], title: str, domain: str = PHASORS
-) -> Equations:  # fmt: skip
-    """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for parts that do not."""
+) -> Equations:
+    """The equations of a load. Raises `Refused` for an effect that does not fit, `UserError` for
+    parts that do not.
+    """
     eq = Equations(domain)
     for what, part in (("motor", motor), ("static load", static)):
         if why := _foreign(eq, part):
@@ -37,14 +41,18 @@ def declare_equations(
         _motor(eq, motor)
         _static(eq, static)
     except Unfit as why:
-        raise UserError(f"the motor '{motor.name}' and the static load '{static.name}' do not compose: {why}") from why
+        raise UserError(
+            f"the motor '{motor.name}' and the static load '{static.name}' do not compose: {why}"
+        ) from why
     for effect in effects:
         try:
             _effect(eq, effect)
         except Unfit as why:
             raise Refused(effect.name, str(why)) from why
     if not any(eq.outputs().values()):
-        raise UserError(f"the {title} draw no power; choose a model/motor or a model/static other than 'none'")
+        raise UserError(
+            f"the {title} draw no power; choose a model/motor or a model/static other than 'none'"
+        )
     eq.close()
     return eq
 
@@ -68,7 +76,10 @@ def _motor(eq: Equations, motor: Motor) -> None:
     current = motor.declare(eq, **eq.declare(motor.parameters))
     if current is None:
         if eq.states or len(eq.definitions) > there:
-            raise UserError(f"declare() of the motor '{motor.name}' returns nothing; it must return the stator current")
+            raise UserError(
+                f"declare() of the motor '{motor.name}' returns nothing; it must return the stator"
+                " current"
+            )
         return
     V = eq.V
     if sites.stator_current not in eq:
@@ -88,7 +99,9 @@ def _static(eq: Equations, static: Static) -> None:
     f = sympy.Symbol("static_frequency", real=True)
     symbols = own | ({"f": f} if "f" in inspect.signature(static.law).parameters else {})
     law = static.law(u, **symbols)
-    for requirement in static.require(**select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})):
+    for requirement in static.require(
+        **select_arguments(static.require, own | {"P0": eq.P0, "Q0": eq.Q0, "U0": eq.U0})
+    ):
         eq.require(*requirement)
     if law is None:
         return
@@ -102,18 +115,26 @@ def _static(eq: Equations, static: Static) -> None:
 
 
 def _check_law(static: Static, law: Any, before: Mapping[sympy.Symbol, float]) -> None:
-    """Raise `UserError` unless the law is a pair that is 1 at the voltage and frequency before the event."""
+    """Raise `UserError` unless the law is a pair that is 1 at the voltage and frequency before the
+    event.
+    """
     where = f"law() of the static load '{static.name}'"
     if not (isinstance(law, tuple | list) and len(law) == 2):
-        raise UserError(f"{where} returns {law!r}; it must return two expressions, P/P_s0 and Q/Q_s0, or None")
+        raise UserError(
+            f"{where} returns {law!r}; it must return two expressions, P/P_s0 and Q/Q_s0, or None"
+        )
     for what, share in zip(("P/P_s0", "Q/Q_s0"), law, strict=True):
         value = sympy.sympify(share).subs(before)
         if value.free_symbols:
             raise UserError(
-                f"{where}: {what} reads {', '.join(sorted(map(str, value.free_symbols)))}, which it does not have"
+                f"{where}: {what} reads {', '.join(sorted(map(str, value.free_symbols)))}, which it"
+                " does not have"
             )
         if not abs(float(value) - 1) < LAW_ROUNDING:
-            raise UserError(f"{where}: {what} is {float(value):.6g} before the event (u = 1), and must be 1 there")
+            raise UserError(
+                f"{where}: {what} is {float(value):.6g} before the event (u = 1), and must be 1"
+                " there"
+            )
 
 
 def _effect(eq: Equations, effect: Effect) -> None:

@@ -1,4 +1,6 @@
-"""What drives a simulation: recorded voltage and the steady state before it, laid out for the kernel."""
+"""What drives a simulation: recorded voltage and the steady state before it, laid out for the
+kernel.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,16 +12,18 @@ from tractexp.kernel.layout import EVENT, INPUTS
 
 PHASORS, WAVES = DOMAINS = ("phasors", "waves")
 OUTPUTS = {PHASORS: ("P", "Q"), WAVES: ("i_alpha", "i_beta", "i_zero")}  # rows of `Drive.measured`
-IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zero-sequence current"}  # as pages say
+# as pages say
+IN_WORDS = {"i_alpha": "current alpha", "i_beta": "current beta", "i_zero": "zero-sequence current"}
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
     """One event: uniformly sampled input, and measured power where there is any.
 
-    U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the steady state
-    before the event; omega_s (N,) is the synchronous speed relative to nominal [rad/s]; omega_n is nominal;
-    U2 (N,) and U20 are the negative-sequence voltage [pu], where recorded.
+    U [pu] (N,); P, Q [pu] (N,), nan where missing; step [s]; U0, P0, Q0 [pu] and omega_s0 are the
+    steady state before the event; omega_s (N,) is the synchronous speed relative to nominal
+    [rad/s]; omega_n is nominal; U2 (N,) and U20 are the negative-sequence voltage [pu], where
+    recorded.
     """
 
     step: float
@@ -36,7 +40,8 @@ class Excitation:
     U20: float = float("nan")
     weight_P: float = 1.0
     weight_Q: float = 1.0
-    window: np.ndarray | None = None  # (odd,) weights of the recorder's window, through which power is looked at
+    # (odd,) weights of the recorder's window, through which power is looked at
+    window: np.ndarray | None = None
 
     @property
     def inputs(self) -> np.ndarray:
@@ -65,13 +70,15 @@ class Excitation:
 
 @dataclass(frozen=True, eq=False)
 class WaveformDrive:
-    """One event of sampled waveforms: space vectors in a frame that turns with the voltage before the event.
+    """One event of sampled waveforms: space vectors in a frame that turns with the voltage before
+    the event.
 
-    v (N,) complex is the voltage [pu of its peak], real and U0 before the event; v_zero (N,) its zero sequence. `turn`
-    (N,) complex of size one turns the frame's vectors into the stationary frame of phase a. currents (3, N) are alpha,
-    beta and zero sequence there [pu], nan where not compared, `weights` how much a squared error of each counts. U
-    (N,) and U2 are the sizes of the voltage's sequences as a window of the past shows them [pu]. omega_s0 is the
-    frame's speed relative to nominal [rad/s].
+    v (N,) complex is the voltage [pu of its peak], real and U0 before the event; v_zero (N,) its
+    zero sequence. `turn` (N,) complex of size one turns the frame's vectors into the stationary
+    frame of phase a. currents (3, N) are alpha, beta and zero sequence there [pu], nan where not
+    compared, `weights` how much a squared error of each counts. U (N,) and U2 are the sizes of the
+    voltage's sequences as a window of the past shows them [pu]. omega_s0 is the frame's speed
+    relative to nominal [rad/s].
     """
 
     step: float
@@ -94,7 +101,13 @@ class WaveformDrive:
     def inputs(self) -> np.ndarray:
         """The kernel's rows (13, N)."""
         n, smooth = len(self.v), (self.v.real, self.v.imag, self.v_zero)
-        rows = [self.U, np.full(n, self.omega_s0), slopes(self.U) / self.step, self.U2, np.arange(n) * self.step]
+        rows = [
+            self.U,
+            np.full(n, self.omega_s0),
+            slopes(self.U) / self.step,
+            self.U2,
+            np.arange(n) * self.step,
+        ]
         bends = (band_limited(y) / self.step for y in smooth)
         return np.stack([*rows, *smooth, *bends, self.turn.real, self.turn.imag])
 
@@ -105,10 +118,11 @@ class WaveformDrive:
 
 
 def slopes(y: np.ndarray) -> np.ndarray:
-    """Slope at each sample (N,), per sample, of the smooth curve through them: Akima's, which does not overshoot.
+    """Slope at each sample (N,), per sample, of the smooth curve through them: Akima's, which does
+    not overshoot.
 
-    Between samples the kernel reads the voltage off the cubics these slopes define. A straight line would round
-    the edges of a dip recorded every 10 ms by more than the noise of a good recorder.
+    Between samples the kernel reads the voltage off the cubics these slopes define. A straight line
+    would round the edges of a dip recorded every 10 ms by more than the noise of a good recorder.
 
     Source: Akima 1970, with the weights that keep flat stretches flat (makima).
     """
@@ -121,14 +135,17 @@ def slopes(y: np.ndarray) -> np.ndarray:
     spread = np.abs(np.diff(m)) + np.abs(m[1:] + m[:-1]) / 2
     left, right = spread[2:], spread[:-2]  # weights of the slopes before and after each sample
     total = left + right
-    return np.where(total > 0, (left * m[1:-2] + right * m[2:-1]) / np.where(total > 0, total, 1.0), 0.0)
+    return np.where(
+        total > 0, (left * m[1:-2] + right * m[2:-1]) / np.where(total > 0, total, 1.0), 0.0
+    )
 
 
 def band_limited(y: np.ndarray) -> np.ndarray:
     """Slope at each sample (N,), per sample, of the cubic spline through them.
 
-    What stands behind an anti-alias filter overshoots by itself: of negative sequence and of harmonics `slopes` would
-    miss some percent of the voltage between samples where there are but 24 in a cycle, and it is not linear in noise.
+    What stands behind an anti-alias filter overshoots by itself: of negative sequence and of
+    harmonics `slopes` would miss some percent of the voltage between samples where there are but 24
+    in a cycle, and it is not linear in noise.
     """
     from scipy.interpolate import CubicSpline
 
@@ -139,7 +156,8 @@ def band_limited(y: np.ndarray) -> np.ndarray:
 class Drive:
     """One or several events end to end. Shapes: N samples in all, E events."""
 
-    inputs: np.ndarray  # (5, N) or (13, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
+    # (5, N) or (13, N), rows as in INPUTS; omega_s is 0 and U2 nan where not recorded
+    inputs: np.ndarray
     measured: np.ndarray  # (C, N): P and Q, or three currents; gaps filled with 0
     weights: np.ndarray  # (C, N): 0 in a gap
     first: np.ndarray  # (E + 1,)
@@ -155,13 +173,17 @@ class Drive:
         weights = np.repeat(np.array([e.weights for e in events]).T, lengths, axis=1)
         gaps = np.isnan(measured)
         return cls(
-            inputs=np.ascontiguousarray(np.concatenate([e.inputs for e in events], axis=1), dtype=float),
+            inputs=np.ascontiguousarray(
+                np.concatenate([e.inputs for e in events], axis=1), dtype=float
+            ),
             measured=np.where(gaps, 0.0, measured),
             weights=np.where(gaps, 0.0, weights),
             first=np.concatenate([[0], np.cumsum(lengths)]),
             event=np.array([[getattr(e, name) for name in EVENT] for e in events]),
             before=np.array([[e.P0, e.Q0] for e in events]),
-            windows=tuple(e.window for e in events) if any(e.window is not None for e in events) else (),
+            windows=tuple(e.window for e in events)
+            if any(e.window is not None for e in events)
+            else (),
         )
 
     @property

@@ -9,7 +9,9 @@ from tractexp.kernel.graph import Basic, Symbol
 
 
 def replace_symbols(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.Expr]) -> sympy.Expr:
-    """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked into."""
+    """The expression with symbols replaced, as `xreplace` does it; maxima and minima are not looked
+    into.
+    """
     new: dict[Basic, Basic] = {**substitutes}
 
     def visit(part: Basic) -> Basic:
@@ -23,14 +25,17 @@ def replace_symbols(expression: sympy.Expr, substitutes: Mapping[Symbol, sympy.E
 
 
 def _rebuilt(part: Basic, args: Sequence[Basic]) -> Any:
-    """The same function of other arguments. SymPy compares those of a maximum with each other, which takes seconds."""
+    """The same function of other arguments. SymPy compares those of a maximum with each other,
+    which takes seconds.
+    """
     if isinstance(part, sympy.Max | sympy.Min) and not all(a.is_number for a in args):
         return part.func(*args, evaluate=False)
     return part.func(*args)
 
 
 def as_real_imag(expression: sympy.Expr) -> tuple[sympy.Expr, sympy.Expr]:
-    """Real and imaginary part of an expression in real symbols, products multiplied out, as SymPy takes them.
+    """Real and imaginary part of an expression in real symbols, products multiplied out, as SymPy
+    takes them.
 
     Of some quotients it leaves a part as it is; those are split as `halves` does.
     """
@@ -60,7 +65,9 @@ def _product(factors: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sympy.Expr, 
     return real, imaginary
 
 
-def _halves(part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]) -> tuple[sympy.Expr, sympy.Expr]:
+def _halves(
+    part: Basic, args: list[tuple[sympy.Expr, sympy.Expr]]
+) -> tuple[sympy.Expr, sympy.Expr]:
     """Those of one node from those of its arguments."""
     zero = sympy.Integer(0)
     if isinstance(part, sympy.Add):

@@ -1,8 +1,9 @@
-"""From declared equations to the expressions a kernel evaluates: hoisted, split by when they must be computed.
+"""From declared equations to the expressions a kernel evaluates: hoisted, split by when they must
+be computed.
 
-What depends on parameters only is computed once per candidate (a *constant*), what depends on the recorded
-input only once per sample (a *signal*); the rest is left for the inner loop. A power with a symbolic exponent
-becomes exp(exponent * log(base)), whose logarithm is then a signal.
+What depends on parameters only is computed once per candidate (a *constant*), what depends on the
+recorded input only once per sample (a *signal*); the rest is left for the inner loop. A power with
+a symbolic exponent becomes exp(exponent * log(base)), whose logarithm is then a signal.
 """
 
 from collections.abc import Mapping, Sequence
@@ -20,11 +21,17 @@ from tractexp.model.equations import Equations
 from tractexp.model.graph import replace_symbols
 
 POINTS, TRIES = 5, 200  # admissible points looked at, of so many that are drawn
-BALANCE_ROUNDING = 1e-7  # of a balance [pu/s, rad/s²]: above what doubles leave of zero, below what a guess misses by
+# of a balance [pu/s, rad/s²]: above what doubles leave of zero, below what a guess misses by
+BALANCE_ROUNDING = 1e-7
 EVENTS: Mapping[str, tuple[float, float]] = {
-    "U0": (0.9, 1.1), "omega_s0": (-3.0, 3.0), "U20": (0.01, 0.05), "omega_n": (310.0, 380.0), "step": (1e-3, 1e-2),
-    "P0": (0.5, 1.5), "Q0": (0.3, 0.9),
-}  # fmt: skip
+    "U0": (0.9, 1.1),
+    "omega_s0": (-3.0, 3.0),
+    "U20": (0.01, 0.05),
+    "omega_n": (310.0, 380.0),
+    "step": (1e-3, 1e-2),
+    "P0": (0.5, 1.5),
+    "Q0": (0.3, 0.9),
+}
 
 
 class _Hoister:
@@ -92,7 +99,9 @@ class _Hoister:
 
 
 def lower(eq: Equations) -> Lowered:
-    """Lower a complete declaration. Raises `UserError` where a symbol is used that nothing declares."""
+    """Lower a complete declaration. Raises `UserError` where a symbol is used that nothing
+    declares.
+    """
     rows = eq.real_states()
     states, memories = tuple(symbol for symbol, _, _ in rows), tuple(eq.memories)
     starts = tuple(eq.real_starts())
@@ -116,18 +125,35 @@ def lower(eq: Equations) -> Lowered:
     phases = (derivative, renewal, output)
     used = tuple(s for s in inputs if s == eq.v or any(s in symbols(p) for p in phases))
     lowered = Lowered(
-        parameters, used, event, states, memories, starts, start, balances,
-        tuple(hoist.constants.values()), _phase(None, list(hoist.constants)), *phases, tuple(outputs),
-    )  # fmt: skip
+        parameters,
+        used,
+        event,
+        states,
+        memories,
+        starts,
+        start,
+        balances,
+        tuple(hoist.constants.values()),
+        _phase(None, list(hoist.constants)),
+        *phases,
+        tuple(outputs),
+    )
     _check_closed(lowered, lane)
-    return replace(lowered, rest=None) if not eq.edits and _is_steady_state_exact(eq, start, balances, starts) else lowered
+    return (
+        replace(lowered, rest=None)
+        if not eq.edits and _is_steady_state_exact(eq, start, balances, starts)
+        else lowered
+    )
 
 
-def _is_steady_state_exact(eq: Equations, start: Phase, rest: Phase, starts: Sequence[Symbol]) -> bool:
-    """Whether the steady state that the parts declare is exact, and no first guess that the kernel has to solve for.
+def _is_steady_state_exact(
+    eq: Equations, start: Phase, rest: Phase, starts: Sequence[Symbol]
+) -> bool:
+    """Whether the steady state that the parts declare is exact, and no first guess that the kernel
+    has to solve for.
 
-    Every balance vanishes there, at random parameters and events. `start` computes `starts` and then the slack of each
-    requirement, `rest` the balances from them.
+    Every balance vanishes there, at random parameters and events. `start` computes `starts` and
+    then the slack of each requirement, `rest` the balances from them.
     """
     ranges = {**{name: p.bounds for name, p in eq.parameters.items()}, **EVENTS}
     low, high = np.array([*ranges.values()]).T
@@ -144,7 +170,9 @@ def _is_steady_state_exact(eq: Equations, start: Phase, rest: Phase, starts: Seq
 
 
 def _phase(
-    hoist: _Hoister | None, expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr] | None = None
+    hoist: _Hoister | None,
+    expressions: list[sympy.Expr],
+    steps: Mapping[Symbol, sympy.Expr] | None = None,
 ) -> Phase:
     signals = ()
     needed = _select_needed_steps(expressions, steps or {})
@@ -157,7 +185,9 @@ def _phase(
     return Phase(signals, _in_order(computed), tuple(expressions[len(targets) :]))
 
 
-def _select_needed_steps(expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]) -> dict[Symbol, sympy.Expr]:
+def _select_needed_steps(
+    expressions: list[sympy.Expr], steps: Mapping[Symbol, sympy.Expr]
+) -> dict[Symbol, sympy.Expr]:
     """The steps that some expressions need, and those that these need in turn."""
     needed: set[Symbol] = set()
     new = set().union(*map(symbols_of, expressions)) & steps.keys()
@@ -167,7 +197,9 @@ def _select_needed_steps(expressions: list[sympy.Expr], steps: Mapping[Symbol, s
     return {symbol: e for symbol, e in steps.items() if symbol in needed}
 
 
-def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbol, sympy.Expr], ...]:
+def _in_order(
+    assignments: list[tuple[Symbol, sympy.Expr]],
+) -> tuple[tuple[Symbol, sympy.Expr], ...]:
     """Assignments rearranged so that each comes after those it reads."""
     waiting, ordered = list(assignments), []
     while waiting:
@@ -180,13 +212,21 @@ def _in_order(assignments: list[tuple[Symbol, sympy.Expr]]) -> tuple[tuple[Symbo
 
 def _check_closed(lowered: Lowered, lane: set[Symbol]) -> None:
     defined = lane | {*lowered.inputs, *lowered.event, *lowered.states, *lowered.memories}
-    for phase in (lowered.start, lowered.rest, lowered.constant, lowered.derivative, lowered.renewal, lowered.output):
+    for phase in (
+        lowered.start,
+        lowered.rest,
+        lowered.constant,
+        lowered.derivative,
+        lowered.renewal,
+        lowered.output,
+    ):
         if phase is None:
             continue
         own = {*lowered.constants, *(s for s, _ in (*phase.steps, *phase.signals))}
         if stray := symbols(phase) - defined - own:
             raise UserError(
-                f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the model declares"
+                f"the equations use {', '.join(sorted(map(str, stray)))}, which no part of the"
+                " model declares"
             )
 
 

@@ -1,4 +1,6 @@
-"""A composed load model: parameters, simulation and objective of many candidates at once, equations in LaTeX."""
+"""A composed load model: parameters, simulation and objective of many candidates at once, equations
+in LaTeX.
+"""
 
 import copy
 import functools
@@ -23,13 +25,17 @@ from tractexp.texts import text_of
 SUBSTEP_TOLERANCE = 1e-7  # pu, largest step-doubling error of P or Q an automatic substep may leave
 MOST_SUBSTEPS = 256
 MOST_STORED = 8_000_000  # numbers of responses that are held at once
-MOST_STEPS_A_CALL = 2e8  # Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
-CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")  # Runge-Kutta of order 4, or Eq. (4) as it stands
+# Runge-Kutta steps of all candidates in one call: about a second, in which no signal is heard
+MOST_STEPS_A_CALL = 2e8
+# Runge-Kutta of order 4, or Eq. (4) as it stands
+CLASSICAL, PRINTED = INTEGRATIONS = ("classical", "printed")
 
 
 @dataclass(frozen=True, eq=False)
 class ModelResponse:
-    """What a load draws: P and Q, or waveforms' currents. Valid where `miss` is 0: a steady state exists there."""
+    """What a load draws: P and Q, or waveforms' currents. Valid where `miss` is 0: a steady state
+    exists there.
+    """
 
     outputs: np.ndarray  # (C, n, N) pu
     miss: np.ndarray  # (E, n)
@@ -64,7 +70,9 @@ class Errors:
 
 @dataclass(frozen=True)
 class Acceptance:
-    """Whether a model takes an effect. `refusal` is the sentence why it makes no sense, None where it does."""
+    """Whether a model takes an effect. `refusal` is the sentence why it makes no sense, None where
+    it does.
+    """
 
     refusal: str | None
     edits: Sequence[str] = ()  # names of the sites it edits
@@ -73,16 +81,24 @@ class Acceptance:
 class Model:
     """A motor in parallel with a static load, Eq. (7). Make one with `compose`.
 
-    Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they differ by event.
+    Candidates are arrays `values` (n, d) in the order of `parameters`, or (E, n, d) where they
+    differ by event.
     """
 
     def __init__(
-        self, motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL,
-        domain: str = PHASORS, window: float | str | None = None,
-    ):  # fmt: skip
-        self.window = window  # over which the recorder averages phasors; see `tractexp.domain.averaging`
+        self,
+        motor: Motor,
+        static: Static,
+        effects: Sequence[Effect] = (),
+        integration: str = CLASSICAL,
+        domain: str = PHASORS,
+        window: float | str | None = None,
+    ):
+        # over which the recorder averages phasors; see `tractexp.domain.averaging`
+        self.window = window
         self.motor, self.static, self.integration, self.domain = motor, static, integration, domain
-        self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))  # the same model in whatever order given
+        # the same model in whatever order given
+        self.effects = tuple(sorted(effects, key=lambda e: (e.order, e.name)))
         self.measurements = tuple(e for e in self.effects if isinstance(e, Measurement))
         self.recorder: Measurement | None = None
         load = f"{motor.label} motor and {static.name} static load"
@@ -101,7 +117,9 @@ class Model:
         return self.domain == WAVES
 
     def behind(self, recorder: Measurement | None) -> "Model":
-        """The same load as a known recorder shows it: without parameters, before the faults of the measurement."""
+        """The same load as a known recorder shows it: without parameters, before the faults of the
+        measurement.
+        """
         if recorder is None:
             return self
         model = copy.copy(self)
@@ -110,7 +128,9 @@ class Model:
 
     @functools.cached_property
     def parameters(self) -> tuple[Parameter, ...]:
-        return tuple(p for part in (self.motor, self.static, *self.effects) for p in part.parameters)
+        return tuple(
+            p for part in (self.motor, self.static, *self.effects) for p in part.parameters
+        )
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
@@ -118,35 +138,53 @@ class Model:
 
     @property
     def reads(self) -> dict[str, Motor | Static | Effect]:
-        """The recorded channels without which this model cannot be identified, each with a part that reads it."""
-        return {channel: part for part in (self.motor, self.static, *self.effects) for channel in part.reads}
+        """The recorded channels without which this model cannot be identified, each with a part
+        that reads it.
+        """
+        return {
+            channel: part
+            for part in (self.motor, self.static, *self.effects)
+            for channel in part.reads
+        }
 
     @functools.cached_property
     def equations(self) -> Any:
-        """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that do not fit."""
+        """The declaration all parts wrote into (an `Equations`). Raises `UserError` for parts that
+        do not fit.
+        """
         from tractexp.model.declaration import declare_equations
 
         return declare_equations(self.motor, self.static, self.effects, self.title, self.domain)
 
     def acceptance(self, effect: Effect) -> "Acceptance":
-        """Whether one more effect makes sense for this model, and what it would edit; remembered beside the kernels."""
+        """Whether one more effect makes sense for this model, and what it would edit; remembered
+        beside the kernels.
+        """
         parts = (self.motor, self.static, *self.effects, effect)
-        return Acceptance(**json.loads(text_of(parts, lambda: self._tried(effect), self._in_cache("acceptance"))))
+        return Acceptance(
+            **json.loads(text_of(parts, lambda: self._tried(effect), self._in_cache("acceptance")))
+        )
 
     def _tried(self, effect: Effect) -> str:
         from tractexp.model.declaration import Refused
 
         try:
-            eq = compose(self.motor, self.static, [*self.effects, effect], domain=self.domain).equations
+            eq = compose(
+                self.motor, self.static, [*self.effects, effect], domain=self.domain
+            ).equations
         except Refused as refused:
-            return json.dumps({"refusal": refused.reason if refused.effect == effect.name else str(refused)})
+            return json.dumps(
+                {"refusal": refused.reason if refused.effect == effect.name else str(refused)}
+            )
         return json.dumps({"refusal": None, "edits": eq.edits.get(effect.name, [])})
 
     @functools.cached_property
     def source(self) -> str:
         """The kernel's text: LLVM IR, the same on every machine."""
         name = "kernel" if self.integration == CLASSICAL else f"kernel_{self.integration}"
-        return text_of((self.motor, self.static, *self.effects), self._written, self._in_cache(name))
+        return text_of(
+            (self.motor, self.static, *self.effects), self._written, self._in_cache(name)
+        )
 
     def _in_cache(self, what: str) -> str:
         """What a text is called in the cache: those of phasors by themselves."""
@@ -183,7 +221,8 @@ class Model:
     ) -> ModelResponse:
         """P and Q of every candidate over every event, (n, N).
 
-        `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the drive's own.
+        `before` (E, n, 2) are P0 and Q0 [pu] where candidates differ in them; by default the
+        drive's own.
         """
         candidates = self._candidates(drive, values, before)
         n = candidates.shape[2]
@@ -193,16 +232,22 @@ class Model:
         for e, window in enumerate(drive.windows):
             if window is not None:
                 part = drive.part(e)
-                outputs[:, :, part] = averaged_power(outputs[:, :, part], drive.inputs[0, part], window)
+                outputs[:, :, part] = averaged_power(
+                    outputs[:, :, part], drive.inputs[0, part], window
+                )
         for effect in self.measurements:
             columns = {p.name: candidates[:, self.names.index(p.name)] for p in effect.parameters}
             outputs = _observe_outputs(effect, outputs, drive, columns)
         return ModelResponse(outputs, miss)
 
-    def errors(self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1) -> Errors:
-        """Weighted squared errors of every candidate over every event, in one pass and without storing responses.
+    def errors(
+        self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int = 1
+    ) -> Errors:
+        """Weighted squared errors of every candidate over every event, in one pass and without
+        storing responses.
 
-        Those of a few candidates are stored at a time where the measurement stands between kernel and sums.
+        Those of a few candidates are stored at a time where the measurement stands between kernel
+        and sums.
         """
         if not (self.measurements or drive.windows):
             sums, miss = self._run(drive, self._candidates(drive, values), substeps)
@@ -211,11 +256,13 @@ class Model:
         together = max(1, MOST_STORED // drive.measured.size)
         groups = np.split(values, range(together, values.shape[-2], together), axis=-2)
         parts = [self._errors_of_responses(drive, group, substeps) for group in groups]
-        return Errors(np.concatenate([p.sums for p in parts], axis=2), np.concatenate([p.miss for p in parts]))
+        return Errors(
+            np.concatenate([p.sums for p in parts], axis=2), np.concatenate([p.miss for p in parts])
+        )
 
     def _errors_of_responses(
         self, drive: Drive, values: np.ndarray, substeps: Sequence[int] | np.ndarray | int
-    ) -> Errors:  # fmt: skip
+    ) -> Errors:
         response = self.simulate(drive, values, substeps)
         with np.errstate(over="ignore", invalid="ignore"):  # of what diverges
             square = (response.outputs - drive.measured[:, None]) ** 2 * drive.weights[:, None]
@@ -230,19 +277,24 @@ class Model:
         share: float = 1.0,
         until: Sequence[float] | None = None,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by step doubling.
+        """Runge-Kutta steps per sample that each event needs, and the error left [pu], found by
+        step doubling.
 
-        The error is the largest difference of any output between n and 2 n steps over the candidates that have a
-        steady state, or over that `share` of them which leaves least; of each event `until` so many seconds after
-        its first sample, by default all. Both results have shape (E,). Integrated as printed a model takes one step per
-        sample, as the paper does, whatever error that leaves.
+        The error is the largest difference of any output between n and 2 n steps over the
+        candidates that have a steady state, or over that `share` of them which leaves least; of
+        each event `until` so many seconds after its first sample, by default all. Both results have
+        shape (E,). Integrated as printed a model takes one step per sample, as the paper does,
+        whatever error that leaves.
         """
         most = MOST_SUBSTEPS if self.integration == CLASSICAL else 1
         chosen, error = np.ones(drive.events, dtype=np.int64), np.full(drive.events, np.inf)
         parts = [drive.part(e) for e in range(drive.events)]
         if until is not None:
             t = drive.inputs[INPUTS.index("t")]  # from each event's first sample on
-            ends = [p.start + int(np.searchsorted(t[p], end)) for p, end in zip(parts, until, strict=True)]
+            ends = [
+                p.start + int(np.searchsorted(t[p], end))
+                for p, end in zip(parts, until, strict=True)
+            ]
             parts = [slice(p.start, end) for p, end in zip(parts, ends, strict=True)]
         coarse = self.simulate(drive, values, chosen)
         while True:
@@ -260,10 +312,13 @@ class Model:
                 coarse = self.simulate(drive, values, chosen)
 
     def refusal(self, values: np.ndarray, drive: Drive) -> str | None:
-        """Why these values (d,) have no steady state before the event, as a sentence; None where they have one."""
+        """Why these values (d,) have no steady state before the event, as a sentence; None where
+        they have one.
+        """
         _, miss = self._run(drive, self._candidates(drive, values), 1)
         if miss[0, 0] == 0:
-            return None  # the kernel found one; the sentence takes the symbols, which take a second to load
+            # the kernel found one; the sentence takes the symbols, which take a second to load
+            return None
         eq = self.equations
         numbers = dict(zip(self.names, map(float, values), strict=True))
         numbers |= dict(zip((*EVENT, "P0", "Q0"), (*drive.event[0], *drive.before[0]), strict=True))
@@ -272,18 +327,30 @@ class Model:
             whole = eq.expand(expression)
             return complex(whole.subs({s: numbers[s.name] for s in whole.free_symbols})).real
 
-        missed = [r.sentence.format(value=number(r.shown)) for r in eq.requirements if not number(r.slack) >= 0]
-        return "; ".join(missed) or "no steady state was found before the event; its equations have no solution there"
+        missed = [
+            r.sentence.format(value=number(r.shown))
+            for r in eq.requirements
+            if not number(r.slack) >= 0
+        ]
+        return (
+            "; ".join(missed)
+            or "no steady state was found before the event; its equations have no solution there"
+        )
 
     def at_rest(self, values: np.ndarray, drive: Drive, event: int = 0) -> dict[str, float]:
-        """The kernel's steady state of values (d,) before an event: parameters, states (`NAME_before`), quantities.
+        """The kernel's steady state of values (d,) before an event: parameters, states
+        (`NAME_before`), quantities.
 
         Valid where `refusal` has nothing to say; quantities that are phasors are left out.
         """
-        stated = json.loads(text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest")))
+        stated = json.loads(
+            text_of((self.motor, self.static, *self.effects), self._at_rest, self._in_cache("rest"))
+        )
         numbers = [*map(float, (*values, *drive.before[event], *drive.event[event]))]
         substitutes = dict(zip((*self.names, "P0", "Q0", *EVENT), numbers, strict=True))
-        starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[0, :, 0].tolist()
+        starts = self.kernel.starts(self._candidates(drive, values)[[event]], drive.event[[event]])[
+            0, :, 0
+        ].tolist()
         substitutes |= dict(zip(stated["starts"], starts, strict=True))
         return evaluate_texts(stated["quantities"], substitutes)
 
@@ -297,11 +364,16 @@ class Model:
         """The model's equations, one a line."""
         return self.equations.latex()
 
-    def _candidates(self, drive: Drive, values: np.ndarray, before: np.ndarray | None = None) -> np.ndarray:
+    def _candidates(
+        self, drive: Drive, values: np.ndarray, before: np.ndarray | None = None
+    ) -> np.ndarray:
         """Kernel rows (E, d + 2, n): the parameters, then P0 and Q0 of the event."""
         values = np.atleast_2d(np.asarray(values, dtype=float))
         if values.shape[-1] != len(self.names):
-            raise ValueError(f"values {values.shape} must end in {len(self.names)} columns: {', '.join(self.names)}")
+            raise ValueError(
+                f"values {values.shape} must end in {len(self.names)} columns:"
+                f" {', '.join(self.names)}"
+            )
         n = values.shape[-2]
         rows = np.empty((drive.events, values.shape[-1] + 2, n))
         rows[:, :-2] = values.swapaxes(-1, -2)
@@ -309,19 +381,28 @@ class Model:
         return rows
 
     def _run(
-        self, drive: Drive, candidates: np.ndarray, substeps: Sequence[int] | np.ndarray | int,
+        self,
+        drive: Drive,
+        candidates: np.ndarray,
+        substeps: Sequence[int] | np.ndarray | int,
         outputs: np.ndarray = NOTHING,
-    ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Sums (E, C, n) and miss (E, n); writes outputs (C, n, N) where there is room."""
         n = candidates.shape[2]
         sums, miss = np.empty((drive.events, drive.channels, n)), np.empty((drive.events, n))
         steps = np.empty(drive.events, dtype=np.int64)
         steps[:] = substeps
-        lanes = LANES * max(1, int(MOST_STEPS_A_CALL / (LANES * max(drive.samples * int(steps.max()), 1))))
+        lanes = LANES * max(
+            1, int(MOST_STEPS_A_CALL / (LANES * max(drive.samples * int(steps.max()), 1)))
+        )
         if n > lanes:
             for part in (slice(begin, begin + lanes) for begin in range(0, n, lanes)):
                 some = np.ascontiguousarray(candidates[..., part])
-                written = np.empty((len(outputs), some.shape[2], drive.samples)) if outputs.size else NOTHING
+                written = (
+                    np.empty((len(outputs), some.shape[2], drive.samples))
+                    if outputs.size
+                    else NOTHING
+                )
                 sums[..., part], miss[..., part] = self._run(drive, some, steps, written)
                 if outputs.size:
                     outputs[:, part] = written
@@ -341,22 +422,33 @@ class Model:
         return sums, miss
 
 
-def _observe_outputs(effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]) -> np.ndarray:
-    """Outputs (C, n, N) as a recorder shows them: changed are those of candidates with an effect off its null."""
+def _observe_outputs(
+    effect: Measurement, outputs: np.ndarray, drive: Drive, columns: dict[str, np.ndarray]
+) -> np.ndarray:
+    """Outputs (C, n, N) as a recorder shows them: changed are those of candidates with an effect
+    off its null.
+    """
     sizes = [columns[p.name] != p.null for p in effect.parameters if p.null is not None]
     off = np.any(sizes, axis=(0, 1)) if sizes else np.ones(outputs.shape[1], dtype=bool)
     if off.all():
         return effect.observe(outputs, drive, columns)
     if off.any():
-        outputs[:, off] = effect.observe(outputs[:, off], drive, {name: each[:, off] for name, each in columns.items()})
+        outputs[:, off] = effect.observe(
+            outputs[:, off], drive, {name: each[:, off] for name, each in columns.items()}
+        )
     return outputs
 
 
 def compose(
-    motor: Motor, static: Static, effects: Sequence[Effect] = (), integration: str = CLASSICAL, domain: str = PHASORS,
+    motor: Motor,
+    static: Static,
+    effects: Sequence[Effect] = (),
+    integration: str = CLASSICAL,
+    domain: str = PHASORS,
     window: float | str | None = None,
-) -> Model:  # fmt: skip
-    """A composite load of these parts. Raises `UserError` for an effect named twice, an unknown integration or domain.
+) -> Model:
+    """A composite load of these parts. Raises `UserError` for an effect named twice, an unknown
+    integration or domain.
 
     `domain` is `phasors` or `waves`; `window` that over which the recorder averages phasors.
     """

@@ -1,8 +1,8 @@
 """The arithmetic of a kernel, counted in its IR: what a simulation costs, whatever machine runs it.
 
-Additions, multiplications and divisions are those written, an exponential or a logarithm taken apart into its own; what
-does not differ between the lanes counts for one in all of them. Signs, choices, conversions and the indices of arrays
-count for nothing.
+Additions, multiplications and divisions are those written, an exponential or a logarithm taken
+apart into its own; what does not differ between the lanes counts for one in all of them. Signs,
+choices, conversions and the indices of arrays count for nothing.
 """
 
 import re
@@ -15,16 +15,23 @@ PASSAGE = re.compile(r"  ; (begin|end) (\w+)$")
 VALUE = re.compile(r"  %\w+ = (\w+) [^<]*<\d+ x (?:double|i64)> ")
 CALL = re.compile(r"  %\w+ = call [^@]*@llvm\.(sqrt|floor|ceil)\.")
 KINDS = {
-    "fadd": "additions", "fsub": "additions", "fmul": "multiplications", "fdiv": "divisions", "fcmp": "others",
-    "shl": "others", "ashr": "others",
-}  # fmt: skip
-POINTS_A_STEP = 2  # of each step, at which what is the same in all lanes is computed: its beginning and its middle
+    "fadd": "additions",
+    "fsub": "additions",
+    "fmul": "multiplications",
+    "fdiv": "divisions",
+    "fcmp": "others",
+    "shl": "others",
+    "ashr": "others",
+}
+# of each step, at which what is the same in all lanes is computed: its beginning and its middle
+POINTS_A_STEP = 2
 
 
 @dataclass(frozen=True)
 class Operations:
-    """Operations in double precision. `others` are comparisons, minima and maxima among them, roots, roundings and
-    shifts."""
+    """Operations in double precision. `others` are comparisons, minima and maxima among them,
+    roots, roundings and shifts.
+    """
 
     additions: float = 0
     multiplications: float = 0
@@ -56,7 +63,9 @@ class Cost:
 
 def count(text: str) -> Cost:
     """The operations of a kernel as `emit.text` writes it."""
-    totals: dict[str, Counter[str]] = {name: Counter() for name in ("points", "signals", "outputs", "step")}
+    totals: dict[str, Counter[str]] = {
+        name: Counter() for name in ("points", "signals", "outputs", "step")
+    }
     inside: list[str] = []
     for line in text.splitlines():
         if passage := PASSAGE.match(line):

@@ -1,8 +1,9 @@
-"""The bases a load is composed of. A part returns what it is asked for; the framework does the rest.
+"""The bases a load is composed of. A part returns what it is asked for; the framework does the
+rest.
 
-A method gets the part's own parameters by name, as SymPy symbols; which names it asks for is checked when the plugin
-is registered, and the bases' `*_, **parameters` leave them open to a type checker. What `eq` offers is told in
-docs/plugins.md.
+A method gets the part's own parameters by name, as SymPy symbols; which names it asks for is
+checked when the plugin is registered, and the bases' `*_, **parameters` leave them open to a type
+checker. What `eq` offers is told in docs/plugins.md.
 """
 
 import inspect
@@ -25,21 +26,23 @@ if TYPE_CHECKING:
     from tractexp.model.drive import Drive
     from tractexp.model.equations import Equations
 
-CHANNELS = ("f", "U2", "I0")  # recorded channels that not every record has; I0 of waveforms, where there is some
+# recorded channels that not every record has; I0 of waveforms, where there is some
+CHANNELS = ("f", "U2", "I0")
 COMPARED = ("I0",)  # of these, what is compared and drives nothing: an event may be without
 
 
 class Part(Plugin):
     """A part of a load.
 
-    `reads` names the recorded channels (`f`, `U2`, `I0`) without which its parameters cannot be identified.
+    `reads` names the recorded channels (`f`, `U2`, `I0`) without which its parameters cannot be
+    identified.
     """
 
     reads: ClassVar[tuple[str, ...]] = ()
     phasors_only: ClassVar[str] = ""  # why it makes no sense of waveforms; "" where it does
     waves_only: ClassVar[str] = ""  # why it makes no sense of phasors
-    # A structure that most loads may have as well: every fit tells by how much it would move the parameters. A static
-    # load takes the place of the model's own, an effect is added.
+    # A structure that most loads may have as well: every fit tells by how much it would move the
+    # parameters. A static load takes the place of the model's own, an effect is added.
     rival: ClassVar[bool] = False
 
     @classmethod
@@ -48,29 +51,36 @@ class Part(Plugin):
             check_name(parameter.name, where)
         for channel in cls.reads:
             if channel not in CHANNELS:
-                raise UserError(f"{where}: reads names the channel '{channel}'{among(channel, CHANNELS, 'Channels')}")
+                raise UserError(
+                    f"{where}: reads names the channel"
+                    f" '{channel}'{among(channel, CHANNELS, 'Channels')}"
+                )
 
 
 class Motor(Part):
     """Base of the motor plugins, chosen by `model/motor=NAME`."""
 
     group: ClassVar[str] = "model/motor"
-    # It follows what happens within a cycle, as stator transients do: its answer is looked at through the window that a
-    # record's phasors were averaged over. Where it does not, the window on voltage and power keeps out what it lacks.
+    # It follows what happens within a cycle, as stator transients do: its answer is looked at
+    # through the window that a record's phasors were averaged over. Where it does not, the window
+    # on voltage and power keeps out what it lacks.
     within_a_cycle: ClassVar[bool] = False
 
     @abstractmethod
     def declare(self, eq: "Equations", *_: Any, **parameters: Any) -> Any:
-        """Declare states and sites in `eq` and return the phasor of the stator current [pu]; None: no motor.
+        """Declare states and sites in `eq` and return the phasor of the stator current [pu]; None:
+        no motor.
 
         The motor draws V conj(I), V = `eq.V`; the framework declares that.
         """
 
     def usual(self, *_: Any, **parameters: Any) -> "Iterable[tuple[Any, float, float]]":
-        """What such machines usually are: (quantity, median, factor), each positive and log-normally spread.
+        """What such machines usually are: (quantity, median, factor), each positive and
+        log-normally spread.
 
-        Two machines of three have a quantity within `factor` times or over its median. Parameters are numbers or
-        arrays (n,); quantities do not depend on the base. Where `model.priors` asks for it, the estimate is held to it.
+        Two machines of three have a quantity within `factor` times or over its median. Parameters
+        are numbers or arrays (n,); quantities do not depend on the base. Where `model.priors` asks
+        for it, the estimate is held to it.
         """
         return ()
 
@@ -90,22 +100,28 @@ class Static(Part):
     group: ClassVar[str] = "model/static"
 
     @abstractmethod
-    def law(self, u: "Symbol", *_: Any, **parameters: Any) -> "tuple[Expr | float, Expr | float] | None":
+    def law(
+        self, u: "Symbol", *_: Any, **parameters: Any
+    ) -> "tuple[Expr | float, Expr | float] | None":
         """P/P_s0 and Q/Q_s0 at the voltage u = U/U_0, both 1 at u = 1; None: no static load.
 
         A law that names an argument `f` gets the frequency over that before the event.
         """
 
     def damping(self, *_: Any, **parameters: Any) -> Any:
-        """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is none."""
+        """Resistance over reactance of the branch that draws Q_s in waveforms; in phasors there is
+        none.
+        """
         from tractexp.model.equations import DAMPING
 
         return DAMPING
 
     def require(self, *_: Any, **parameters: Any) -> Iterable[tuple[Any, ...]]:
-        """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack >= 0 where it does.
+        """What must hold for a steady state: (slack, sentence) or (slack, sentence, shown), slack
+        >= 0 where it does.
 
-        `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and `U0` by name.
+        `{value}` in the sentence prints `shown`, by default the slack. May ask for `P0`, `Q0` and
+        `U0` by name.
         """
         return ()
 
@@ -114,7 +130,10 @@ class Static(Part):
         super().check_class(where)
         check_signature(cls, "law", "u", where, offered=("f",))
         if "f" in inspect.signature(cls.law).parameters and "f" not in cls.reads:
-            raise UserError(f"{where}: law() asks for the frequency, f, which not every record has; say reads = ('f',)")
+            raise UserError(
+                f"{where}: law() asks for the frequency, f, which not every record has; say reads ="
+                " ('f',)"
+            )
         check_signature(cls, "require", None, where, offered=("P0", "Q0", "U0"), all_taken=False)
         check_signature(cls, "damping", None, where, all_taken=False)
 
@@ -130,26 +149,30 @@ class Curve:
 
 
 class Effect(Part):
-    """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the equations.
+    """Base of the effects a model may lack, named in `model.effects=[...]`: an edit of the
+    equations.
 
-    The parameters that say how large the effect is have a `null` at which the edited equations are the unedited
-    ones; `relevant` is the smallest departure from it that matters. The others vanish there, and `grid` names the
-    values of each at which to look for the effect. `reads` names the recorded channels without which it cannot be
-    seen, `confused_with` the effects that look alike on ordinary dips. `places` and `kind` say where it acts and what
-    it does there, of `sites.PLACES` and `sites.KINDS`. One that `iterates` solves its equations anew at each stage of
-    a step, by parts that other effects have enlarged, which makes all of them dear: it is simulated beside few.
+    The parameters that say how large the effect is have a `null` at which the edited equations are
+    the unedited ones; `relevant` is the smallest departure from it that matters. The others vanish
+    there, and `grid` names the values of each at which to look for the effect. `reads` names the
+    recorded channels without which it cannot be seen, `confused_with` the effects that look alike
+    on ordinary dips. `places` and `kind` say where it acts and what it does there, of
+    `sites.PLACES` and `sites.KINDS`. One that `iterates` solves its equations anew at each stage of
+    a step, by parts that other effects have enlarged, which makes all of them dear: it is simulated
+    beside few.
 
-    A member of a family names the textbook effect as its `family`: the same kind of effect at another place, or at the
-    same place by another law, tried beside a single textbook effect. `differs` ends the
-    sentence that begins with the textbook's name; `as_textbook` {own parameter: the textbook's} says where a search
-    begins and, where it `nests_textbook`, at which values it is the textbook effect, the other parameters at their
-    defaults. `likely` {parameter: standard deviation} holds shapes to their defaults, the textbook law, unless the data
-    say otherwise.
+    A member of a family names the textbook effect as its `family`: the same kind of effect at
+    another place, or at the same place by another law, tried beside a single textbook effect.
+    `differs` ends the sentence that begins with the textbook's name; `as_textbook` {own parameter:
+    the textbook's} says where a search begins and, where it `nests_textbook`, at which values it is
+    the textbook effect, the other parameters at their defaults. `likely` {parameter: standard
+    deviation} holds shapes to their defaults, the textbook law, unless the data say otherwise.
     """
 
     group: ClassVar[str] = "effect"
     chosen: ClassVar[bool] = False
-    order: ClassVar[int] = 0  # edits of a higher order come later: those that copy what others have edited
+    # edits of a higher order come later: those that copy what others have edited
+    order: ClassVar[int] = 0
     grid: ClassVar[dict[str, tuple[float, ...]]] = {}
     relevant: ClassVar[dict[str, float]] = {}
     confused_with: ClassVar[tuple[str, ...]] = ()
@@ -174,17 +197,21 @@ class Effect(Part):
         """
 
     def shown(self, event: Any) -> str:
-        """How a recorded event shows this effect before anything is fitted, in words; "" where it does not.
+        """How a recorded event shows this effect before anything is fitted, in words; "" where it
+        does not.
 
-        A model with `shown_effects` has the effects that an event shows, as nuisances: what the fit needs to meet the
-        record, and nobody asks for. `event` is a `tractexp.record.Event`, in waveforms a `WaveEvent`.
+        A model with `shown_effects` has the effects that an event shows, as nuisances: what the fit
+        needs to meet the record, and nobody asks for. `event` is a `tractexp.record.Event`, in
+        waveforms a `WaveEvent`.
         """
         return ""
 
     def refusal(self, eq: "Equations") -> str | None:
-        """A reason, as a sentence, that only this effect knows why it makes no sense for the equations in `eq`.
+        """A reason, as a sentence, that only this effect knows why it makes no sense for the
+        equations in `eq`.
 
-        That a site, a speed or a quantity is not there needs no saying: asking `eq` for it refuses the effect.
+        That a site, a speed or a quantity is not there needs no saying: asking `eq` for it refuses
+        the effect.
         """
         return None
 
@@ -194,35 +221,54 @@ class Effect(Part):
         check_signature(cls, "edit", "eq", where)
         for place in cls.places:
             if place not in sites.PLACES:
-                raise UserError(f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}")
+                raise UserError(
+                    f"{where}: places names '{place}'{among(place, sites.PLACES, 'Places')}"
+                )
         if cls.kind and cls.kind not in sites.KINDS:
             raise UserError(f"{where}: kind is '{cls.kind}'{among(cls.kind, sites.KINDS, 'Kinds')}")
         own = {p.name: p for p in cls.parameters}
         sizes = [p.name for p in cls.parameters if p.null is not None]
         if not sizes:
             raise UserError(
-                f"{where} has no size: give the parameter that says how large the effect is a 'null', the value at"
+                f"{where} has no size: give the parameter that says how large the effect is a"
+                " 'null', the value at"
                 " which the equations are as if it were absent"
             )
         for label, table in (("grid", cls.grid), ("relevant", cls.relevant)):
             for name in table:
                 if name not in own:
-                    raise UserError(f"{where}: {label} names '{name}', no parameter of it{among(name, own, 'It has')}")
+                    raise UserError(
+                        f"{where}: {label} names '{name}', no parameter of"
+                        f" it{among(name, own, 'It has')}"
+                    )
                 if (name in sizes) == (label == "grid"):
-                    kind = "is a size, looked for from its null" if label == "grid" else "has no null and is no size"
+                    kind = (
+                        "is a size, looked for from its null"
+                        if label == "grid"
+                        else "has no null and is no size"
+                    )
                     raise UserError(f"{where}: {label} names '{name}', which {kind}; take it out")
         for name, values in cls.grid.items():
             low, high = own[name].bounds
             if outside := [v for v in values if not low <= v <= high]:
-                raise UserError(f"{where}: grid has {name} = {outside[0]:g}, outside its bounds [{low:g}, {high:g}]")
+                raise UserError(
+                    f"{where}: grid has {name} = {outside[0]:g}, outside its bounds [{low:g},"
+                    f" {high:g}]"
+                )
 
 
 class Measurement(Effect):
-    """Base of the effects of the measurement: they act on the calculated power, not on the equations."""
+    """Base of the effects of the measurement: they act on the calculated power, not on the
+    equations.
+    """
 
     def edit(self, eq: "Equations", *_: Any, **parameters: Any) -> None:
         """A recorder leaves the equations as they are."""
 
     @abstractmethod
-    def observe(self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]) -> np.ndarray:
-        """P and Q (2, n, N) as the recorder would show them, in place or anew; `values` {parameter: (E, n)}."""
+    def observe(
+        self, power: np.ndarray, drive: "Drive", values: dict[str, np.ndarray]
+    ) -> np.ndarray:
+        """P and Q (2, n, N) as the recorder would show them, in place or anew; `values` {parameter:
+        (E, n)}.
+        """

@@ -1,4 +1,6 @@
-"""Equations in LaTeX, and quantities before the event as texts of arithmetic (`arithmetic.evaluated`)."""
+"""Equations in LaTeX, and quantities before the event as texts of arithmetic
+(`arithmetic.evaluated`).
+"""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -20,23 +22,34 @@ def lines(eq: "Equations") -> list[str]:
     for s in eq.states:
         halves = phasor_parts(start_symbol(s))
         names |= zip(
-            halves, (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")), strict=True
+            halves,
+            (rf"\operatorname{{{part}}} {starts[start_symbol(s)]}" for part in ("Re", "Im")),
+            strict=True,
         )
     tex = lambda e: sympy.latex(e, symbol_names=names, imaginary_unit="j", mul_symbol=r" \, ")  # noqa: E731
     equations = [rf"\frac{{d {s.latex}}}{{dt}} = {tex(s.derivative)}" for s in eq.states.values()]
     equations += [rf"{m.latex} \leftarrow {tex(m.renewal)}" for m in eq.memories.values()]
-    equations += [f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()]
+    equations += [
+        f"{tex(s)} = {tex(eq.shown.get(s, expression))}" for s, expression in eq.definitions.items()
+    ]
     equations += [f"{site.latex} = {tex(drawn)}" for site, drawn in eq._drawn.items()]
-    return equations + [f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()]
+    return equations + [
+        f"{starts[start_symbol(s.symbol)]} = {tex(s.initial)}" for s in eq.states.values()
+    ]
 
 
 def list_changed_lines(before: Sequence[str], after: Sequence[str]) -> list[tuple[str | None, str]]:
-    """(line before, line after) of equations that are not as they were; None before one that came in.
+    """(line before, line after) of equations that are not as they were; None before one that came
+    in.
 
     What holds before the event is left out: it follows from the others.
     """
     old = {line.split("=")[0]: line for line in before}
-    return [(old.get(line.split("=")[0]), line) for line in after if line not in before and "|_0" not in line]
+    return [
+        (old.get(line.split("=")[0]), line)
+        for line in after
+        if line not in before and "|_0" not in line
+    ]
 
 
 class _Printer(PythonCodePrinter):
@@ -47,7 +60,9 @@ class _Printer(PythonCodePrinter):
 
 
 def list_stated_quantities(eq: "Equations") -> dict[str, str]:
-    """{quantity: text of its value before the event, of what stands above it}; phasors are left out."""
+    """{quantity: text of its value before the event, of what stands above it}; phasors are left
+    out.
+    """
     printer, texts = _Printer({"strict": True}), dict[str, str]()
     for symbol in eq.definitions:
         value, imaginary = eq.parts(eq.before(symbol))

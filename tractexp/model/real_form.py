@@ -16,24 +16,32 @@ Halves = tuple[sympy.Expr, sympy.Expr]
 
 
 def expand_definitions(
-    expression: sympy.Expr, definitions: Mapping[Symbol, sympy.Expr], named: Callable[[Symbol], bool] = lambda _: True
+    expression: sympy.Expr,
+    definitions: Mapping[Symbol, sympy.Expr],
+    named: Callable[[Symbol], bool] = lambda _: True,
 ) -> sympy.Expr:
-    """The expression with the defined symbols that are `named` (by default all) replaced by what they stand for."""
+    """The expression with the defined symbols that are `named` (by default all) replaced by what
+    they stand for.
+    """
     while names := {s for s in symbols_of(expression) & definitions.keys() if named(s)}:
         expression = replace_symbols(expression, {s: definitions[s] for s in names})
     return expression
 
 
 class RealForm:
-    """Real and imaginary parts in real symbols of expressions in names with `definitions` and in complex `states`.
+    """Real and imaginary parts in real symbols of expressions in names with `definitions` and in
+    complex `states`.
 
-    A name that stands for something real is lowered by itself and put in last: products are not expanded across it, so
-    that it stays one common subexpression. `by_name` that holds for complex names, too, as space vectors need it: there
-    products across names are long. What was split once is not split again, until a definition changes (`forget`): a
-    derivative is asked for as what moves, and as what vanishes before the event.
+    A name that stands for something real is lowered by itself and put in last: products are not
+    expanded across it, so that it stays one common subexpression. `by_name` that holds for complex
+    names, too, as space vectors need it: there products across names are long. What was split once
+    is not split again, until a definition changes (`forget`): a derivative is asked for as what
+    moves, and as what vanishes before the event.
     """
 
-    def __init__(self, definitions: Mapping[Symbol, sympy.Expr], states: Iterable[Symbol], *, by_name: bool):
+    def __init__(
+        self, definitions: Mapping[Symbol, sympy.Expr], states: Iterable[Symbol], *, by_name: bool
+    ):
         self.definitions, self.states, self.by_name = definitions, states, by_name
         self._split: dict[sympy.Expr, Halves] = {}
 
@@ -56,7 +64,9 @@ class RealForm:
 
     def _complex_states(self) -> dict[Symbol, sympy.Expr]:
         """What stands for complex states and for their values before the event."""
-        both = (s for state in self.states if not state.is_real for s in (state, start_symbol(state)))
+        both = (
+            s for state in self.states if not state.is_real for s in (state, start_symbol(state))
+        )
         return {s: a + I * b for s in both for a, b in [phasor_parts(s)]}
 
     def _at_once(self, expression: sympy.Expr) -> Halves:
@@ -72,12 +82,20 @@ class RealForm:
 
     def _name_by_name(self, expression: sympy.Expr) -> Halves:
         """Every name, real or complex, is lowered by itself."""
-        pairs = {s: phasor_parts(s) for s in symbols_of(expression) & self.definitions.keys() if not s.is_real}
-        lowered = replace_symbols(expression, self._complex_states() | {s: a + I * b for s, (a, b) in pairs.items()})
+        pairs = {
+            s: phasor_parts(s)
+            for s in symbols_of(expression) & self.definitions.keys()
+            if not s.is_real
+        }
+        lowered = replace_symbols(
+            expression, self._complex_states() | {s: a + I * b for s, (a, b) in pairs.items()}
+        )
         values: dict[Symbol, sympy.Expr] = {}
         for s, pair in pairs.items():
             values |= zip(pair, self.parts(self.definitions[s]), strict=True)
-        real, imaginary = (replace_symbols(_shorter(e), values | self._named(e)) for e in halves(lowered))
+        real, imaginary = (
+            replace_symbols(_shorter(e), values | self._named(e)) for e in halves(lowered)
+        )
         return real, imaginary
 
     def _named(self, expression: sympy.Expr) -> dict[Symbol, sympy.Expr]:
@@ -86,19 +104,28 @@ class RealForm:
 
 
 def _shorter(expression: sympy.Expr) -> sympy.Expr:
-    """The expression or its expansion, whichever has fewer operations: products of phasors cancel when expanded.
+    """The expression or its expansion, whichever has fewer operations: products of phasors cancel
+    when expanded.
 
     Long ones stay as they are: they gain nothing, and expanding them takes seconds.
     """
-    if sum(1 for _ in itertools.islice(sympy.preorder_traversal(expression), MOST_EXPANDED_NODES + 1)) > MOST_EXPANDED_NODES:
+    if (
+        sum(
+            1
+            for _ in itertools.islice(sympy.preorder_traversal(expression), MOST_EXPANDED_NODES + 1)
+        )
+        > MOST_EXPANDED_NODES
+    ):
         return expression
     if not any(
-        isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args) for part in nodes(expression)
+        isinstance(part, sympy.Mul | sympy.Pow) and any(a.is_Add for a in part.args)
+        for part in nodes(expression)
     ):
         return expression
     extremes = [part for part in nodes(expression) if isinstance(part, sympy.Max | sympy.Min)]
     hidden: dict[Any, Any] = {part: real_symbol(f"_extreme{k}") for k, part in enumerate(extremes)}
-    plain: Any = expression.xreplace(hidden)  # SymPy compares the arguments of a maximum for seconds
+    # SymPy compares the arguments of a maximum for seconds
+    plain: Any = expression.xreplace(hidden)
     expanded = plain.expand(power_exp=False, power_base=False, log=False, basic=False)
     chosen: Any = min(plain, expanded, key=operations)
     return chosen.xreplace({symbol: part for part, symbol in hidden.items()})

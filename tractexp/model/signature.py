@@ -1,4 +1,6 @@
-"""What a plugin's method asks for by the names of its arguments, checked when the plugin is registered."""
+"""What a plugin's method asks for by the names of its arguments, checked when the plugin is
+registered.
+"""
 
 import inspect
 from collections.abc import Sequence
@@ -11,9 +13,15 @@ NAMED = (inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.KEYWORD_ONLY
 
 
 def check_signature(
-    cls: type[Plugin], method: str, first: str | None, where: str, offered: Sequence[str] = (), all_taken: bool = True
+    cls: type[Plugin],
+    method: str,
+    first: str | None,
+    where: str,
+    offered: Sequence[str] = (),
+    all_taken: bool = True,
 ) -> None:
-    """Raise `UserError` unless the method takes `first`, then names of own parameters and of what is `offered`.
+    """Raise `UserError` unless the method takes `first`, then names of own parameters and of what
+    is `offered`.
 
     `all_taken`: it must take every parameter of its own; `**name` takes all the rest.
     """
@@ -23,21 +31,33 @@ def check_signature(
     own = [p.name for p in cls.parameters]
     if first is not None:
         if not arguments or arguments[0].kind not in NAMED or arguments[0].name in own:
-            raise UserError(f"{where}: {method}() must take {first} first, then its parameters by name")
+            raise UserError(
+                f"{where}: {method}() must take {first} first, then its parameters by name"
+            )
         arguments = arguments[1:]
     for argument in arguments:
-        if argument.kind in NAMED and argument.name not in (*own, *offered) and argument.default is argument.empty:
+        if (
+            argument.kind in NAMED
+            and argument.name not in (*own, *offered)
+            and argument.default is argument.empty
+        ):
             raise UserError(
-                f"{where}: {method}() asks for '{argument.name}', which is neither a parameter of it nor offered"
+                f"{where}: {method}() asks for '{argument.name}', which is neither a parameter of"
+                " it nor offered"
                 f"{among(argument.name, (*own, *offered), 'It may ask for')}"
             )
-        if argument.kind is argument.VAR_POSITIONAL and argument.name != "_":  # the bases' own, which gets nothing
-            raise UserError(f"{where}: {method}() gets its parameters by name, so it cannot take *{argument.name}")
+        # the bases' own, which gets nothing
+        if argument.kind is argument.VAR_POSITIONAL and argument.name != "_":
+            raise UserError(
+                f"{where}: {method}() gets its parameters by name, so it cannot take"
+                f" *{argument.name}"
+            )
     rest = any(a.kind is a.VAR_KEYWORD for a in arguments)
     taken = {a.name for a in arguments}
     if all_taken and not rest and (unused := [name for name in own if name not in taken]):
         raise UserError(
-            f"{where}: {method}() does not take the parameter '{unused[0]}'; add it to its arguments, or drop it"
+            f"{where}: {method}() does not take the parameter '{unused[0]}'; add it to its"
+            " arguments, or drop it"
         )
 
 

@@ -10,19 +10,37 @@ from tractexp.plugin import discover, get
 
 
 def sites(model: Any) -> Table:
-    """The sites of a model: what stands at each, which of its effects edit it, and which other ones could.
+    """The sites of a model: what stands at each, which of its effects edit it, and which other ones
+    could.
 
-    Every registered effect is tried on the model, which takes seconds the first time and is remembered then.
+    Every registered effect is tried on the model, which takes seconds the first time and is
+    remembered then.
     """
     model = getattr(model, "model", model)  # what compose() returns carries it
     if not isinstance(model, Model):
-        raise UserError(f"sites() takes a model, as compose() makes one, not a {type(model).__name__}")
+        raise UserError(
+            f"sites() takes a model, as compose() makes one, not a {type(model).__name__}"
+        )
     eq, effects = model.equations, discover().get("effect", {})
     here = {effect.name for effect in model.effects}
-    could = {name: model.acceptance(get("effect", name)()).edits for name in effects if name not in here}
+    could = {
+        name: model.acceptance(get("effect", name)()).edits for name in effects if name not in here
+    }
     rows = []
     for s in (site for site in SITES.values() if site in eq):
-        by = (", ".join(sorted(n for n, edited in table.items() if s.name in edited)) for table in (eq.edits, could))
+        by = (
+            ", ".join(sorted(n for n, edited in table.items() if s.name in edited))
+            for table in (eq.edits, could)
+        )
         rows.append((s.name, s.owner, s.kind, s.unit, s.about, str(eq.expression(s)), *by))
-    columns = ("site", "of", "kind", "unit", "what", "expression", "edited by", "could be edited by")
+    columns = (
+        "site",
+        "of",
+        "kind",
+        "unit",
+        "what",
+        "expression",
+        "edited by",
+        "could be edited by",
+    )
     return Table(columns, rows, f"Sites of {model.title}")

@@ -7,8 +7,12 @@ from tractexp.kernel.graph import Symbol, nodes
 
 
 def is_real(expression: sympy.Expr) -> bool:
-    """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is finite."""
-    all_real = I not in (parts := set(nodes(expression))) and all(s.is_real for s in parts if isinstance(s, Symbol))
+    """Whether an expression is made of real symbols, or SymPy knows it to be real wherever it is
+    finite.
+    """
+    all_real = I not in (parts := set(nodes(expression))) and all(
+        s.is_real for s in parts if isinstance(s, Symbol)
+    )
     return all_real or bool(expression.is_real)  # SymPy's answer may take a second
 
 

@@ -1,7 +1,9 @@
-"""Noise of a recorded channel: how large it is, how one sample follows from those before it, and how to whiten it.
+"""Noise of a recorded channel: how large it is, how one sample follows from those before it, and
+how to whiten it.
 
-Recorded power is rarely white: a phasor window, a filter or the load itself correlate its samples. Treating
-them as independent makes standard errors too small. An autoregressive model of the residual repairs that.
+Recorded power is rarely white: a phasor window, a filter or the load itself correlate its samples.
+Treating them as independent makes standard errors too small. An autoregressive model of the
+residual repairs that.
 """
 
 import functools
@@ -24,8 +26,9 @@ FEWEST_NOISE_SAMPLES = 20  # samples to estimate a noise model from
 class Autoregression:
     """x[t] = a_1 x[t-1] + ... + a_p x[t-p] + e[t], and the best predictors of each lower order.
 
-    `coefficients[k, :k]` predict from k known predecessors, with an error of standard deviation `deviation[k]`:
-    what the first samples of a stretch and those after a gap have. `deviation[0]` is that of x itself.
+    `coefficients[k, :k]` predict from k known predecessors, with an error of standard deviation
+    `deviation[k]`: what the first samples of a stretch and those after a gap have. `deviation[0]`
+    is that of x itself.
     """
 
     coefficients: np.ndarray  # (p + 1, p)
@@ -43,9 +46,11 @@ class Autoregression:
         """The same color, `factor` times as loud."""
         return Autoregression(self.coefficients, self.deviation * factor)
 
-    def whiten(self, rows: np.ndarray, valid: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
-        """Rows (..., N) to prediction errors of unit variance (..., N), written to `out` where it is given; 0 where
-        `valid` (N,) is False.
+    def whiten(
+        self, rows: np.ndarray, valid: np.ndarray, out: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Rows (..., N) to prediction errors of unit variance (..., N), written to `out` where it
+        is given; 0 where `valid` (N,) is False.
 
         A gap ends the memory: the samples after it are predicted from fewer predecessors.
         """
@@ -56,7 +61,9 @@ class Autoregression:
         return out
 
     def _whiten(self, rows: np.ndarray, parts: Sequence[slice], out: np.ndarray) -> None:
-        """The same of parts of rows (n, N) without gaps, each sample from its predecessors there."""
+        """The same of parts of rows (n, N) without gaps, each sample from its
+        predecessors there.
+        """
         weights, p = np.r_[1.0, -self.coefficients[-1]] / self.deviation[-1], self.order
         if self.white or np.iscomplexobj(rows):
             for part in parts:
@@ -81,7 +88,9 @@ class Autoregression:
         return matrix / self.deviation[: self.order, None]
 
     def recurring(self, shocks: np.ndarray) -> np.ndarray:
-        """What the recurrence of full order makes of shocks (n, N) from rest: the banded system that whitens."""
+        """What the recurrence of full order makes of shocks (n, N) from rest: the banded system
+        that whitens.
+        """
         from scipy.linalg import solve_banded
 
         bands = np.repeat(np.r_[1.0, -self.coefficients[-1]][:, None], shocks.shape[1], axis=1)
@@ -90,7 +99,9 @@ class Autoregression:
 
 @functools.cache
 def build_filter_stencil(order: int) -> Stencil:
-    """The sum of the samples 0, 1, ... `order` before each, times the numbers c0, c1, ... of their row."""
+    """The sum of the samples 0, 1, ... `order` before each, times the numbers c0, c1, ... of their
+    row.
+    """
 
     def expression(y: Callable[[int], Any], **c: Any) -> Any:
         return sum(c[f"c{lag}"] * y(-lag) for lag in range(order + 1))
@@ -107,7 +118,8 @@ def check_count(samples: int) -> None:
     """Raise `UserError` for too few quiet samples."""
     if samples < FEWEST_NOISE_SAMPLES:
         raise UserError(
-            f"the noise cannot be told from {samples} quiet samples before and after the dips: at least {FEWEST_NOISE_SAMPLES} are"
+            f"the noise cannot be told from {samples} quiet samples before and after the dips: at"
+            f" least {FEWEST_NOISE_SAMPLES} are"
             " needed; give records that start earlier"
         )
 
@@ -115,9 +127,11 @@ def check_count(samples: int) -> None:
 def fit_autoregression(
     stretches: Sequence[np.ndarray], highest: int = HIGHEST_ORDER, sparing: bool = False
 ) -> Autoregression:
-    """The autoregression of least AICc (BIC if `sparing`), by Burg's method over several stretches (n_i,) of a channel.
+    """The autoregression of least AICc (BIC if `sparing`), by Burg's method over several stretches
+    (n_i,) of a channel.
 
-    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc); Schwarz 1978 (BIC).
+    The result is stationary whatever the data. Source: Burg 1975; Hurvich and Tsai 1989 (AICc);
+    Schwarz 1978 (BIC).
     """
     count = sum(map(len, stretches))
     power = sum(float(x @ x) for x in stretches) / max(count, 1)
@@ -131,7 +145,9 @@ def fit_autoregression(
         last = table[-1]
         table.append(np.concatenate((last - reflection * last[::-1], [reflection])))
         variance.append(max(variance[-1] * (1 - reflection**2), SMALLEST_DEVIATION**2))
-        pairs = [(f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)]
+        pairs = [
+            (f - reflection * b, b - reflection * f) for f, b in zip(forward, backward, strict=True)
+        ]
         forward, backward = [f[1:] for f, _ in pairs], [b[:-1] for _, b in pairs]
     orders = np.arange(len(variance))
     price = np.log(max(count, 2)) if sparing else 2 * count / np.maximum(count - orders - 2, 1)
@@ -140,8 +156,12 @@ def fit_autoregression(
     return of_orders(table[: order + 1], variance)
 
 
-def of_orders(table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float]) -> Autoregression:
-    """The autoregression of the coefficients (k,) of each order k, and the variance of its shocks."""
+def of_orders(
+    table: Sequence[np.ndarray], variance: np.ndarray | Sequence[float]
+) -> Autoregression:
+    """The autoregression of the coefficients (k,) of each order k, and the variance
+    of its shocks.
+    """
     coefficients = np.zeros((len(table), len(table) - 1), dtype=table[-1].dtype)
     for k, row in enumerate(table):
         coefficients[k, :k] = row

@@ -1,7 +1,8 @@
-"""The noise of what is compared: correlated between channels and in time, and how residuals are whitened by it.
+"""The noise of what is compared: correlated between channels and in time, and how residuals are
+whitened by it.
 
-Beside fast noise there may be shapes of known variance, slow or local: the wandering of the load, and what is left of
-the voltage's noise, which enters the model and leaves it in P and Q at once.
+Beside fast noise there may be shapes of known variance, slow or local: the wandering of the load,
+and what is left of the voltage's noise, which enters the model and leaves it in P and Q at once.
 """
 
 import functools
@@ -17,7 +18,8 @@ from tractexp.noise.color import Autoregression, white_noise
 from tractexp.noise.random_walk import Load, RandomWalk
 
 BURN_IN = 500  # samples
-LEAST_SHAPE_DEVIATION = 0.05  # standard deviations of the fast noise: shapes that do less are left out
+# standard deviations of the fast noise: shapes that do less are left out
+LEAST_SHAPE_DEVIATION = 0.05
 
 Pair = tuple[Autoregression, ...]  # of P and of Q, or of each current
 Shrunk = tuple[np.ndarray, np.ndarray]  # orthonormal shapes (k, R), and how much of each goes (k,)
@@ -27,16 +29,19 @@ Shrunk = tuple[np.ndarray, np.ndarray]  # orthonormal shapes (k, R), and how muc
 class Noise:
     """Residuals of each event's C channels, times `mix`, are independent autoregressions.
 
-    `pairs` has one for each event, or a single one that holds for every event. Without `mix` the channels are
-    independent as they stand, and a sample of one counts where another is missing.
+    `pairs` has one for each event, or a single one that holds for every event. Without `mix` the
+    channels are independent as they stand, and a sample of one counts where another is missing.
     """
 
     pairs: tuple[Pair, ...]
     mix: np.ndarray | None = None  # (C, C)
-    shocks: tuple[np.ndarray, ...] | None = None  # of unit variance, as they were seen; None: normal
+    # of unit variance, as they were seen; None: normal
+    shocks: tuple[np.ndarray, ...] | None = None
     random_walk: RandomWalk | None = None  # of the mixed channels
-    input_modes: np.ndarray | None = None  # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
-    vector: bool = False  # the first two channels are a space vector, whose autoregression is complex
+    # (k, C, N) pu: what errors of the voltage do, each of one standard deviation
+    input_modes: np.ndarray | None = None
+    # the first two channels are a space vector, whose autoregression is complex
+    vector: bool = False
     _shrunk: dict[int, Shrunk] = field(default_factory=dict, init=False)
 
     @classmethod
@@ -58,12 +63,20 @@ class Noise:
 
     @functools.cached_property
     def loudest_input_mode(self) -> float:
-        """The largest variance that noise of the voltage causes at any sample, over that of the power."""
-        return 0.0 if self.input_modes is None else float((self._mixed(self.input_modes) ** 2).sum(axis=0).max())
+        """The largest variance that noise of the voltage causes at any sample, over that of the
+        power.
+        """
+        return (
+            0.0
+            if self.input_modes is None
+            else float((self._mixed(self.input_modes) ** 2).sum(axis=0).max())
+        )
 
     def scaled(self, factor: float) -> "Noise":
         """The same noise, `factor` times as loud."""
-        random_walk = self.random_walk and replace(self.random_walk, intensity=self.random_walk.intensity * factor**2)
+        random_walk = self.random_walk and replace(
+            self.random_walk, intensity=self.random_walk.intensity * factor**2
+        )
         pairs = tuple(tuple(channel.scaled(factor) for channel in pair) for pair in self.pairs)
         louder = replace(
             self,
@@ -80,10 +93,13 @@ class Noise:
         return replace(self, random_walk=random_walk, input_modes=input_modes)
 
     def whiten(self, residuals: np.ndarray, drive: Drive, valid: np.ndarray) -> np.ndarray:
-        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C, N) are 0."""
+        """(n, C, N) to rows (n, C N) of independent unit variance; samples that are not `valid` (C,
+        N) are 0.
+        """
         valid = self._together(valid, drive)
         rows = np.empty(residuals.shape)
-        with np.errstate(over="ignore", invalid="ignore"):  # what diverges has a deviance that is not finite
+        # what diverges has a deviance that is not finite
+        with np.errstate(over="ignore", invalid="ignore"):
             mixed = self._mixed(residuals)
             for e in range(drive.events):
                 part = drive.part(e)
@@ -92,15 +108,19 @@ class Noise:
         return rows.reshape(len(rows), math.prod(rows.shape[1:]))  # of no rows, too
 
     def prepare(self, drive: Drive, valid: np.ndarray) -> None:
-        """Make ready what `whiten` keeps of the shapes, once, where several processes are about to be forked."""
+        """Make ready what `whiten` keeps of the shapes, once, where several processes are about to
+        be forked.
+        """
         valid = self._together(valid, drive)
         for e in range(drive.events):
             self._shrinkage(valid[:, drive.part(e)], drive.part(e), e)
 
     def _together(self, valid: np.ndarray, drive: Drive) -> np.ndarray:
-        """Samples (C, N) that count where channels are mixed: those at which all count that are measured.
+        """Samples (C, N) that count where channels are mixed: those at which all count that are
+        measured.
 
-        The mixing of currents is triangular, so that an event without the last, of zero sequence, has the others.
+        The mixing of currents is triangular, so that an event without the last, of zero sequence,
+        has the others.
         """
         if self.mix is None:
             return valid
@@ -118,15 +138,24 @@ class Noise:
             drawn[:, :, a:b] = own if self.mix is None else np.linalg.solve(self.mix, own)
         return drawn
 
-    def draw_white(self, rng: np.random.Generator, count: int, drive: Drive, valid: np.ndarray) -> np.ndarray:
-        """Rows (count, C N) of the law that `whiten` gives to what `draw` draws: the shocks alone, 0 in gaps."""
+    def draw_white(
+        self, rng: np.random.Generator, count: int, drive: Drive, valid: np.ndarray
+    ) -> np.ndarray:
+        """Rows (count, C N) of the law that `whiten` gives to what `draw` draws: the shocks alone,
+        0 in gaps.
+        """
         size = count, drive.samples
-        shocks = [rng.standard_normal(size) if seen is None else rng.choice(seen, size) for seen in self._shocks]
+        shocks = [
+            rng.standard_normal(size) if seen is None else rng.choice(seen, size)
+            for seen in self._shocks
+        ]
         rows = np.stack(shocks, axis=1) * self._together(valid, drive)
         return rows.reshape(count, math.prod(rows.shape[1:]))  # of no rows, too
 
     def worth(self, samples: int) -> float:
-        """How many independent samples tell as much of the slowest of this noise, by the color's gain at rest."""
+        """How many independent samples tell as much of the slowest of this noise, by the color's
+        gain at rest.
+        """
         channels = [channel for pair in self.pairs for channel in pair]
         gains = [1 / max(float(abs(1 - a.coefficients[-1].sum())), 1e-3) for a in channels]
         spreads = [a.deviation[0] / a.deviation[-1] for a in channels]
@@ -138,9 +167,11 @@ class Noise:
         return tuple(np.sqrt(self._fast_variance(0)).tolist())
 
     def memory(self, step: float) -> float:
-        """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples `step` [s] apart.
+        """Within which time [s] a first-order autoregression as loud at rest as P forgets, samples
+        `step` [s] apart.
 
-        Its neighbors correlate by a, with (1 + a) / (1 - a) the square of its gain at rest over its spread.
+        Its neighbors correlate by a, with (1 + a) / (1 - a) the square of its gain at rest over its
+        spread.
         """
         P = self.pairs[0][0]
         gain = P.deviation[-1] / max(1 - float(P.coefficients[-1].sum()), 1e-3)
@@ -151,11 +182,17 @@ class Noise:
     def describe(self, names: Sequence[str] = ("P", "Q")) -> str:
         """Level and color, as a run prints them."""
         pair, levels = self.pairs[0], zip(names, self.levels, strict=True)
-        color = "white" if all(a.white for a in pair) else f"colored (order {max(a.order for a in pair)})"
+        color = (
+            "white"
+            if all(a.white for a in pair)
+            else f"colored (order {max(a.order for a in pair)})"
+        )
         return f"{', '.join(f'{name} {level:.2g} pu' for name, level in levels)}, {color}"
 
     def deviation(self, drive: Drive) -> np.ndarray:
-        """Standard deviation of every sample of each channel, (C, N) [pu], with what its shapes add."""
+        """Standard deviation of every sample of each channel, (C, N) [pu], with what its shapes
+        add.
+        """
         variance = np.empty(drive.measured.shape)
         for e in range(drive.events):
             part = drive.part(e)
@@ -165,7 +202,9 @@ class Noise:
 
     @property
     def _shocks(self) -> Sequence[np.ndarray | None]:
-        """The shocks of each channel as they were seen; None where they are normal, as those of a space vector are."""
+        """The shocks of each channel as they were seen; None where they are normal, as those of a
+        space vector are.
+        """
         seen = self.shocks or [None] * self.channels
         return [None, None, *seen[2:]] if self.vector else seen
 
@@ -186,8 +225,12 @@ class Noise:
         """Channels (n, C, N) mixed so that their noise is independent."""
         return rows if self.mix is None else self.mix @ rows
 
-    def _fast(self, mixed: np.ndarray, valid: np.ndarray, event: int, out: np.ndarray) -> np.ndarray:
-        """Mixed channels (n, C, samples) of one event without the color of the fast noise, in `out`."""
+    def _fast(
+        self, mixed: np.ndarray, valid: np.ndarray, event: int, out: np.ndarray
+    ) -> np.ndarray:
+        """Mixed channels (n, C, samples) of one event without the color of the fast noise, in
+        `out`.
+        """
         pair, alone = self.pair(event), 0
         if self.vector:
             white = pair[0].whiten(mixed[:, 0] + 1j * mixed[:, 1], valid[0])
@@ -208,7 +251,9 @@ class Noise:
         white -= (((flat @ basis.T) * share) @ basis).reshape(white.shape)
 
     def _shrinkage(self, valid: np.ndarray, part: slice, event: int) -> Shrunk | None:
-        """The shapes of an event as whitening takes them out, decomposed once; None where there are none."""
+        """The shapes of an event as whitening takes them out, decomposed once; None where there are
+        none.
+        """
         if self.random_walk is None and self.input_modes is None:
             return None
         if event not in self._shrunk:
@@ -217,10 +262,16 @@ class Noise:
         return self._shrunk[event]
 
     def _shapes(self, part: slice, event: int) -> np.ndarray:
-        """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation each, in their order."""
+        """Shapes (k, C, samples) of the mixed channels in one event, of one standard deviation
+        each, in their order.
+        """
         shapes = [np.empty((0, self.channels, part.stop - part.start))]
         if self.random_walk is not None:
-            shapes.append(self.random_walk.modes(event, part, np.eye(self.channels) if self.mix is None else self.mix))
+            shapes.append(
+                self.random_walk.modes(
+                    event, part, np.eye(self.channels) if self.mix is None else self.mix
+                )
+            )
         if self.input_modes is not None:
             shapes.append(self._mixed(self.input_modes[:, :, part]))
         return np.concatenate(shapes)
@@ -239,7 +290,9 @@ class Noise:
             shocks *= channel.deviation[-1]
             colored.append(channel.recurring(shocks)[:, BURN_IN:])
         shapes = self._shapes(part, event)
-        return np.stack(colored, axis=1) + np.tensordot(rng.standard_normal((count, len(shapes))), shapes, axes=1)
+        return np.stack(colored, axis=1) + np.tensordot(
+            rng.standard_normal((count, len(shapes))), shapes, axes=1
+        )
 
 
 def _all_measured(valid: np.ndarray) -> np.ndarray:
@@ -249,7 +302,8 @@ def _all_measured(valid: np.ndarray) -> np.ndarray:
 
 
 def _shrunk(shapes: np.ndarray) -> Shrunk:
-    """Right singular vectors of shapes (k, C, n) that are seen, and 1 - (1 + s²)^(-1/2) of their singular values s.
+    """Right singular vectors of shapes (k, C, n) that are seen, and 1 - (1 + s²)^(-1/2) of their
+    singular values s.
 
     By the eigenvectors of their products: a fifth of the time of a singular value decomposition.
     """

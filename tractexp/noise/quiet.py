@@ -1,4 +1,6 @@
-"""Noise where little happens: estimated from what a fit leaves before the dips and at the end of the records."""
+"""Noise where little happens: estimated from what a fit leaves before the dips and at the end of
+the records.
+"""
 
 import functools
 from collections.abc import Callable, Sequence
@@ -6,7 +8,13 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from tractexp.model.drive import Drive
-from tractexp.noise.color import SMALLEST_DEVIATION, Autoregression, check_count, fit_autoregression, white_noise
+from tractexp.noise.color import (
+    SMALLEST_DEVIATION,
+    Autoregression,
+    check_count,
+    fit_autoregression,
+    white_noise,
+)
 from tractexp.noise.model import Noise
 from tractexp.noise.random_walk import RandomWalk, without_slow
 from tractexp.record import Event
@@ -14,8 +22,10 @@ from tractexp.record import Event
 HIGHEST_NOISE_ORDER = 8  # order of the autoregressions
 QUIET_TAIL_SHARE = 0.35  # share of the record after the dip that counts as quiet
 SHORTEST_QUIET_STRETCH = 8  # samples of a stretch
-FEWEST_EMPIRICAL_SAMPLES = 200  # quiet samples from which shocks are drawn as they were seen, with their tails and steps
-DEGREES = np.array([2.5, 3, 3.5, 4, 5, 6, 8, 10, 15, 20])  # of freedom of Student's t that are tried
+# quiet samples from which shocks are drawn as they were seen, with their tails and steps
+FEWEST_EMPIRICAL_SAMPLES = 200
+# of freedom of Student's t that are tried
+DEGREES = np.array([2.5, 3, 3.5, 4, 5, 6, 8, 10, 15, 20])
 LEAST_QUIET_GAIN = 10.0  # of twice the log-likelihood: by chance once in some 1,500
 LOUDER = 1e-3  # p below which the end of a record is louder than its beginning
 QUANTILES = 20_000  # that stand for a law
@@ -38,7 +48,8 @@ def estimate(
     random_walk: Callable[[np.ndarray], RandomWalk | None] = lambda mix: None,
     input_modes: np.ndarray | None = None,
 ) -> Noise:
-    """Noise from residuals (C, N) in quiet stretches; `random_walk` is that of the load in channels mixed by `mix`.
+    """Noise from residuals (C, N) in quiet stretches; `random_walk` is that of the load in channels
+    mixed by `mix`.
 
     Raises `UserError` where too few samples are quiet.
     """
@@ -49,7 +60,8 @@ def estimate(
     check_count(count)
     together = np.concatenate(pieces, axis=1)
     covariance = together @ together.T / count
-    covariance += np.diag(1e-18 + 1e-14 * np.diag(covariance))  # of channels that say the same: sums are no more exact
+    # of channels that say the same: sums are no more exact
+    covariance += np.diag(1e-18 + 1e-14 * np.diag(covariance))
     own = np.linalg.inv(np.linalg.cholesky(covariance))
     fast = [[(own @ p)[c] for p in pieces] for c in range(len(own))]
     mix = np.eye(len(measured))
@@ -57,7 +69,8 @@ def estimate(
     slow = random_walk(mix)
     if slow is not None:
         fast = [[without_slow(p) for p in channel] for channel in fast]
-    # Sparing, because a color that is not there changes the weight of slow differences, which every effect makes.
+    # Sparing, because a color that is not there changes the weight of slow differences, which every
+    # effect makes.
     fitted = [fit_autoregression(channel, HIGHEST_NOISE_ORDER, sparing=True) for channel in fast]
     shocks = None
     if count >= FEWEST_EMPIRICAL_SAMPLES and measured.all():
@@ -83,25 +96,32 @@ def louder(late: Sequence[np.ndarray], calm: Sequence[np.ndarray]) -> bool:
 def _variance(pieces: Sequence[np.ndarray]) -> tuple[float, float]:
     """Variance of stretches, and how many independent samples it is worth."""
     count = sum(map(len, pieces))
-    color = fit_autoregression(list(pieces), min(HIGHEST_NOISE_ORDER, max(count // 10, 0)), sparing=True)
-    return sum(float(p @ p) for p in pieces) / max(count, 1), max(Noise(((color,),)).worth(count), 2.0)
+    color = fit_autoregression(
+        list(pieces), min(HIGHEST_NOISE_ORDER, max(count // 10, 0)), sparing=True
+    )
+    return sum(float(p @ p) for p in pieces) / max(count, 1), max(
+        Noise(((color,),)).worth(count), 2.0
+    )
 
 
 def _shocks(channel: Autoregression, pieces: Sequence[np.ndarray]) -> np.ndarray:
     """What the past of a channel does not predict, centered and scaled to unit variance.
 
-    Of heavy tails the quiet samples show less than follows after the dip: there the quantiles of their law stand for
-    them.
+    Of heavy tails the quiet samples show less than follows after the dip: there the quantiles of
+    their law stand for them.
     """
-    white = np.concatenate([channel.whiten(p, np.ones(len(p), dtype=bool))[channel.order :] for p in pieces])
+    white = np.concatenate(
+        [channel.whiten(p, np.ones(len(p), dtype=bool))[channel.order :] for p in pieces]
+    )
     unit = (white - white.mean()) / max(float(white.std()), 1e-300)
     heavy = _heavy(unit)
     return unit if heavy is None else heavy
 
 
 def _heavy(unit: np.ndarray) -> np.ndarray | None:
-    """Quantiles of unit variance of the most likely Student's t of samples (n,), where it is clearly likelier than the
-    normal distribution; else None."""
+    """Quantiles of unit variance of the most likely Student's t of samples (n,), where it is
+    clearly likelier than the normal distribution; else None.
+    """
     from scipy.special import gammaln
 
     freedom = DEGREES[:, None]
@@ -116,7 +136,9 @@ def _heavy(unit: np.ndarray) -> np.ndarray | None:
 
 @functools.cache
 def _quantiles(freedom: float) -> np.ndarray:
-    """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since draws estimate their noise anew."""
+    """Quantiles of Student's t, of unit variance; once for each of `DEGREES`, since draws estimate
+    their noise anew.
+    """
     from scipy.special import stdtrit
 
     quantiles = stdtrit(freedom, (np.arange(QUANTILES) + 0.5) / QUANTILES)

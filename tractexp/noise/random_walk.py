@@ -1,7 +1,8 @@
 """Slow wandering of the load: trains accelerate and others come and go while an event is recorded.
 
-A random walk over an event is a sum of cosines whose amplitudes fall with the frequency (Karhunen and Loeve); their
-prior is divided out of the residuals like the rest of the noise, so that no slow effect is named for it.
+A random walk over an event is a sum of cosines whose amplitudes fall with the frequency (Karhunen
+and Loeve); their prior is divided out of the residuals like the rest of the noise, so that no slow
+effect is named for it.
 """
 
 import functools
@@ -16,17 +17,26 @@ from tractexp.noise.span import compute_basis
 from tractexp.record import Event
 
 MODES = 48
-LEAST_LEVEL_SHARE = 0.3  # of the level of a load in both channels: one that has less of the first does not wander by it
-WANDERING_COSINES = 3  # cosines of a stretch that belong to wandering before its fast noise is modelled
-LEAST_DIRECTION_SHARE = 0.03  # of the strongest direction: columns that differ by less from others are none of their own
-LESS = 1.0  # log-likelihood below the largest at which the intensity is taken: the larger end of an interval of 84 %
-GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))  # of the intensity, variances of the channel per second
-STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))  # of a single stretch, in variances of its noise
+# of the level of a load in both channels: one that has less of the first does not wander by it
+LEAST_LEVEL_SHARE = 0.3
+# cosines of a stretch that belong to wandering before its fast noise is modelled
+WANDERING_COSINES = 3
+# of the strongest direction: columns that differ by less from others are none of their own
+LEAST_DIRECTION_SHARE = 0.03
+# log-likelihood below the largest at which the intensity is taken: the larger end of an interval of
+# 84 %
+LESS = 1.0
+# of the intensity, variances of the channel per second
+GRID = np.concatenate(([0.0], np.geomspace(1e-3, 1e4, 71)))
+# of a single stretch, in variances of its noise
+STIFF = np.concatenate(([0.0], np.geomspace(1e-4, 1e12, 97)))
 
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A stretch of white noise of unit variance and of modes of random amplitude, whose intensity is looked for."""
+    """A stretch of white noise of unit variance and of modes of random amplitude, whose intensity
+    is looked for.
+    """
 
     values: np.ndarray  # (k,) singular values of the modes
     basis: np.ndarray  # (k, n)
@@ -34,7 +44,9 @@ class Walk:
 
     @classmethod
     def of(cls, stretch: np.ndarray, fixed: np.ndarray, modes: np.ndarray) -> "Walk":
-        """A stretch (n,) with orthonormal rows `fixed` of any amplitude, and modes of unit intensity (k, n)."""
+        """A stretch (n,) with orthonormal rows `fixed` of any amplitude, and modes of unit
+        intensity (k, n).
+        """
         _, values, basis = np.linalg.svd(modes - (modes @ fixed.T) @ fixed, full_matrices=False)
         return cls(values, basis, basis @ (stretch - (stretch @ fixed.T) @ fixed))
 
@@ -65,7 +77,9 @@ class Load:
     def of(cls, measured: np.ndarray, before: np.ndarray, first: np.ndarray) -> "Load":
         """Of P and Q (2, N) with means `before` (E, 2); events begin at `first` (E + 1,)."""
         level = np.maximum(np.linalg.norm(before, axis=1), 1e-9)
-        return cls(np.nan_to_num(measured) / np.repeat(level, np.diff(first)), before / level[:, None])
+        return cls(
+            np.nan_to_num(measured) / np.repeat(level, np.diff(first)), before / level[:, None]
+        )
 
     @functools.cached_property
     def apparent(self) -> np.ndarray:
@@ -75,10 +89,12 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class RandomWalk:
-    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second before an event.
+    """Random walks of two mixed channels: `intensity` (2,) is the variance gained in a second
+    before an event.
 
-    What wanders are customers, whose active and reactive power go together, in a dip and after it, too: what the first
-    channel does the second follows as the load's power says. Beside that the second wanders by itself.
+    What wanders are customers, whose active and reactive power go together, in a dip and after it,
+    too: what the first channel does the second follows as the load's power says. Beside that the
+    second wanders by itself.
     """
 
     intensity: np.ndarray
@@ -86,7 +102,9 @@ class RandomWalk:
     load: Load
 
     def modes(self, event: int, part: slice, mix: np.ndarray) -> np.ndarray:
-        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their amplitudes."""
+        """Cosines (2 k, 2, samples) of one event, scaled by the standard deviation of their
+        amplitudes.
+        """
         n = part.stop - part.start
         walk = _random_walk(n, self.step, min(MODES, n // 8))
         level, power = mix @ self.load.before[event], mix @ self.load.power[:, part]
@@ -98,7 +116,9 @@ class RandomWalk:
 
 @dataclass(frozen=True, eq=False)
 class Rest:
-    """What a fit leaves of an event (2, n), and all that something known could still explain (k, 2, n)."""
+    """What a fit leaves of an event (2, n), and all that something known could still explain (k, 2,
+    n).
+    """
 
     left: np.ndarray
     columns: np.ndarray
@@ -106,51 +126,77 @@ class Rest:
 
 
 def find(
-    before: Sequence[np.ndarray], step: float, load: Load, rests: Sequence[Rest] = (), *, seen: float
+    before: Sequence[np.ndarray],
+    step: float,
+    load: Load,
+    rests: Sequence[Rest] = (),
+    *,
+    seen: float,
 ) -> RandomWalk | None:
-    """The wandering of two channels in stretches (2, n_i) before the events; None where there is none to be seen.
+    """The wandering of two channels in stretches (2, n_i) before the events; None where there is
+    none to be seen.
 
-    To be safe the largest intensity whose log-likelihood is at most `LESS` below the likeliest's, given the fast
-    noise; in both channels where it is seen in one, for what wanders is the load. It is seen where twice the
-    log-likelihood gains `seen`. What is left of the events counts, too, where both show twice that, but no more than
-    the stretches before them allow: what answers a dip does not wander.
+    To be safe the largest intensity whose log-likelihood is at most `LESS` below the likeliest's,
+    given the fast noise; in both channels where it is seen in one, for what wanders is the load. It
+    is seen where twice the log-likelihood gains `seen`. What is left of the events counts, too,
+    where both show twice that, but no more than the stretches before them allow: what answers a dip
+    does not wander.
     """
     stretches = [b for b in before if b.shape[1] >= 8 * (WANDERING_COSINES + 2)]
     if not stretches:
         return None
-    fast = [fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)]
+    fast = [
+        fit_autoregression([without_slow(s[c]) for s in stretches], sparing=True) for c in (0, 1)
+    ]
     total = np.array([_likelihood([s[c] for s in stretches], fast[c], step) for c in (0, 1)])
     total -= total[:, :1]
     most = [_last(row) for row in total]
     walk = RandomWalk(GRID[most], step, load)
     if 2 * total.max() >= seen:
         return walk
-    rest = np.array([sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)])
+    rest = np.array(
+        [sum(_within(r, c, fast[c], step) for r in rests) * np.ones(len(GRID)) for c in (0, 1)]
+    )
     both = total + rest - rest[:, :1]
     gained = max(2 * row[: last + 1].max() for row, last in zip(both, most, strict=True))
     return walk if gained >= 2 * seen else None
 
 
 def walk_of_load(
-    events: Sequence[Event], drive: Drive, load: Load, left: np.ndarray | None, columns: np.ndarray | None,
-    valid: np.ndarray, mix: np.ndarray, *, seen: float,
-) -> RandomWalk | None:  # fmt: skip
-    """How the load wanders before the events, and during them, in channels mixed by `mix`, as `find` tells it.
+    events: Sequence[Event],
+    drive: Drive,
+    load: Load,
+    left: np.ndarray | None,
+    columns: np.ndarray | None,
+    valid: np.ndarray,
+    mix: np.ndarray,
+    *,
+    seen: float,
+) -> RandomWalk | None:
+    """How the load wanders before the events, and during them, in channels mixed by `mix`, as
+    `find` tells it.
 
-    What a fit leaves (C, N) counts where it is there with all columns that could explain it (k, C, N) and has no gap.
+    What a fit leaves (C, N) counts where it is there with all columns that could explain it (k, C,
+    N) and has no gap.
     """
     parts = [drive.part(e) for e in range(drive.events)]
-    before = [drive.measured[:, part][:, event.steady] for part, event in zip(parts, events, strict=True)]
+    before = [
+        drive.measured[:, part][:, event.steady] for part, event in zip(parts, events, strict=True)
+    ]
     rests = []
     if left is not None and columns is not None and valid.all():
         mixed = np.einsum("ij,kjt->kit", mix, columns)
-        rests = [Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts]
+        rests = [
+            Rest(mix @ left[:, part], mixed[:, :, part], load.apparent[part]) for part in parts
+        ]
     stretches = [mix @ b for b in before if np.isfinite(b).all()]
     return find(stretches, events[0].record.step, load, rests, seen=seen)
 
 
 def _last(likelihood: np.ndarray) -> int:
-    """Index of the last of the intensities that are less likely than the likeliest by no more than `LESS`."""
+    """Index of the last of the intensities that are less likely than the likeliest by no more than
+    `LESS`.
+    """
     return int(np.flatnonzero(likelihood > likelihood.max() - LESS)[-1])
 
 
@@ -162,7 +208,9 @@ def without_slow(stretch: np.ndarray) -> np.ndarray:
 
 
 def without_drift(stretches: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Stretches (n_i,) without the slope that they share: a load that drifts does so in every event."""
+    """Stretches (n_i,) without the slope that they share: a load that drifts does so in every
+    event.
+    """
     times = [np.arange(len(s)) - (len(s) - 1) / 2 for s in stretches]
     slope = sum(t @ s for t, s in zip(times, stretches, strict=True)) / sum(t @ t for t in times)
     return [s - slope * t for t, s in zip(times, stretches, strict=True)]
@@ -176,11 +224,15 @@ def cosines(samples: int, count: int) -> np.ndarray:
 
 def _random_walk(samples: int, step: float, count: int) -> np.ndarray:
     """Modes (count, samples) of a random walk that gains a variance of one in a second."""
-    return np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
+    return (
+        np.sqrt(step) * samples / np.pi / np.arange(1, count + 1)[:, None] * cosines(samples, count)
+    )
 
 
 def _likelihood(stretches: Sequence[np.ndarray], fast: Autoregression, step: float) -> np.ndarray:
-    """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of one channel."""
+    """Logarithm of the likelihood of each intensity of the grid in stretches (n_i,) of
+    one channel.
+    """
     total = np.zeros(len(GRID))
     for stretch in without_drift(stretches):
         total += _compute_log_likelihood(stretch, np.ones((1, len(stretch))), fast, step)
@@ -196,10 +248,18 @@ def _within(rest: Rest, channel: int, fast: Autoregression, step: float) -> np.n
 
 
 def _compute_log_likelihood(
-    stretch: np.ndarray, columns: np.ndarray, fast: Autoregression, step: float, profile: np.ndarray | float = 1.0
-) -> np.ndarray:  # fmt: skip
-    """Logarithm of the likelihood of each intensity in a stretch (n,) with columns (k, n) of any amplitude."""
+    stretch: np.ndarray,
+    columns: np.ndarray,
+    fast: Autoregression,
+    step: float,
+    profile: np.ndarray | float = 1.0,
+) -> np.ndarray:
+    """Logarithm of the likelihood of each intensity in a stretch (n,) with columns (k, n) of any
+    amplitude.
+    """
     n, k = len(stretch), len(columns)
     modes = _random_walk(n, step, min(MODES, n // 8)) * profile
     rows = fast.whiten(np.vstack([columns, stretch, modes]), np.ones(n, dtype=bool))
-    return Walk.of(rows[k], compute_basis(rows[:k], LEAST_DIRECTION_SHARE), rows[k + 1 :]).likelihood(GRID)
+    return Walk.of(
+        rows[k], compute_basis(rows[:k], LEAST_DIRECTION_SHARE), rows[k + 1 :]
+    ).likelihood(GRID)

@@ -4,7 +4,8 @@ import numpy as np
 
 
 def compute_basis(rows: np.ndarray, distinct: float, least: float = 0.0) -> np.ndarray:
-    """Orthonormal basis (m, R) of what rows (k, R) span, each scaled to length one; those of at most `least` are none.
+    """Orthonormal basis (m, R) of what rows (k, R) span, each scaled to length one; those of at
+    most `least` are none.
 
     Directions weaker than `distinct` times the strongest are left out.
     """

@@ -1,10 +1,12 @@
-"""The voltage channel's own noise. The load never saw it, but a simulation driven by the record does.
+"""The voltage channel's own noise. The load never saw it, but a simulation driven by the record
+does.
 
-Where the voltage is smooth it is replaced by a cubic and cosines whose amplitudes fall with the square of the
-frequency: a smoothing spline in other words, its stiffness the likeliest (Wahba 1990). Near the edges of a dip it is
-left as recorded. Either way something of the noise remains; how much, and in which shapes, is known, and what they do
-to the calculated power is part of the noise of a study. Left out of account they would do harm: whatever smooths the
-calculated power, or wanders slowly, would seem to be there.
+Where the voltage is smooth it is replaced by a cubic and cosines whose amplitudes fall with the
+square of the frequency: a smoothing spline in other words, its stiffness the likeliest (Wahba
+1990). Near the edges of a dip it is left as recorded. Either way something of the noise remains;
+how much, and in which shapes, is known, and what they do to the calculated power is part of the
+noise of a study. Left out of account they would do harm: whatever smooths the calculated power, or
+wanders slowly, would seem to be there.
 """
 
 from dataclasses import dataclass, replace
@@ -18,10 +20,12 @@ from tractexp.record.change import runs
 HALF_WIDTHS = (1, 2, 3, 5, 8)  # samples of the averages that must agree where the voltage is smooth
 AGREE = 2.5  # standard deviations within which they do
 EDGE_MARGIN = 3  # samples beside an edge that are not smooth
-BOUND, BESIDE = 4.0, 3.0  # standard deviations of an average that smoothing may leave, and beside an edge
+# standard deviations of an average that smoothing may leave, and beside an edge
+BOUND, BESIDE = 4.0, 3.0
 SHORTEST_SMOOTHED_STRETCH = 24  # samples of a stretch worth smoothing
 DEGREE, COSINES = 3, 32  # of the curve through a smooth stretch
-MOST_FOLLOWED_SAMPLES = 400  # samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
+# samples as recorded whose errors are followed up, the nearest to the dip: each costs a simulation
+MOST_FOLLOWED_SAMPLES = 400
 LEAST_NOISE_SHARE = 0.01  # share of a direction's noise: less of it is left out
 SILENT = 1e-5  # pu: less noise than this is none
 
@@ -59,7 +63,11 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
             smooth[part] = curve
             errors.append(np.zeros((len(own), len(U))))
             errors[-1][:, part] = own
-        far = _distance(U - smooth, deviation) / np.where(_widen_rough_stretches(rough), BESIDE, BOUND) * ~rough
+        far = (
+            _distance(U - smooth, deviation)
+            / np.where(_widen_rough_stretches(rough), BESIDE, BOUND)
+            * ~rough
+        )
         if far.max() < 1:
             break
         rough[far.argmax()] = True
@@ -68,7 +76,9 @@ def smooth_voltage(event: Event) -> SmoothedEvent:
     apart = np.maximum(event.start - raw, 0) + np.maximum(raw - event.end, 0)
     raw = raw[np.argsort(apart, kind="stable")[:MOST_FOLLOWED_SAMPLES]]
     errors.append(deviation * (np.arange(len(U)) == raw[:, None]))
-    return SmoothedEvent(replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors))
+    return SmoothedEvent(
+        replace(event, record=replace(event.record, U=smooth)), np.concatenate(errors)
+    )
 
 
 def noise_of(U: np.ndarray) -> float:
@@ -82,7 +92,8 @@ def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
     index, sums = np.arange(len(U)), np.concatenate(([0.0], np.cumsum(U)))
     low, high = U - AGREE * deviation, U + AGREE * deviation
     for half in HALF_WIDTHS:
-        h = np.minimum(half, np.minimum(index, index[::-1]))  # symmetric at the ends too, or a slope would bend
+        # symmetric at the ends too, or a slope would bend
+        h = np.minimum(half, np.minimum(index, index[::-1]))
         mean = (sums[index + h + 1] - sums[index - h]) / (2 * h + 1)
         reach = AGREE * deviation / np.sqrt(2 * h + 1)
         low, high = np.maximum(low, mean - reach), np.minimum(high, mean + reach)
@@ -90,7 +101,9 @@ def _edges(U: np.ndarray, deviation: float) -> np.ndarray:
 
 
 def _widen_rough_stretches(rough: np.ndarray) -> np.ndarray:
-    """Rough samples with those beside them, and the stretches between them that are too short to be smoothed."""
+    """Rough samples with those beside them, and the stretches between them that are too short to be
+    smoothed.
+    """
     wide = np.convolve(rough, np.ones(2 * EDGE_MARGIN + 1), "same") > 0.5
     for part in runs(~wide):
         if part.stop - part.start < SHORTEST_SMOOTHED_STRETCH:
@@ -99,7 +112,9 @@ def _widen_rough_stretches(rough: np.ndarray) -> np.ndarray:
 
 
 def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
-    """How far the worst average around each sample of what is left (N,) is from zero, in standard deviations."""
+    """How far the worst average around each sample of what is left (N,) is from zero, in standard
+    deviations.
+    """
     far = np.abs(left)
     for half in HALF_WIDTHS:
         window = np.ones(2 * half + 1) / np.sqrt(2 * half + 1)
@@ -108,7 +123,9 @@ def _distance(left: np.ndarray, deviation: float) -> np.ndarray:
 
 
 def _curve(U: np.ndarray, deviation: float) -> tuple[np.ndarray, np.ndarray]:
-    """The likeliest curve through a stretch (n,), and its errors (k, n) of one standard deviation each."""
+    """The likeliest curve through a stretch (n,), and its errors (k, n) of one standard deviation
+    each.
+    """
     n = len(U)
     fixed = np.linalg.qr(np.polynomial.legendre.legvander(np.linspace(-1, 1, n), DEGREE))[0].T
     count = min(COSINES, n // 8)

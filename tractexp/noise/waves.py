@@ -1,22 +1,32 @@
-"""Noise of sampled currents: white noise of their own, and that of the recorded voltage, as the load passes it on.
+"""Noise of sampled currents: white noise of their own, and that of the recorded voltage, as the
+load passes it on.
 
-A model is driven by the voltage as recorded. What is noise in it makes calculated currents wander about the true ones:
-slowly, since a machine's flux sums the voltage up, and in the sense in which its rotor turns, so that the two
-components of the space vector are one complex series. Its color follows from the model's own response to a single wrong
-sample of the voltage, so that the loudness of the two is all that has to be told from the records.
+A model is driven by the voltage as recorded. What is noise in it makes calculated currents wander
+about the true ones: slowly, since a machine's flux sums the voltage up, and in the sense in which
+its rotor turns, so that the two components of the space vector are one complex series. Its color
+follows from the model's own response to a single wrong sample of the voltage, so that the loudness
+of the two is all that has to be told from the records.
 """
 
 from collections.abc import Sequence
 
 import numpy as np
 
-from tractexp.noise.color import SMALLEST_DEVIATION, Autoregression, check_count, of_orders, white_noise
+from tractexp.noise.color import (
+    SMALLEST_DEVIATION,
+    Autoregression,
+    check_count,
+    of_orders,
+    white_noise,
+)
 from tractexp.noise.model import Noise
 
 HIGHEST_WAVE_ORDER = 48  # order of the autoregressions
 GAINED = 1.001  # times its least variance: a prediction as good is good enough
-SHARES = (0.0, 0.25, 0.5, 1.0)  # of the voltage's deviations from its periodic course that are noise
-LEAST_WAVE_GAIN = 4.0  # of twice the log-likelihood, by which anything else must be better than all of them
+# of the voltage's deviations from its periodic course that are noise
+SHARES = (0.0, 0.25, 0.5, 1.0)
+# of twice the log-likelihood, by which anything else must be better than all of them
+LEAST_WAVE_GAIN = 4.0
 FLOORS = np.geomspace(1.0, 0.01, 28)  # of the current's own noise over all that is left in quiet
 FINER = np.geomspace(FLOORS[1], 1 / FLOORS[1], 15)  # times the best of these
 
@@ -31,8 +41,9 @@ def of_waves(
 ) -> Noise:
     """Noise from residuals (3, N) in quiet stretches.
 
-    `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one standard deviation of
-    a voltage's sample causes at the samples from then on. Raises `UserError` where too few samples are quiet.
+    `answers` has, for the space vector and for the zero sequence, the currents (L,) [pu] that one
+    standard deviation of a voltage's sample causes at the samples from then on. Raises `UserError`
+    where too few samples are quiet.
     """
     measured = np.any(valid, axis=1)
     count = sum(part.stop - part.start for part in quiet)
@@ -41,12 +52,16 @@ def of_waves(
     first = _fit_wave_noise([vector[part][valid[0, part]] for part in quiet], answers[0])
     pair = [first, first if phases == 3 else white_noise(1.0), white_noise(1.0)]
     if measured[2]:
-        pair[2] = _fit_wave_noise([residuals[2, part][valid[2, part]] for part in quiet], answers[1])
+        pair[2] = _fit_wave_noise(
+            [residuals[2, part][valid[2, part]] for part in quiet], answers[1]
+        )
     return Noise((tuple(pair),), np.eye(3), input_modes=input_modes, vector=phases == 3)
 
 
 def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoregression:
-    """The most likely sum of white noise and noise of the voltage, of stretches (n_i,) real or complex."""
+    """The most likely sum of white noise and noise of the voltage, of stretches (n_i,) real or
+    complex.
+    """
     per = 2 if np.iscomplexobj(pieces[0]) else 1
     level = max(np.sqrt(np.mean(np.abs(np.concatenate(pieces)) ** 2) / per), SMALLEST_DEVIATION)
     passed = covariances(answer, HIGHEST_WAVE_ORDER)
@@ -58,7 +73,9 @@ def _fit_wave_noise(pieces: Sequence[np.ndarray], answer: np.ndarray) -> Autoreg
         whole = share**2 * passed
         whole[0] += (floor * level) ** 2
         color = solve_levinson(whole)
-        price = sum(_surprise(color, piece, per) for piece in pieces) - LEAST_WAVE_GAIN * (share == 1.0)
+        price = sum(_surprise(color, piece, per) for piece in pieces) - LEAST_WAVE_GAIN * (
+            share == 1.0
+        )
         return price, share, floor, color
 
     tried = [of(share, floor) for share in shares for floor in (FLOORS if share else (1.0,))]
@@ -76,15 +93,19 @@ def _surprise(color: Autoregression, piece: np.ndarray, per: int) -> float:
 
 
 def covariances(answer: np.ndarray, highest: int) -> np.ndarray:
-    """E[x(t + k) x*(t)] for k = 0 ... highest of noise that is the sum of such answers (L,) to unit shocks."""
+    """E[x(t + k) x*(t)] for k = 0 ... highest of noise that is the sum of such answers (L,) to unit
+    shocks.
+    """
     padded = np.concatenate([answer, np.zeros(highest)])
     return np.array([np.vdot(answer, padded[k : k + len(answer)]) for k in range(highest + 1)])
 
 
 def solve_levinson(covariance: np.ndarray) -> Autoregression:
-    """The autoregression of these covariances (p + 1,), by Levinson's recursion; of less order where that is as good.
+    """The autoregression of these covariances (p + 1,), by Levinson's recursion; of less order
+    where that is as good.
 
-    Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and Modeling, section 5.2.
+    Source: Levinson 1947; Hayes 1996, Statistical Digital Signal Processing and Modeling, section
+    5.2.
     """
     table, variance = [np.empty(0, dtype=covariance.dtype)], [float(covariance[0].real)]
     for m in range(1, len(covariance)):

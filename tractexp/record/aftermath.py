@@ -15,10 +15,12 @@ SETTLED = 0.1, 0.5  # s after a dip between which a loss is judged
 
 
 def until_change(record: Record, start: int, end: int, S: complex) -> Record:
-    """The record up to where its load changes after a dip for another reason, with a note; else the record itself.
+    """The record up to where its load changes after a dip for another reason, with a note; else the
+    record itself.
 
-    `S` is P + jQ before the dip. A step back towards it, as of what tripped and returns, is the load's answer to the
-    dip. What changes right after the dip is noted only, and power that is fed back may change as it likes.
+    `S` is P + jQ before the dip. A step back towards it, as of what tripped and returns, is the
+    load's answer to the dip. What changes right after the dip is noted only, and power that is fed
+    back may change as it likes.
     """
     if S.real <= 0:
         return record
@@ -29,13 +31,18 @@ def until_change(record: Record, start: int, end: int, S: complex) -> Record:
         what, at = clause(record, start, change), start + change.first
         if at - end >= least:
             return _cut_aftermath(record, at, what)
-        said = f"{what}, {1000 * (at - end) * record.step:.0f} ms after the dip: it is fitted as part of the answer"
+        said = (
+            f"{what}, {1000 * (at - end) * record.step:.0f} ms after the dip: it is fitted as part"
+            " of the answer"
+        )
         return _add_note(record, said)
     return _until_gone(record, end + least, S, BACK * float(np.median(record.U[:start])))
 
 
 def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
-    """The record up to where its load begins to go though it was there at sample `first` and the voltage exceeds U."""
+    """The record up to where its load begins to go though it was there at sample `first` and the
+    voltage exceeds U.
+    """
     size = np.abs(without_gaps(record.P) + 1j * without_gaps(record.Q))[first:]
     gone = (size < LOST * abs(S)) & (record.U[first:] > U)
     n = max(1, round(smear(record)))
@@ -45,17 +52,22 @@ def _until_gone(record: Record, first: int, S: complex, U: float) -> Record:
     there = np.flatnonzero(size[:stop] >= (1 - CHANGED) * np.median(size[: max(stop // 2, n)]))
     at = first + (int(there[-1]) if len(there) else 0)
     what = (
-        f"the load goes after t = {record.t[at]:g} s, to {100 * size[-n:].mean() / abs(S):.0f} % of that before the dip"
+        f"the load goes after t = {record.t[at]:g} s, to {100 * size[-n:].mean() / abs(S):.0f} % of"
+        " that before the dip"
     )
     return _cut_aftermath(record, at, what)
 
 
 def _cut_aftermath(record: Record, at: int, why: str) -> Record:
-    return _add_note(replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there")
+    return _add_note(
+        replace(record.part(slice(0, at)), digest=digest(record)), f"{why}: the record is cut there"
+    )
 
 
 def loss(record: Record, end: int, S: complex) -> list[str]:
-    """What is said of a load that has less than half of its power `S`, P + jQ, left after a dip; [] of any other."""
+    """What is said of a load that has less than half of its power `S`, P + jQ, left after a dip; []
+    of any other.
+    """
     first, stop = np.searchsorted(record.t, record.t[end] + np.array(SETTLED)).tolist()
     P, Q = record.P[first:stop], record.Q[first:stop]
     if not (np.isfinite(P) & np.isfinite(Q)).any():
@@ -64,7 +76,8 @@ def loss(record: Record, end: int, S: complex) -> list[str]:
     if abs(left) >= LOST * abs(S):
         return []
     return [
-        f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip ({from_to(record, S, left)}): "
+        f"the load loses {100 * (1 - abs(left) / abs(S)):.0f} % of its power in the dip"
+        f" ({from_to(record, S, left)}): "
         "it trips, which a model without the effect undervoltage_trip cannot follow"
     ]
 

@@ -1,8 +1,10 @@
-"""Steps of a load, or of its voltage: changes for another reason than the voltage, over within a cycle.
+"""Steps of a load, or of its voltage: changes for another reason than the voltage, over within a
+cycle.
 
-The mean of one cycle is compared with that of the cycle after the next: a step is over within a cycle, and so is what
-the window of a phasor makes of it. A load's own answer to a dip decays, so that each cycle changes less than the one
-before it; a step does not follow from what came before it.
+The mean of one cycle is compared with that of the cycle after the next: a step is over within a
+cycle, and so is what the window of a phasor makes of it. A load's own answer to a dip decays, so
+that each cycle changes less than the one before it; a step does not follow from what came before
+it.
 """
 
 from collections.abc import Iterator
@@ -16,15 +18,21 @@ CHANGED = 0.05  # of the apparent power: what a load that is steady does not lea
 CHANGED_U = 0.01  # of the voltage: a step of a tap changer
 ANSWERED = 4.0  # times the relative change of voltage: what a load answers to it at most
 ABRUPT_CHANGE_RATIO = 3.0  # times the changes right before and after: what does not go on
-LARGEST_USUAL_CHANGE = 8.0  # times the lower quartile of all such changes of P and Q, six standard deviations of noise: more is none
-USUAL_U = 19.0  # the same of the voltage: the lower quartile of one quantity is smaller than that of two
-SMALL_LOAD_SHARE = 0.2  # of the greatest apparent power: steps of a smaller load count as those of this one
+# times the lower quartile of all such changes of P and Q, six standard deviations of noise: more is
+# none
+LARGEST_USUAL_CHANGE = 8.0
+# the same of the voltage: the lower quartile of one quantity is smaller than that of two
+USUAL_U = 19.0
+# of the greatest apparent power: steps of a smaller load count as those of this one
+SMALL_LOAD_SHARE = 0.2
 STAYS = 5, 0.5  # cycles over which a step is still seen, and how much of it
 
 
 @dataclass(frozen=True)
 class Change:
-    """A step of a load, or of its voltage: samples before `first` and from `stop` on are those of steady levels."""
+    """A step of a load, or of its voltage: samples before `first` and from `stop` on are those of
+    steady levels.
+    """
 
     first: int
     stop: int
@@ -38,13 +46,19 @@ class Change:
 
 
 def load_changes(U: np.ndarray, P: np.ndarray, Q: np.ndarray, cycle: float) -> list[Change]:
-    """The steps of P + jQ (N,), of more than 5 %, that the voltage U (N,) does not explain; `cycle` in samples."""
+    """The steps of P + jQ (N,), of more than 5 %, that the voltage U (N,) does not explain; `cycle`
+    in samples.
+    """
     S, n = without_gaps(P) + 1j * without_gaps(Q), max(1, round(cycle))
     (before, after), (low, high) = _levels(S, n), _levels(U.astype(complex), n)
     if not len(before):
         return []
     size = np.maximum(np.maximum(np.abs(before), np.abs(after)), SMALL_LOAD_SHARE * _greatest(S))
-    answer = ANSWERED * np.abs(high - low) / np.maximum(np.abs(low), DEAD_VOLTAGE_SHARE * _greatest(high))
+    answer = (
+        ANSWERED
+        * np.abs(high - low)
+        / np.maximum(np.abs(low), DEAD_VOLTAGE_SHARE * _greatest(high))
+    )
     return list(_steps(before, after, size, answer, (CHANGED, LARGEST_USUAL_CHANGE), n))
 
 
@@ -52,11 +66,17 @@ def voltage_changes(U: np.ndarray, cycle: float) -> list[Change]:
     """The steps of a voltage (N,) of more than 1 %, with the voltages in place of powers."""
     n = max(1, round(cycle))
     low, high = _levels(U.astype(complex), n)
-    return list(_steps(low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), (CHANGED_U, USUAL_U), n))
+    return list(
+        _steps(
+            low, high, np.maximum(np.abs(low), 1e-300), np.zeros(len(low)), (CHANGED_U, USUAL_U), n
+        )
+    )
 
 
 def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Means (N,) of the n samples before each, and of the n that begin n samples later; empty for too few samples."""
+    """Means (N,) of the n samples before each, and of the n that begin n samples later; empty for
+    too few samples.
+    """
     if len(x) < 3 * n + 1:
         return np.empty(0, complex), np.empty(0, complex)
     total = np.concatenate([[0.0], np.cumsum(x)])
@@ -65,9 +85,15 @@ def _levels(x: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _steps(
-    before: np.ndarray, after: np.ndarray, size: np.ndarray, answer: np.ndarray, least: tuple[float, float], n: int
+    before: np.ndarray,
+    after: np.ndarray,
+    size: np.ndarray,
+    answer: np.ndarray,
+    least: tuple[float, float],
+    n: int,
 ) -> Iterator[Change]:
-    """The changes that stand out; entry k compares the samples up to k + n with those from k + 2 n on.
+    """The changes that stand out; entry k compares the samples up to k + n with those from k + 2 n
+    on.
 
     `least` is what a change exceeds, as a share of `size` and in lower quartiles of all changes.
     """
@@ -80,7 +106,10 @@ def _steps(
     steps = (change - answer > enough) & (change > ABRUPT_CHANGE_RATIO * beside)
     for run in runs(steps):
         k = run.start + int(np.argmax(np.abs(after - before)[run]))
-        earlier, later = before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n], after[k : k + (STAYS[0] - 1) * n + 1 : n]
+        earlier, later = (
+            before[max(k - (STAYS[0] - 1) * n, 0) : k + 1 : n],
+            after[k : k + (STAYS[0] - 1) * n + 1 : n],
+        )
         if abs(later.mean() - earlier.mean()) > STAYS[1] * abs(after[k] - before[k]):
             yield Change(k + n, k + 2 * n, complex(before[k]), complex(after[k]))
 
@@ -96,7 +125,11 @@ def without_gaps(x: np.ndarray) -> np.ndarray:
     valid = np.isfinite(x)
     if valid.all():
         return x
-    return np.interp(np.arange(len(x)), np.flatnonzero(valid), x[valid]) if valid.any() else np.zeros(len(x))
+    return (
+        np.interp(np.arange(len(x)), np.flatnonzero(valid), x[valid])
+        if valid.any()
+        else np.zeros(len(x))
+    )
 
 
 def _greatest(S: np.ndarray) -> float:
@@ -104,7 +137,9 @@ def _greatest(S: np.ndarray) -> float:
 
 
 def smear(record: Record) -> float:
-    """Samples that a step is smeared over: a cycle, or the window of the phasors if that is longer."""
+    """Samples that a step is smeared over: a cycle, or the window of the phasors if
+    that is longer.
+    """
     length = record.window.length if record.window else 0.0
     return max(1 / record.base.frequency, length) * record.rate
 
@@ -113,7 +148,10 @@ def clause(record: Record, begin: int, change: Change) -> str:
     """What a step is; its samples count from `begin`."""
     name = "is switched off" if change.ratio < SMALL_LOAD_SHARE else "changes"
     when = record.t[begin + (change.first + change.stop) // 2]
-    return f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while the voltage stays"
+    return (
+        f"the load {name} at t = {when:g} s ({from_to(record, change.before, change.after)}) while"
+        " the voltage stays"
+    )
 
 
 def from_to(record: Record, before: complex, after: complex) -> str:

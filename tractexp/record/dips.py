@@ -1,4 +1,6 @@
-"""Several dips of one file, numbered in order of time, each cut out as a record to be fitted or held out."""
+"""Several dips of one file, numbered in order of time, each cut out as a record to be fitted or
+held out.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +20,9 @@ LONGEST_REACH = 60.0  # s of a record that are used before its dip and after
 
 @dataclass(frozen=True)
 class FileDip:
-    """One dip of a file: its time, and the record cut out about it, or the error that says why it cannot be used."""
+    """One dip of a file: its time, and the record cut out about it, or the error that says why it
+    cannot be used.
+    """
 
     number: int  # from 1
     start: float  # s
@@ -29,15 +33,19 @@ class FileDip:
 def cut_dips(
     wholes: Sequence[Record], where: str, pre: float, post: float, trigger: float | None = None
 ) -> list[FileDip]:
-    """The dips of records that follow each other, with at most `pre` and `post` [s] about the start of each.
+    """The dips of records that follow each other, with at most `pre` and `post` [s] about the start
+    of each.
 
-    `trigger` [s] is that of the recorder. A record never reaches into the dip before or after it. It is checked for an
-    event, and not yet for its units.
+    `trigger` [s] is that of the recorder. A record never reaches into the dip before or after it.
+    It is checked for an event, and not yet for its units.
     """
     file_dips: list[FileDip] = []
     for whole in wholes:
         t, dips = whole.t, find_dips(whole.t, whole.U, trigger)
-        firsts, stops = [0, *(end for _, end in dips)], [*(start for start, _ in dips[1:]), whole.samples]
+        firsts, stops = (
+            [0, *(end for _, end in dips)],
+            [*(start for start, _ in dips[1:]), whole.samples],
+        )
         for first, (start, end), stop in zip(firsts, dips, stops, strict=False):
             early, late = np.searchsorted(t, [t[start] - pre, t[start] + post]).tolist()
             window, number = slice(max(first, early), min(stop, late)), len(file_dips) + 1
@@ -47,7 +55,9 @@ def cut_dips(
                 detect(result)
             except UserError as error:
                 result = error
-            file_dips.append(FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), result))
+            file_dips.append(
+                FileDip(number, float(t[start]), float(t[min(end, len(t) - 1)]), result)
+            )
     return file_dips
 
 
@@ -61,13 +71,18 @@ def around(event: Event) -> Event:
     first, stop = np.searchsorted(t, [event.t_start - LONGEST_REACH, end + LONGEST_REACH]).tolist()
     if record.waves is not None or stop - first == record.samples:
         return event
-    note = f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about the first dip"
+    note = (
+        f"of {t[-1] - t[0]:.0f} s those from {t[first]:.0f} to {t[stop - 1]:.0f} s are used, about"
+        " the first dip"
+    )
     part = record.part(slice(first, stop))
     return detect(replace(part, digest=digest(record), notes=(*record.notes, note)))
 
 
 def level(record: Record) -> tuple[float, float]:
-    """Voltage and apparent power, in the record's units, before its first dip; of all of it where there is none."""
+    """Voltage and apparent power, in the record's units, before its first dip; of all of it where
+    there is none.
+    """
     before = steady(record)
     P, Q = (values[before][np.isfinite(values[before])] for values in (record.P, record.Q))
     S = float(np.hypot(P.mean(), Q.mean())) if len(P) and len(Q) else 0.0
@@ -75,16 +90,20 @@ def level(record: Record) -> tuple[float, float]:
 
 
 def check_load(where: str, U: float, S: float = 0.0) -> None:
-    """Raise `UserError` for a load of U [kV] and S [MVA] that no network feeds: another unit was meant."""
+    """Raise `UserError` for a load of U [kV] and S [MVA] that no network feeds: another unit was
+    meant.
+    """
     low, high = SIZES["voltage"]
     if not low <= U <= high:
         raise UserError(
-            f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most {high:g} kV; if the "
+            f"{where}: the voltage before the first dip is {U:.4g} kV, and a network's is at most"
+            f" {high:g} kV; if the "
             f"numbers are in V, say so: {DATA.units}={{U: V}}"
         )
     if np.sqrt(3) * U * GREATEST_CURRENT < S:
         raise UserError(
-            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of {S / np.sqrt(3) / U:.4g} kA, "
+            f"{where}: {S:.4g} MVA at {U:.4g} kV before the first dip is a current of"
+            f" {S / np.sqrt(3) / U:.4g} kA, "
             f"and no load draws as much; say the units of voltage and of current or power, such as "
             f"{DATA.units}={{U: kV, I: A}} or {DATA.units}={{U: kV, P: kW, Q: kvar}}"
         )
@@ -97,25 +116,37 @@ def signs(record: Record) -> list[str]:
     """
     calm = np.zeros(record.samples, bool)
     calm[steady(record)] = True
-    P, Q = (float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0 for x in (record.P, record.Q))
+    P, Q = (
+        float(np.nanmedian(x[calm])) if np.isfinite(x[calm]).any() else 0.0
+        for x in (record.P, record.Q)
+    )
     reason = direction(record.U, record.P, record.Q, calm=calm)
     if OUTWARD in reason:
-        raise UserError(f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}")
+        raise UserError(
+            f"{record.where}: P is {record.base.power * P:.4g} before the first dip: {reason}"
+        )
     said = [f"P is {record.base.power * P:.4g} before the first dip: {reason}"] if reason else []
     if abs(Q) > abs(P):
         said.append(
-            f"Q ({record.base.power * Q:.4g}) is greater than P ({record.base.power * P:.4g}) before the first dip: "
+            f"Q ({record.base.power * Q:.4g}) is greater than P ({record.base.power * P:.4g})"
+            " before the first dip: "
             "the two columns may be exchanged (data.columns={P: ..., Q: ...} says which is which)"
         )
     return said
 
 
-def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, validate: Sequence[int] | None,
-           notes: Sequence[str] = ()) -> Events:  # fmt: skip
-    """The records of the chosen dips; by default the first usable one is fitted and all others validate.
+def chosen(
+    where: str,
+    dips: Sequence[FileDip],
+    train: Sequence[int] | None,
+    validate: Sequence[int] | None,
+    notes: Sequence[str] = (),
+) -> Events:
+    """The records of the chosen dips; by default the first usable one is fitted and all others
+    validate.
 
-    `notes` concern the whole file and go to the first record. Raises `UserError`, naming the usable dips, for one that
-    cannot be used.
+    `notes` concern the whole file and go to the first record. Raises `UserError`, naming the usable
+    dips, for one that cannot be used.
     """
     results = {dip.number: dip.result for dip in dips}
     usable = [number for number, result in results.items() if isinstance(result, Record)]
@@ -126,23 +157,39 @@ def chosen(where: str, dips: Sequence[FileDip], train: Sequence[int] | None, val
         held = [_pick_dip(where, number, results) for number in validate]
         return Events([replace(first, notes=notes), *rest], held)
     others = [result for number, result in results.items() if number not in fitted]
-    notes += tuple(f"not used for validation: {result}" for result in others if isinstance(result, UserError))
-    return Events([replace(first, notes=notes), *rest], [result for result in others if isinstance(result, Record)])
+    notes += tuple(
+        f"not used for validation: {result}" for result in others if isinstance(result, UserError)
+    )
+    return Events(
+        [replace(first, notes=notes), *rest],
+        [result for result in others if isinstance(result, Record)],
+    )
 
 
 def check_numbers(train: Sequence[int] | None, validate: Sequence[int] | None) -> None:
     """Raise `UserError` for no dip to fit, and for one that is named twice."""
     if train is not None and not train:
-        raise UserError(f"{DATA.train} is empty: name at least one dip by its number, e.g. {DATA.train}=[1]")
+        raise UserError(
+            f"{DATA.train} is empty: name at least one dip by its number, e.g. {DATA.train}=[1]"
+        )
     numbers = [*(train or []), *(validate or [])]
     for number in numbers:
         if numbers.count(number) > 1:
-            raise UserError(f"{DATA.train} and {DATA.validate} name dip {number} twice; a dip may serve only once")
+            raise UserError(
+                f"{DATA.train} and {DATA.validate} name dip {number} twice; a dip may serve only"
+                " once"
+            )
 
 
 def _pick_dip(where: str, number: int, results: Mapping[int, Record | UserError]) -> Record:
-    usable = ", ".join(f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s" for n, r in results.items() if isinstance(r, Record))
-    result = results.get(number, UserError(f"{where}: there is no dip {number}; the file has {len(results)}"))
+    usable = ", ".join(
+        f"{n} at {r.t[0]:.3f} to {r.t[-1]:.3f} s"
+        for n, r in results.items()
+        if isinstance(r, Record)
+    )
+    result = results.get(
+        number, UserError(f"{where}: there is no dip {number}; the file has {len(results)}")
+    )
     if isinstance(result, UserError):
         raise UserError(f"{result}; dips that can be used: {usable or 'none'}")
     return result

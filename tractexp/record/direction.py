@@ -3,39 +3,54 @@
 import numpy as np
 
 DISTURBED = 0.03  # of the voltage: a larger deviation is a disturbance, which a load answers
-LARGEST_CALM_DEVIATION = 0.01  # of the voltage: within this deviation P counts as before the disturbance
+# of the voltage: within this deviation P counts as before the disturbance
+LARGEST_CALM_DEVIATION = 0.01
 FEWEST_STATE_SAMPLES = 3  # samples in either state
-LEAST_LOAD_EXPONENT = 0.5  # exponent of |P| over U from which on power falls with the voltage as a load's does
+# exponent of |P| over U from which on power falls with the voltage as a load's does
+LEAST_LOAD_EXPONENT = 0.5
 STEEPEST_EXPONENT = 4.0  # exponent that no load exceeds: what falls faster was switched off
 IMPEDANCE = 1.3  # exponent above that of a constant current, which a converter may keep as well
 LEAST_REACTIVE_SHARE = 0.1  # of |P|: a smaller Q says nothing about the direction
 LEAST_SIGN_RATIO = 3.0  # times the noise that P must exceed to have a sign
-OUTWARD = "its current is counted out of it, or this feeder supplies such loads"  # where that is certain
-TURNS = 0.1  # of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
+# where that is certain
+OUTWARD = "its current is counted out of it, or this feeder supplies such loads"
+# of |P|: positive power of this size, at normal voltage, is a train that motors and brakes
+TURNS = 0.1
 REMEDY = "set data.reverse_current=true"
 
 
 def at_level(x: np.ndarray, share: float) -> np.ndarray:
-    """Which of the values (N,), positive, lie within `share` of the level that most of them have; the higher of two."""
+    """Which of the values (N,), positive, lie within `share` of the level that most of them have;
+    the higher of two.
+    """
     ordered = np.sort(x)
-    counts = np.searchsorted(ordered, ordered * (1 + share), "right") - np.searchsorted(ordered, ordered * (1 - share))
+    counts = np.searchsorted(ordered, ordered * (1 + share), "right") - np.searchsorted(
+        ordered, ordered * (1 - share)
+    )
     level = ordered[len(ordered) - 1 - int(np.argmax(counts[::-1]))]
     return np.abs(x - level) <= share * level
 
 
-def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None) -> str:
+def direction(
+    U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, calm: np.ndarray | None = None
+) -> str:
     """Why P is negative before a disturbance, one clause; "" where it is not.
 
-    `calm` (N,) marks the state to compare with, by default the one that lasts longest. `polarity` is the direction that
-    the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows none. A passive load draws
-    negative-sequence current whatever its power does. Otherwise the answer of P and Q to the voltage decides: a load's
-    |P| falls with U and returns, and so does its inductive Q; a converter keeps P or the current, or reverses.
+    `calm` (N,) marks the state to compare with, by default the one that lasts longest. `polarity`
+    is the direction that the negative sequence shows: 1 as a load's, -1 reversed, 0 where it shows
+    none. A passive load draws negative-sequence current whatever its power does. Otherwise the
+    answer of P and Q to the voltage decides: a load's |P| falls with U and returns, and so does its
+    inductive Q; a converter keeps P or the current, or reverses.
     """
     valid = np.isfinite(U) & np.isfinite(P) & np.isfinite(Q)
     if not valid.any() or (calm is not None and not (calm & valid).any()):
         return ""
     U, P, Q = U[valid], P[valid], Q[valid]
-    rough = 3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12) if len(U) > 1 else 0.0
+    rough = (
+        3 * float(np.median(np.abs(np.diff(U)))) / max(float(np.median(U)), 1e-12)
+        if len(U) > 1
+        else 0.0
+    )
     near = max(LARGEST_CALM_DEVIATION, rough)
     calm = at_level(U, near) if calm is None else calm[valid]
     level, P0, Q0 = (float(np.median(x[calm])) for x in (U, P, Q))
@@ -44,29 +59,51 @@ def direction(U: np.ndarray, P: np.ndarray, Q: np.ndarray, polarity: int = 0, ca
     if not -LEAST_SIGN_RATIO * spread > P0:
         return ""
     if np.count_nonzero(P[normal] > -TURNS * P0) > max(FEWEST_STATE_SAMPLES, 0.02 * len(P)):
-        return "P changes its sign at normal voltage, as of a train that brakes and motors: power flows both ways"
+        return (
+            "P changes its sign at normal voltage, as of a train that brakes and motors: power"
+            " flows both ways"
+        )
     a, fell = _exponent(U / level, P / P0)
-    answer = f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls" if fell else "the voltage is never disturbed"
+    answer = (
+        f"|P| goes as U^{round(a, 2) + 0.0:g} when the voltage falls"
+        if fell
+        else "the voltage is never disturbed"
+    )
     if polarity < 0 or (polarity == 0 and fell and _load_like(a, P0, Q0)):
         shown = (
-            "the negative-sequence current is that of a load turned round" if polarity < 0 else f"{answer}, as a load's"
+            "the negative-sequence current is that of a load turned round"
+            if polarity < 0
+            else f"{answer}, as a load's"
         )
         return f"{shown}: {OUTWARD} ({REMEDY})"
     if polarity > 0:
-        return "the negative-sequence current is that of a load, so its direction is right and this is regeneration"
+        return (
+            "the negative-sequence current is that of a load, so its direction is right and this is"
+            " regeneration"
+        )
     if fell and a < LEAST_LOAD_EXPONENT:
-        return f"{answer}, as a converter's or a generator's: regeneration (a braking train), no reversed current"
+        return (
+            f"{answer}, as a converter's or a generator's: regeneration (a braking train), no"
+            " reversed current"
+        )
     return f"{answer}, which cannot separate a reversed current ({REMEDY}) from regeneration"
 
 
 def _load_like(a: float, P0: float, Q0: float) -> bool:
-    """Whether power answers as that of a load with its sign turned: inductive, or as an impedance."""
+    """Whether power answers as that of a load with its sign turned: inductive, or as
+    an impedance.
+    """
     inductive = -Q0 > LEAST_REACTIVE_SHARE * -P0
-    return a <= STEEPEST_EXPONENT and ((a >= LEAST_LOAD_EXPONENT and inductive) or (a >= IMPEDANCE and Q0 < LEAST_REACTIVE_SHARE * -P0))
+    return a <= STEEPEST_EXPONENT and (
+        (a >= LEAST_LOAD_EXPONENT and inductive)
+        or (a >= IMPEDANCE and Q0 < LEAST_REACTIVE_SHARE * -P0)
+    )
 
 
 def _exponent(u: np.ndarray, p: np.ndarray) -> tuple[float, bool]:
-    """(exponent of p over u while u is low, whether u is low long enough for it); p is 1 where u is 1."""
+    """(exponent of p over u while u is low, whether u is low long enough for it); p is 1 where u is
+    1.
+    """
     low = (u < 1 - DISTURBED) & (u > 0.1)
     if np.count_nonzero(low) < FEWEST_STATE_SAMPLES:
         return float("nan"), False

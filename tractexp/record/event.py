@@ -1,4 +1,6 @@
-"""The event inside a record: where the dip is, what came before it, and how noisy the recording is."""
+"""The event inside a record: where the dip is, what came before it, and how noisy the
+recording is.
+"""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -21,8 +23,9 @@ NO_POWER = 1e-9  # pu: nothing is a share of less
 class Event:
     """The first dip of `record`. Means and noise are those of the samples `steady`, before the dip.
 
-    Noise is the standard deviation about a straight line. `end` is the first sample after the dip, where the
-    voltage has regained all but a fifth of the depth (or all but the threshold, if that is more).
+    Noise is the standard deviation about a straight line. `end` is the first sample after the dip,
+    where the voltage has regained all but a fifth of the depth (or all but the threshold, if that
+    is more).
     """
 
     domain: ClassVar[str] = "phasors"  # in which models are compared with it
@@ -99,11 +102,12 @@ def noise(t: np.ndarray, values: np.ndarray) -> float:
 
 
 def detect(record: Record) -> Event:
-    """The first dip of a record; raises `UserError` for none, one that does not end, or one that comes too early.
+    """The first dip of a record; raises `UserError` for none, one that does not end, or one that
+    comes too early.
 
-    An interruption, an open pole and a step are refused by their names, and so is a load that steps right before. The
-    record begins after an earlier step and ends where its load changes after the dip for another reason than the
-    voltage; its notes say what was done.
+    An interruption, an open pole and a step are refused by their names, and so is a load that steps
+    right before. The record begins after an earlier step and ends where its load changes after the
+    dip for another reason than the voltage; its notes say what was done.
     """
     dips, swells = falls(record.t, record.U)
     if not dips:
@@ -111,7 +115,8 @@ def detect(record: Record) -> Event:
     start, end = dips[0]
     if start < FEWEST_BEFORE:
         raise UserError(
-            f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the steady state "
+            f"{record.where}: the dip starts at sample {start + 1} (t = {record.t[start]:g} s): the"
+            " steady state "
             f"before it needs at least {FEWEST_BEFORE} samples; give a record that starts earlier"
         )
     if reason := no_such_dip(record, start, end):
@@ -125,8 +130,10 @@ def detect(record: Record) -> Event:
     t, U, P, Q = (values[before] for values in (record.t, record.U, record.P, record.Q))
     if np.count_nonzero(np.isfinite(P) & np.isfinite(Q)) < FEWEST_BEFORE:
         raise UserError(
-            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the {before.stop - before.start} "
-            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be computed"
+            f"{record.where}: P and Q have fewer than {FEWEST_BEFORE} values in the"
+            f" {before.stop - before.start} "
+            f"samples before the dip at t = {record.t[start]:g} s; the steady state cannot be"
+            " computed"
         )
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
     if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
@@ -150,7 +157,9 @@ def detect(record: Record) -> Event:
 
 
 def steady(record: Record) -> slice:
-    """The samples of the steady state before the first dip; all where there is none, or too little before it."""
+    """The samples of the steady state before the first dip; all where there is none, or too little
+    before it.
+    """
     dips, swells = falls(record.t, record.U)
     start = dips[0][0] if dips else 0
     if start < FEWEST_BEFORE:
@@ -192,7 +201,10 @@ def describe(event: Event) -> str:
     if event.P0 <= 0:
         calm = np.zeros(record.samples, bool)
         calm[event.steady] = True
-        reason = direction(record.U, record.P, record.Q, calm=calm) or "no more than noise, so this is no load"
+        reason = (
+            direction(record.U, record.P, record.Q, calm=calm)
+            or "no more than noise, so this is no load"
+        )
         odd.append(f"P is {event.P0:.3g} before the dip: {reason}")
     gaps = int(np.count_nonzero(np.isnan(record.P) | np.isnan(record.Q)))
     if gaps:
@@ -204,4 +216,7 @@ def _noise(event: Event) -> str:
     """The noise of P and Q as shares of P, per unit where no P is drawn."""
     if event.noise_share is None:
         return f"{event.noise_P:.2g} pu in P and {event.noise_Q:.2g} pu in Q"
-    return f"{100 * event.noise_share:.2f} % in P and {100 * event.noise_Q / abs(event.P0):.2f} % in Q, of P"
+    return (
+        f"{100 * event.noise_share:.2f} % in P and {100 * event.noise_Q / abs(event.P0):.2f} % in"
+        " Q, of P"
+    )

@@ -7,35 +7,46 @@ from tractexp.record.record import DEAD_VOLTAGE_SHARE
 
 SHALLOWEST = 0.03  # of the voltage before: anything less is no dip
 NOISE_FACTOR = 6.0  # standard deviations of noise that a dip must exceed
-RECOVERED = 0.2  # of the depth: the dip ends when no more than this is missing, or the threshold if that is more
+# of the depth: the dip ends when no more than this is missing, or the threshold if that is more
+RECOVERED = 0.2
 FEWEST_BEFORE = 10  # samples before a dip, for the steady state and the noise
 MERGED = 0.02  # s: dips closer than one cycle are one
 STEADY = 1.0  # s: the steady state is the mean over at most so long before the dip
 REFERENCE = 0.1  # s at the start, or after a change, whose median is the reference
 NO_STEP = 0.13  # of the voltage: no tap changer and no switched line raises it by more
-CERTAIN = 0.02  # s: what lasts so long at the start was before the event, and not a window that holds a part of it
+# s: what lasts so long at the start was before the event, and not a window that holds a part of it
+CERTAIN = 0.02
 NEAR_TRIGGER = 60.0  # s: a trigger that comes later says nothing of the record's first voltage
 
 
 def starting_level(
     t: np.ndarray, levels: np.ndarray, limits: np.ndarray, most: int, trigger: float | None = None
 ) -> np.ndarray:
-    """The levels (K,) of voltages (K, N) at times t (N,) [s] from which the first event leaves, by more than `limits`.
+    """The levels (K,) of voltages (K, N) at times t (N,) [s] from which the first event leaves, by
+    more than `limits`.
 
-    That right before the recorder's trigger where it is steady; else that of the first samples, at most so many, or
-    of what precedes the first change where fewer do. Where less than a cycle does, what follows counts if it is higher;
-    and so it does where a record begins inside a dip, lower by more than a step, and most of it is at the later level.
+    That right before the recorder's trigger where it is steady; else that of the first samples, at
+    most so many, or of what precedes the first change where fewer do. Where less than a cycle does,
+    what follows counts if it is higher; and so it does where a record begins inside a dip, lower by
+    more than a step, and most of it is at the later level.
     """
     if trigger is not None and CERTAIN < trigger - t[0] < NEAR_TRIGGER:
         before = levels[:, (t < trigger - CERTAIN) & (t > trigger - CERTAIN - STEADY)]
         last = before[:, -max(2, round(REFERENCE * (len(t) - 1) / (t[-1] - t[0]))) :]
-        middle = np.maximum(np.median(last, axis=1), 1e-12) if last.shape[1] > 1 else np.zeros(len(levels))
+        middle = (
+            np.maximum(np.median(last, axis=1), 1e-12)
+            if last.shape[1] > 1
+            else np.zeros(len(levels))
+        )
         if last.shape[1] > 1 and (np.ptp(last, axis=1) <= limits * middle).all():
             return middle
     first = levels[:, :most]
-    middle = np.maximum(np.array([np.median(first[:, : k + 1], axis=1) for k in range(first.shape[1])]).T, 1e-12)
+    middle = np.maximum(
+        np.array([np.median(first[:, : k + 1], axis=1) for k in range(first.shape[1])]).T, 1e-12
+    )
     stays = np.all(np.abs(first / middle - 1) <= limits[:, None] / 2, axis=0)
-    count = len(stays) if stays.all() else max(1, int(np.argmin(stays)))  # a dead channel leaves nothing
+    # a dead channel leaves nothing
+    count = len(stays) if stays.all() else max(1, int(np.argmin(stays)))
     level = np.median(first[:, :count], axis=1)
     last = levels[:, t >= t[-1] - max(REFERENCE, (t[-1] - t[0]) / 5)]
     after, usual = np.median(last, axis=1), np.median(levels, axis=1)
@@ -43,16 +54,19 @@ def starting_level(
         return level
     if count < first.shape[1] and t[count - 1] - t[0] < CERTAIN / 2:
         return np.maximum(level, after)
-    begun = (np.abs(usual - after) <= limits * after).all() and (level > DEAD_VOLTAGE_SHARE * after).all()
+    begun = (np.abs(usual - after) <= limits * after).all() and (
+        level > DEAD_VOLTAGE_SHARE * after
+    ).all()
     return after if begun and level[0] < (1 - NO_STEP) * after[0] else level
 
 
 def find_dips(t: np.ndarray, U: np.ndarray, trigger: float | None = None) -> list[tuple[int, int]]:
-    """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if never recovered.
+    """All dips of a voltage (N,), in order of time, as (start, end) sample numbers; end = N if
+    never recovered.
 
-    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference that starts at
-    the level of the first samples, follows slow changes, and starts anew after each dip. Rises are not dips, and a
-    swell leaves the reference where it was.
+    A dip falls by more than 3 % (or six standard deviations of the sample noise) below a reference
+    that starts at the level of the first samples, follows slow changes, and starts anew after each
+    dip. Rises are not dips, and a swell leaves the reference where it was.
     """
     return falls(t, U, trigger)[0]
 
@@ -71,7 +85,9 @@ def falls(
         part = U[k : k + block]
         below = part < (1 - margin) * reference
         if not below.any():
-            if float(np.median(part)) > (1 + margin) * reference and (swell := _swell(t, U, k, reference, margin)):
+            if float(np.median(part)) > (1 + margin) * reference and (
+                swell := _swell(t, U, k, reference, margin)
+            ):
                 swells.append(swell)
                 k = swell[1]
                 continue
@@ -86,14 +102,17 @@ def falls(
         if dips and t[start] - t[dips[-1][1]] < MERGED:
             start = dips.pop()[0]
         dips.append((start, end))
-        if end < len(U):  # the higher: the short one where another dip follows soon, the long one while U still rises
+        # the higher: the short one where another dip follows soon, the long one while U still rises
+        if end < len(U):
             reference = max(float(np.median(U[end : end + n])) for n in (FEWEST_BEFORE, block))
         k = end
     return dips, swells
 
 
 def margin_of(U: np.ndarray) -> float:
-    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to exceed."""
+    """The share of the reference by which a dip must fall; a voltage that is gone has no noise to
+    exceed.
+    """
     alive = U[DEAD_VOLTAGE_SHARE * U.max() < U]
     if len(alive) < FEWEST_BEFORE:
         return SHALLOWEST
@@ -101,12 +120,18 @@ def margin_of(U: np.ndarray) -> float:
 
 
 def sample_noise(x: np.ndarray) -> np.ndarray:
-    """Standard deviation of the noise from sample to sample of x (..., N): robust, and blind to slow changes."""
+    """Standard deviation of the noise from sample to sample of x (..., N): robust, and blind to
+    slow changes.
+    """
     return np.median(np.abs(np.diff(x)), axis=-1) / 0.6745 / np.sqrt(2)
 
 
-def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float) -> tuple[int, int] | None:
-    """The swell in the block from k on; None where the voltage stays at its new level, or falls from it after long."""
+def _swell(
+    t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float
+) -> tuple[int, int] | None:
+    """The swell in the block from k on; None where the voltage stays at its new level, or falls
+    from it after long.
+    """
     first = k + int(np.argmax(U[k:] > (1 + margin) * reference))
     back = U[first:] <= (1 + margin) * reference
     if not back.any():
@@ -119,7 +144,9 @@ def _swell(t: np.ndarray, U: np.ndarray, k: int, reference: float, margin: float
 
 
 def _onset(U: np.ndarray, first: int, crossing: int, reference: float, margin: float) -> int:
-    """The sample after the last one, not before `first`, that was still within a tenth of the margin."""
+    """The sample after the last one, not before `first`, that was still within a tenth of the
+    margin.
+    """
     high = np.flatnonzero(U[first:crossing] >= (1 - margin / 10) * reference)
     return first + int(high[-1]) + 1 if len(high) else crossing
 

@@ -1,4 +1,5 @@
-"""Which load a record is of: where it was read, which channels, when, and what one per unit stands for.
+"""Which load a record is of: where it was read, which channels, when, and what one per unit stands
+for.
 
 One object for everyone who says it: console, pages, `result.json`, MLflow, exports.
 """
@@ -17,10 +18,12 @@ DIP = re.compile(r" dip \d+$")  # behind the path of a file that holds several
 
 @dataclass(frozen=True)
 class Identity:
-    """`source` are texts by their keys, as far as the file says: file, station, device, load, voltages, currents, time.
+    """`source` are texts by their keys, as far as the file says: file, station, device, load,
+    voltages, currents, time.
 
-    `base` says what one per unit is, `given_base` what it is in the file, None where that is the same: voltage_kV,
-    power_MVA, frequency_Hz and origin each, None where nobody said it. `sha256` is of the channels as they were read.
+    `base` says what one per unit is, `given_base` what it is in the file, None where that is the
+    same: voltage_kV, power_MVA, frequency_Hz and origin each, None where nobody said it. `sha256`
+    is of the channels as they were read.
     """
 
     source: Mapping[str, str]
@@ -38,7 +41,9 @@ class Identity:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Identity":
-        """That of an entry of `records` in `result.json`; of an early one, without what it lacks."""
+        """That of an entry of `records` in `result.json`; of an early one, without
+        what it lacks.
+        """
         source, base = content.get("source", {}), content.get("base", {})
         return cls(source, base, content.get("given_base"), content.get("sha256", ""))
 
@@ -75,15 +80,21 @@ class Identity:
     @property
     def recording(self) -> "Identity":
         """The same for all dips of one recording."""
-        return Identity(dict(self.source) | {"file": DIP.sub("", self.source.get("file", ""))}, self.base)
+        return Identity(
+            dict(self.source) | {"file": DIP.sub("", self.source.get("file", ""))}, self.base
+        )
 
     @property
     def parts(self) -> list[str]:
         """What is known of it, in words."""
-        said = [f"{key} {text}" * (key != "file") or text for key, text in self.source.items() if text]
+        said = [
+            f"{key} {text}" * (key != "file") or text for key, text in self.source.items() if text
+        ]
         for base, name in ((self.base, "per unit of"), (self.given_base or {}, "in the file of")):
             sizes = [
-                f"{base[size]:.6g} {size.partition('_')[2]}" for size in ("voltage_kV", "power_MVA") if base.get(size)
+                f"{base[size]:.6g} {size.partition('_')[2]}"
+                for size in ("voltage_kV", "power_MVA")
+                if base.get(size)
             ]
             said += [f"{name} {' and '.join(sizes)}"] * bool(sizes)
         return said
@@ -107,7 +118,9 @@ def distinct(identities: Iterable[Identity]) -> list[Identity]:
 
 
 def describe_identities(identities: Iterable[Identity]) -> list[str]:
-    """The recordings in words, each once; what is unknown of several is said once, with those it concerns."""
+    """The recordings in words, each once; what is unknown of several is said once, with those it
+    concerns.
+    """
     recordings = distinct(identities)
     unknown = [one for one in recordings if one.unknown]
     if len(unknown) < 2:
@@ -135,4 +148,9 @@ def title_of(records: Iterable[Record]) -> str:
 def _sizes(base: Base, in_mva: bool) -> dict[str, Any]:
     voltage = None if base.voltage == 1.0 else base.voltage
     power = base.power if in_mva else None
-    return {"voltage_kV": voltage, "power_MVA": power, "frequency_Hz": base.frequency, "origin": base.origin}
+    return {
+        "voltage_kV": voltage,
+        "power_MVA": power,
+        "frequency_Hz": base.frequency,
+        "origin": base.origin,
+    }

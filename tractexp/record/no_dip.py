@@ -9,12 +9,13 @@ from tractexp.record.record import DEAD_VOLTAGE_SHARE, Record
 OPEN_POLE = 0.25  # of the voltage: negative sequence of an open pole, of a fault as well
 PHASE_GONE = 0.42  # the same where next to nothing of a phase is left
 UNCLEARED = 1.5  # s: back-up protection clears a fault within about a second
-# Of a current that stays: how far it moves, and for how much of the time it may move farther. Motors answer a fault of
-# one phase by a tenth.
+# Of a current that stays: how far it moves, and for how much of the time it may move farther.
+# Motors answer a fault of one phase by a tenth.
 SAME_CURRENT = 0.05
 LARGEST_TAP_STEP = 0.15  # of the voltage: a tap changer or a switched line moves it no farther
 STEP_LASTS = 0.3  # s of a new level before it is one
-COARSE, FEWEST_INSIDE = 20.0, 5  # Hz, samples: a dip of fewer samples at a lower rate shows no response
+# Hz, samples: a dip of fewer samples at a lower rate shows no response
+COARSE, FEWEST_INSIDE = 20.0, 5
 
 
 def no_such_dip(record: Record, start: int, end: int) -> str:
@@ -25,17 +26,20 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
     lowest, when = float(inside.min()), f"at t = {t[start]:g} s"
     if _current_stays(record, start, end):
         return (
-            f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of the voltage "
+            f"the voltage falls to {lowest:.3g} {when} while the current stays as it was: a fuse of"
+            " the voltage "
             "transformers, or their wiring, and no dip of the network; choose another event"
         )
     if lowest < DEAD_VOLTAGE_SHARE * before:
         if end < len(U):
             return (
-                f"the voltage is gone from t = {t[start]:g} to {t[end]:g} s (U falls to {lowest:.3g}): an "
+                f"the voltage is gone from t = {t[start]:g} to {t[end]:g} s (U falls to"
+                f" {lowest:.3g}): an "
                 "interruption, no dip, after which loads start anew; choose another event"
             )
         return (
-            f"the voltage is gone from t = {t[start]:g} s on (U falls to {lowest:.3g}): the line is dead, which is no "
+            f"the voltage is gone from t = {t[start]:g} s on (U falls to {lowest:.3g}): the line is"
+            " dead, which is no "
             "dip; choose another event"
         )
     if record.U2 is not None:
@@ -43,33 +47,48 @@ def no_such_dip(record: Record, start: int, end: int) -> str:
         if np.count_nonzero(unbalanced) * record.step > UNCLEARED:
             share = float(np.median(record.U2[start:end][unbalanced] / inside[unbalanced]))
             return (
-                f"U2 is {100 * share:.3g} % of U for {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
-                "than a fault lasts: one pole is open, which is no dip of all phases; choose another event"
+                f"U2 is {100 * share:.3g} % of U for"
+                f" {np.count_nonzero(unbalanced) * record.step:.2g} s {when}, longer "
+                "than a fault lasts: one pole is open, which is no dip of all phases; choose"
+                " another event"
             )
     if end == len(U):
         return _explain_unfinished_fall(record, start, before)
     if record.rate < COARSE and end - start < FEWEST_INSIDE:
         return (
-            f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show a response; give a "
+            f"the dip {when} has {end - start} samples at {record.rate:.3g} Hz: too coarse to show"
+            " a response; give a "
             f"record of at least {COARSE:g} Hz"
         )
     return ""
 
 
 def _current_stays(record: Record, start: int, end: int) -> bool:
-    """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the current as it was."""
+    """Whether a voltage that is gone, or unbalanced for longer than a fault lasts, leaves the
+    current as it was.
+    """
     edge = max(1, round(smear(record)))
-    inside, before = slice(start + edge, end - edge * (end < record.samples)), slice(max(0, start - 10 * edge), start)
+    inside, before = (
+        slice(start + edge, end - edge * (end < record.samples)),
+        slice(max(0, start - 10 * edge), start),
+    )
     if inside.stop - inside.start < max(3 * edge, FEWEST_INSIDE):
         return False
     U = record.U[inside]
     share = 0.0 if record.U2 is None else float(np.median(record.U2[inside] / np.maximum(U, 1e-12)))
     gone = float(np.median(U)) < DEAD_VOLTAGE_SHARE * float(record.U[:start].mean())
-    if not gone and not share > (OPEN_POLE if (end - start) * record.step > UNCLEARED else PHASE_GONE):
+    if not gone and not share > (
+        OPEN_POLE if (end - start) * record.step > UNCLEARED else PHASE_GONE
+    ):
         return False
-    usual, current = (np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12) for at in (before, inside))
+    usual, current = (
+        np.hypot(record.P[at], record.Q[at]) / np.maximum(record.U[at], 1e-12)
+        for at in (before, inside)
+    )
     level = float(np.nanmedian(usual)) if np.isfinite(usual).any() else 0.0
-    return level > 0 and bool((np.abs(current / level - 1) < SAME_CURRENT).mean() > 1 - SAME_CURRENT)
+    return level > 0 and bool(
+        (np.abs(current / level - 1) < SAME_CURRENT).mean() > 1 - SAME_CURRENT
+    )
 
 
 def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
@@ -80,11 +99,13 @@ def _explain_unfinished_fall(record: Record, start: int, before: float) -> str:
     lasts = float(t[-1] - t[start])
     if fall <= LARGEST_TAP_STEP and lasts >= STEP_LASTS and level.mean() > 0.8:
         return (
-            f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the {lasts:.2g} s that "
+            f"the voltage falls by {100 * fall:.3g} % at t = {t[start]:g} s and stays there for the"
+            f" {lasts:.2g} s that "
             "remain: a step (a tap changer, or something switched), no dip; choose another event"
         )
     return (
-        f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where it was "
+        f"the record is shorter than the dip: it ends at t = {t[-1]:g} s with U = {U[-1]:.3g} where"
+        " it was "
         f"{before:.3g} before the dip of t = {t[start]:g} s; give a record that shows the recovery"
     )
 
@@ -93,20 +114,25 @@ def no_dip(record: Record) -> str:
     U, t = record.U, record.t
     reference, margin = float(np.median(U[:FEWEST_BEFORE])), margin_of(U)
     if reference <= 0:
-        return f"{record.where}: there is no dip: the voltage starts at zero; give a record of a live line"
+        return (
+            f"{record.where}: there is no dip: the voltage starts at zero; give a record of a live"
+            " line"
+        )
     low, high = int(np.argmin(U)), int(np.argmax(U))
     fall, rise = 1 - U[low] / reference, U[high] / reference - 1
     start = f"{record.where}: there is no dip: the voltage starts at {reference:.4g} and falls"
     if fall <= margin:
         sentence = (
-            f"{start} at most {100 * fall:.3g} % below it (t = {t[low]:g} s), but a dip must exceed "
+            f"{start} at most {100 * fall:.3g} % below it (t = {t[low]:g} s), but a dip must exceed"
+            " "
             f"{100 * SHALLOWEST:g} % and the noise"
         ) + (f", here {100 * margin:.3g} %" if margin > SHALLOWEST else "")
     else:
         sentence = f"{start} by {100 * fall:.3g} % (t = {t[low]:g} s), but slowly: a ramp, no dip"
     if rise > margin:
         sentence += (
-            f"; it rises by {100 * rise:.3g} % at t = {t[high]:g} s: a swell is not fitted, and a record that "
+            f"; it rises by {100 * rise:.3g} % at t = {t[high]:g} s: a swell is not fitted, and a"
+            " record that "
             "starts inside a dip lacks the steady state before it"
         )
     return sentence

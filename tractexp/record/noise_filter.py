@@ -1,7 +1,9 @@
-"""Noise removed from a sampled voltage, which drives the model, so that its noise appears in every calculated current.
+"""Noise removed from a sampled voltage, which drives the model, so that its noise appears in every
+calculated current.
 
-Within a cycle noise and voltage cannot be separated with certainty. But away from the edges of a dip the voltage
-departs from its periodic course slowly, so that faster changes are noise. Changes larger than noise stay: the edges.
+Within a cycle noise and voltage cannot be separated with certainty. But away from the edges of a
+dip the voltage departs from its periodic course slowly, so that faster changes are noise. Changes
+larger than noise stay: the edges.
 """
 
 from dataclasses import dataclass
@@ -9,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-PASSED, BETWEEN = 7.0, 4.0  # times the frequency: upper end of the pass band, and width of the transition about it
+# times the frequency: upper end of the pass band, and width of the transition about it
+PASSED, BETWEEN = 7.0, 4.0
 RIPPLE = 80.0  # dB below one: ripple in the pass band
 LARGEST_NOISE_RATIO = 2.5  # of the variance of fast noise, below which it is taken for noise
 AVERAGED_WINDOWS = 8  # windows a cycle in which the power of fast changes is averaged
@@ -17,14 +20,18 @@ AVERAGED_WINDOWS = 8  # windows a cycle in which the power of fast changes is av
 
 @dataclass(frozen=True, eq=False)
 class NoiseFilter:
-    """A low-pass filter of weights (2 m + 1,) without delay; `near` samples average the power of fast changes."""
+    """A low-pass filter of weights (2 m + 1,) without delay; `near` samples average the power of
+    fast changes.
+    """
 
     weights: np.ndarray
     near: int
 
     @classmethod
     def at(cls, rate: float, frequency: float) -> "NoiseFilter":
-        """The filter for a sampling rate and a frequency [Hz] in its pass band; at too low a rate all passes."""
+        """The filter for a sampling rate and a frequency [Hz] in its pass band; at too low a rate
+        all passes.
+        """
         from scipy.signal import firwin, kaiserord
 
         edge, width = PASSED * frequency, BETWEEN * frequency
@@ -39,12 +46,19 @@ class NoiseFilter:
         return cls(weights / gain, near)
 
     def __call__(self, departure: np.ndarray, noise: float) -> np.ndarray:
-        """Departures (N,) from a periodic course, real or complex, whose samples have white noise of a variance."""
+        """Departures (N,) from a periodic course, real or complex, whose samples have white noise
+        of a variance.
+        """
         if len(self.weights) == 1 or len(departure) <= 2 * len(self.weights):
             return departure
         half = len(self.weights) // 2
-        slow = np.convolve(np.pad(departure, half, "reflect", reflect_type="odd"), self.weights, "valid")
+        slow = np.convolve(
+            np.pad(departure, half, "reflect", reflect_type="odd"), self.weights, "valid"
+        )
         fast = departure - slow
         loud = np.convolve(np.abs(fast) ** 2, np.ones(self.near) / self.near, "same")
         rest = noise * (1 - 2 * self.weights[half] + float(self.weights @ self.weights))
-        return slow + np.clip(1 - LARGEST_NOISE_RATIO * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
+        return (
+            slow
+            + np.clip(1 - LARGEST_NOISE_RATIO * rest / np.maximum(loud, 1e-300), 0.0, 1.0) * fast
+        )

@@ -1,9 +1,10 @@
 """Records on the base of their own load, whatever unit of power their files are in.
 
-Bounds and priors of a model mean a load that draws about one per unit. A record in per unit of a system (100 MVA) is
-therefore fitted per unit of the apparent power before the first dip that is fitted, and so are all events beside it.
-A load that draws between a half and one of its per unit is on a base of its own, its rating: there the bounds mean what
-they say, and its user knows the values on that base.
+Bounds and priors of a model mean a load that draws about one per unit. A record in per unit of a
+system (100 MVA) is therefore fitted per unit of the apparent power before the first dip that is
+fitted, and so are all events beside it. A load that draws between a half and one of its per unit is
+on a base of its own, its rating: there the bounds mean what they say, and its user knows the values
+on that base.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +19,8 @@ from tractexp.record.event import Event, detect
 from tractexp.record.record import DECLARATION, LOAD, Base, Record
 from tractexp.record.wave_event import WaveEvent, in_waves
 
-LEAST_S, MOST_P = 0.5, 1.05  # pu before the dip, on a base of the load: bounds reach to a torque of one
+# pu before the dip, on a base of the load: bounds reach to a torque of one
+LEAST_S, MOST_P = 0.5, 1.05
 SMALLEST_BASE = 1e-6  # pu: less apparent power is no load, and no base
 
 Scalable = TypeVar("Scalable", float, np.ndarray)
@@ -26,7 +28,9 @@ Scalable = TypeVar("Scalable", float, np.ndarray)
 
 @dataclass(frozen=True)
 class OwnBase:
-    """The base of power that a load is fitted on, and that of its file, both in MVA or in the file's per unit."""
+    """The base of power that a load is fitted on, and that of its file, both in MVA or in the
+    file's per unit.
+    """
 
     power: float = 1.0
     file_power: float = 1.0
@@ -41,7 +45,9 @@ class OwnBase:
 
     @classmethod
     def of(cls, event: Event) -> "OwnBase":
-        """The base for a first fitted event: its power before the dip, or its present base if that is its own."""
+        """The base for a first fitted event: its power before the dip, or its present base if that
+        is its own.
+        """
         at, S = cls.at(event.record), float(np.hypot(event.P0, event.Q0))
         own = event.record.base.origin == LOAD or (S >= LEAST_S and abs(event.P0) <= MOST_P)
         return at if own or not S > SMALLEST_BASE else replace(at, power=S * at.power)
@@ -54,8 +60,9 @@ class OwnBase:
     def over(self, record: Record) -> float:
         """How many per units of a record one of this base is.
 
-        A record of which nobody said how many MVA its per unit is, is taken to be in the unit of this one's file, and
-        the other way round. Bases that were each the steady state of a load stay beside each other.
+        A record of which nobody said how many MVA its per unit is, is taken to be in the unit of
+        this one's file, and the other way round. Bases that were each the steady state of a load
+        stay beside each other.
         """
         file = record.file_base
         if self.origin == file.origin == LOAD:
@@ -76,7 +83,10 @@ class OwnBase:
 
     def values(self, values: Mapping[str, float], exponents: Mapping[str, int]) -> dict[str, float]:
         """Parameters by name, or by name and event as `T_m[1]`, on the file's base."""
-        return {name: scale_parameter(value, exponents[name.partition("[")[0]], self.ratio) for name, value in values.items()}
+        return {
+            name: scale_parameter(value, exponents[name.partition("[")[0]], self.ratio)
+            for name, value in values.items()
+        }
 
     def __str__(self) -> str:
         return f"{self.power:.4g} MVA" if self.in_mva else f"{self.power:.4g} pu of the file"
@@ -85,7 +95,8 @@ class OwnBase:
 def on_own_base(events: Sequence[Event]) -> list[Event]:
     """Events of one call, the first one fitted, all on the base of the load in that.
 
-    Raises `UserError` where they must be rebased and some of them do not say how many MVA one per unit is.
+    Raises `UserError` where they must be rebased and some of them do not say how many MVA one per
+    unit is.
     """
     if not events:
         return []
@@ -95,8 +106,10 @@ def on_own_base(events: Sequence[Event]) -> list[Event]:
         if own.power != first.base.power and record.file_base.in_mva != own.in_mva:
             which, other = (first, record) if own.in_mva else (record, first)
             raise UserError(
-                f"{other.where} does not say how many MVA one per unit is, and {which.where} is per unit of"
-                f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of both"
+                f"{other.where} does not say how many MVA one per unit is, and {which.where} is per"
+                " unit of"
+                f" {which.file_base.power:g} MVA, so that they cannot be put on one base; say it of"
+                " both"
                 f" ({DATA.base_power} in MVA, with {DATA.units}={{P: pu, Q: pu}}), or of none"
             )
     return [own.put(event) for event in events]
@@ -110,13 +123,22 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
     by, base = Base(1.0, ratio), replace(record.base, power=ratio * record.base.power, origin=LOAD)
     arrays = by.per_unit({"P": record.P, "Q": record.Q})
     note = (
-        f"put on a base of {own}, the apparent power before the first dip that is fitted: on {own.file} powers, torque"
-        f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values on this base"
+        f"put on a base of {own}, the apparent power before the first dip that is fitted: on"
+        f" {own.file} powers, torque"
+        f" and inertia are {own.ratio:.5g} times, impedances {1 / own.ratio:.5g} times the values"
+        " on this base"
     )
     return detect(
-        replace(record, base=base, original_base=record.file_base, digest=digest(record), more=by.per_unit(record.more),
-                notes=(*record.notes, *[note] * (record.original_base is None)), **arrays)
-    )  # fmt: skip
+        replace(
+            record,
+            base=base,
+            original_base=record.file_base,
+            digest=digest(record),
+            more=by.per_unit(record.more),
+            notes=(*record.notes, *[note] * (record.original_base is None)),
+            **arrays,
+        )
+    )
 
 
 def scale_parameter(value: Scalable, power_exponent: int, ratio: float) -> Scalable:

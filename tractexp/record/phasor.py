@@ -1,4 +1,6 @@
-"""Phasors from sampled waveforms: weighted windows at the frequency really present, and what follows from them."""
+"""Phasors from sampled waveforms: weighted windows at the frequency really present, and what
+follows from them.
+"""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -18,7 +20,9 @@ BLOCK = 1 << 15  # samples measured at once, about: what fits into a processor's
 
 
 class WaveSource(Protocol):
-    """Voltages [kV] and as many currents [kA], (2 K, N): an array, or what is read when it is sliced like one."""
+    """Voltages [kV] and as many currents [kA], (2 K, N): an array, or what is read when it is
+    sliced like one.
+    """
 
     @property
     def shape(self) -> tuple[int, ...]: ...
@@ -33,8 +37,9 @@ Means = Callable[[np.ndarray, float, np.ndarray, np.ndarray], np.ndarray]
 class Averager:
     """The window of an estimator at one sampling rate.
 
-    `means(y, rate, frequency, at)` are weighted means (..., M) of y (..., N), sampled at `rate` [Hz], about the
-    samples `at` (M,), the weights of sum 1; `frequency` (N,) [Hz] is that of the waveforms behind y.
+    `means(y, rate, frequency, at)` are weighted means (..., M) of y (..., N), sampled at `rate`
+    [Hz], about the samples `at` (M,), the weights of sum 1; `frequency` (N,) [Hz] is that of the
+    waveforms behind y.
     """
 
     reach: int  # samples it needs on either side of its center
@@ -42,7 +47,9 @@ class Averager:
 
 
 def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Means over one cycle, to a fraction of a sample: the two end samples have fractional weights."""
+    """Means over one cycle, to a fraction of a sample: the two end samples have
+    fractional weights.
+    """
     cycle = rate / frequency[at]  # samples
     whole = np.floor(cycle / 2 - 0.5).astype(int)  # of full weight on either side of the center
     total = np.zeros((*y.shape[:-1], y.shape[-1] + 1), dtype=y.dtype)
@@ -54,19 +61,25 @@ def cycle_means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarra
 
 
 def one_cycle(rate: float, nominal: float) -> Averager:
-    """The plain mean over one cycle of the frequency really present, down to the lowest that is tracked."""
+    """The plain mean over one cycle of the frequency really present, down to the lowest that is
+    tracked.
+    """
     return Averager(int(rate / (SLOWEST * nominal) / 2 + 0.5) + 1, cycle_means)
 
 
 def make_weighted_averager(weights: np.ndarray) -> Averager:
-    """Means with these weights (2 reach + 1,), symmetric; by the fast Fourier transform, as windows may be long."""
+    """Means with these weights (2 reach + 1,), symmetric; by the fast Fourier transform, as windows
+    may be long.
+    """
     reach, weights = len(weights) // 2, weights / weights.sum()
 
     def means(y: np.ndarray, rate: float, frequency: np.ndarray, at: np.ndarray) -> np.ndarray:
         from scipy.fft import next_fast_len
 
         length = next_fast_len(y.shape[-1])  # what wraps around falls where no whole window lies
-        filtered = np.fft.ifft(np.fft.fft(y, length) * np.fft.fft(weights, length)).take(at + reach, axis=-1)
+        filtered = np.fft.ifft(np.fft.fft(y, length) * np.fft.fft(weights, length)).take(
+            at + reach, axis=-1
+        )
         return filtered if np.iscomplexobj(y) else filtered.real
 
     return Averager(reach, means)
@@ -85,15 +98,17 @@ def fundamental(
     means: Means = cycle_means,
     harmonics: Sequence[int] = (),
 ) -> np.ndarray:
-    """RMS phasors (..., M) of x (..., N) at the samples `at` (M,), about which whole windows must lie inside.
+    """RMS phasors (..., M) of x (..., N) at the samples `at` (M,), about which whole windows must
+    lie inside.
 
-    `rate` in samples per second, `frequency` in Hz, a number or (N,). The phasors are stamped at the window's center,
-    in the `frame` that turns at `frequency`. With `harmonics`, those of each (H, ..., M), in frames as many times
-    as fast.
+    `rate` in samples per second, `frequency` in Hz, a number or (N,). The phasors are stamped at
+    the window's center, in the `frame` that turns at `frequency`. With `harmonics`, those of each
+    (H, ..., M), in frames as many times as fast.
 
-    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is exact at any
-    `frequency`, where the plain DFT leaks its mirror image: with S and G the weighted means of x e^{-j phi} and
-    e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is solved for X.
+    In the window the least-squares sinusoid is taken, x = sqrt(2) Re(X e^{j phi}), so a phasor is
+    exact at any `frequency`, where the plain DFT leaks its mirror image: with S and G the weighted
+    means of x e^{-j phi} and e^{-2 j phi}, the normal equation sqrt(2) S = X + G X* is solved for
+    X.
     """
     f = np.broadcast_to(np.asarray(frequency, dtype=float), x.shape[-1])
     angle = frame(f, rate)
@@ -106,13 +121,17 @@ def fundamental(
 
 
 def sequences(phases: np.ndarray) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Positive and negative sequence (N,) of three phase phasors (3, N), ordered a, b, c (Fortescue 1918)."""
+    """Positive and negative sequence (N,) of three phase phasors (3, N), ordered a, b, c (Fortescue
+    1918).
+    """
     a, b, c = phases
     return (a + TURN * b + TURN**2 * c) / 3, (a + TURN**2 * b + TURN * c) / 3
 
 
 def symmetrical(X: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N), itself and zero."""
+    """Positive and negative sequence (N,) of phasors (3, N); of a single phase (1, N), itself and
+    zero.
+    """
     return sequences(X) if len(X) == 3 else (X[0], np.zeros_like(X[0]))
 
 
@@ -122,11 +141,13 @@ def measure_turning(angle: np.ndarray, rate: float) -> np.ndarray:
 
 
 def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0) -> np.ndarray:
-    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over 4 cycles, within 10 % of `nominal`.
+    """Frequency (N,) [Hz] of phase voltages (K, N), three or one, smoothed over 4 cycles, within 10
+    % of `nominal`.
 
-    The mean speed of the positive-sequence voltage (of the one there is) over the span about each sample. Three passes,
-    each at the frequency that the previous one measured, remove the error of the frequency from the phasors.
-    A voltage below `least` has no angle: spans end before it, and within the nominal frequency is taken.
+    The mean speed of the positive-sequence voltage (of the one there is) over the span about each
+    sample. Three passes, each at the frequency that the previous one measured, remove the error of
+    the frequency from the phasors. A voltage below `least` has no angle: spans end before it, and
+    within the nominal frequency is taken.
     """
     n, (every, reach, half) = voltages.shape[-1], _choose_tracking_grid(rate, nominal)
     at = np.arange(reach, n - reach, every)
@@ -136,36 +157,48 @@ def track(voltages: np.ndarray, rate: float, nominal: float, least: float = 0.0)
         angle = np.unwrap(np.angle(V1)) + frame(f, rate)[at]
         speed = _speed(angle, np.abs(V1) < least, half) * rate / every / (2 * np.pi)
         f = np.interp(
-            np.arange(n), at, np.clip(np.nan_to_num(speed, nan=nominal), SLOWEST * nominal, FASTEST * nominal)
+            np.arange(n),
+            at,
+            np.clip(np.nan_to_num(speed, nan=nominal), SLOWEST * nominal, FASTEST * nominal),
         )
     return f
 
 
 def _speed(angle: np.ndarray, dead: np.ndarray, half: int) -> np.ndarray:
-    """Mean increase (M,) of an angle over `half` steps either way, or up to where it is dead; nan where it is."""
+    """Mean increase (M,) of an angle over `half` steps either way, or up to where it is dead; nan
+    where it is.
+    """
     k, last = np.arange(len(angle)), len(angle) - 1
     early = np.maximum(k - half, np.maximum.accumulate(np.where(dead, k + 1, 0)))
     late = np.minimum(k + half, np.minimum.accumulate(np.where(dead, k - 1, last)[::-1])[::-1])
     speed = np.full(len(angle), np.nan)
-    np.divide(angle[late] - angle[early.clip(max=last)], late - early, out=speed, where=late > early)
+    np.divide(
+        angle[late] - angle[early.clip(max=last)], late - early, out=speed, where=late > early
+    )
     return speed
 
 
 def _choose_tracking_grid(rate: float, nominal: float) -> tuple[int, int, int]:
-    """Samples from one tracked phasor to the next, samples a phasor needs on either side, phasors in half a span."""
+    """Samples from one tracked phasor to the next, samples a phasor needs on either side, phasors
+    in half a span.
+    """
     every = max(1, int(rate / nominal / 20))
     return every, one_cycle(rate, nominal).reach, int(SMOOTHED * rate / nominal / 2 / every)
 
 
 @dataclass(frozen=True, eq=False)
 class Phasors:
-    """RMS phasors of one load at uniform times: of its three phases (K = 3) or of the only one (K = 1)."""
+    """RMS phasors of one load at uniform times: of its three phases (K = 3) or of the only one (K =
+    1).
+    """
 
     t: np.ndarray  # (M,) s
-    V: NDArray[np.complex128]  # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
+    # (K, M) kV, phase to ground; of a single-phase load the voltage it is fed with
+    V: NDArray[np.complex128]
     I: NDArray[np.complex128]  # (K, M) kA, into the load
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
-    more: Mapping[str, np.ndarray] = field(default_factory=dict)  # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
+    # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
+    more: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def V1(self) -> NDArray[np.complex128]:
@@ -189,7 +222,9 @@ class Phasors:
 
     @property
     def S(self) -> NDArray[np.complex128]:
-        """Power P + jQ [MVA], (M,) complex: of the positive sequence, 3 V1 I1*; of a single-phase load V I*."""
+        """Power P + jQ [MVA], (M,) complex: of the positive sequence, 3 V1 I1*; of a single-phase
+        load V I*.
+        """
         return len(self.V) * self.V1 * self.I1.conj()
 
     @property
@@ -204,10 +239,11 @@ class Phasors:
 
 
 def join_phasors(parts: Sequence[Phasors]) -> Phasors:
-    """Phasors that follow each other without a gap as one, evenly spaced by the widest of their steps.
+    """Phasors that follow each other without a gap as one, evenly spaced by the widest of their
+    steps.
 
-    The frame of each part is turned so that V1 goes on where the part before it ends; what no window saw at a change
-    of rate is interpolated.
+    The frame of each part is turned so that V1 goes on where the part before it ends; what no
+    window saw at a change of rate is interpolated.
     """
     if len(parts) == 1:
         return parts[0]
@@ -223,7 +259,9 @@ def join_phasors(parts: Sequence[Phasors]) -> Phasors:
 
     def join(rows: Sequence[np.ndarray]) -> np.ndarray:
         values = np.concatenate(rows, axis=-1)
-        return np.array([np.interp(t, at, row) for row in np.atleast_2d(values)]).reshape(*values.shape[:-1], len(t))
+        return np.array([np.interp(t, at, row) for row in np.atleast_2d(values)]).reshape(
+            *values.shape[:-1], len(t)
+        )
 
     more = {name: join([part.more[name] for part in turned]) for name in turned[0].more}
     V, I, f = (join([getattr(part, name) for part in turned]) for name in ("V", "I", "f"))
@@ -242,24 +280,36 @@ def measure(
     block: int = BLOCK,
     tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
-    """Phasors of `waves` (2 K, N) sampled at `rate` [Hz] from `start` [s], measured `block` samples at a time, about.
+    """Phasors of `waves` (2 K, N) sampled at `rate` [Hz] from `start` [s], measured `block` samples
+    at a time, about.
 
-    One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is how much later
-    than the time stamp each channel is sampled. `window(rate, nominal)` is what the estimator averages over. With
-    `harmonics`, `more` has their powers P_3, ..., that of all but the fundamental, P_H [MW], and the total distortions
-    THD_u and THD_i. `tracked` has the frequencies that were tracked in the blocks of the same voltages before, by their
-    first sample, and gets those that are tracked here: loads of one bus share it. N must span two cycles, and the
-    window, at least; raises `UserError` otherwise.
+    One phasor about every `step` seconds: the nearest whole number of samples. `skew` (2 K,) [s] is
+    how much later than the time stamp each channel is sampled. `window(rate, nominal)` is what the
+    estimator averages over. With `harmonics`, `more` has their powers P_3, ..., that of all but the
+    fundamental, P_H [MW], and the total distortions THD_u and THD_i. `tracked` has the frequencies
+    that were tracked in the blocks of the same voltages before, by their first sample, and gets
+    those that are tracked here: loads of one bus share it. N must span two cycles, and the window,
+    at least; raises `UserError` otherwise.
     """
-    n, K, over, every = waves.shape[-1], waves.shape[0] // 2, window(rate, nominal), max(1, round(step * rate))
+    n, K, over, every = (
+        waves.shape[-1],
+        waves.shape[0] // 2,
+        window(rate, nominal),
+        max(1, round(step * rate)),
+    )
     needed = max(2 * rate / (SLOWEST * nominal) + 4, 2 * (over.reach + every) + 1)
     if n < needed:
         raise UserError(
-            f"{n} samples at {rate:g} Hz are too short: phasors need {1000 * needed / rate:.0f} ms, over two cycles of "
+            f"{n} samples at {rate:g} Hz are too short: phasors need {1000 * needed / rate:.0f} ms,"
+            " over two cycles of "
             f"{nominal:g} Hz and more than their window"
         )
     tracked = {} if tracked is None else tracked
-    least = DEAD_PHASOR_SHARE * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block)) / np.sqrt(2)
+    least = (
+        DEAD_PHASOR_SHARE
+        * max(float(np.abs(waves[:K, a:b]).max()) for a, b in _blocks(n, block))
+        / np.sqrt(2)
+    )
     at, angle, pieces, distortions = np.arange(over.reach, n - over.reach, every), 0.0, [], []
     for (first, stop), (a, b) in _cut_overlapping_blocks(n, rate, nominal, over.reach, block):
         x = waves[:, first:stop]
@@ -270,13 +320,18 @@ def measure(
         X *= np.exp(1j * np.array([1, *harmonics])[:, None, None] * (turned[a - first] - angle))
         angle += turned[min(b, n - 1) - first] - turned[a - first]
         if skew is not None:
-            X *= np.exp(-2j * np.pi * np.array([1, *harmonics])[:, None, None] * f[here] * skew[:, None])
+            X *= np.exp(
+                -2j * np.pi * np.array([1, *harmonics])[:, None, None] * f[here] * skew[:, None]
+            )
         pieces.append((X[0], f[here]))
         if harmonics:
             products = over.means(np.concatenate([x**2, x[:K] * x[K:]]), rate, f, here)
             distortions.append(_distortion(X, products[: 2 * K], products[2 * K :], harmonics))
     X, f = (np.concatenate([part[k] for part in pieces], axis=-1) for k in (0, 1))
-    more = {name: np.concatenate([one[name] for one in distortions]) for name in next(iter(distortions), ())}
+    more = {
+        name: np.concatenate([one[name] for one in distortions])
+        for name in next(iter(distortions), ())
+    }
     phasors = Phasors(start + at / rate, X[:K], X[K:], f, more)
     return replace(phasors, f=_measure_frequency(phasors, rate / every, least))
 
@@ -284,15 +339,17 @@ def measure(
 def _distortion(
     X: np.ndarray, squares: np.ndarray, power: np.ndarray, harmonics: Sequence[int]
 ) -> dict[str, np.ndarray]:
-    """Powers and distortion of phasors X (1 + H, 2 K, M), of waves with these mean `squares` and products (`power`).
+    """Powers and distortion of phasors X (1 + H, 2 K, M), of waves with these mean `squares` and
+    products (`power`).
 
-    Source: IEEE 1459-2010, 3.1.2: P_H = P - P_1 and THD = sqrt((V/V_1)^2 - 1), which count whatever is not the
-    fundamental; of three phases together as in its effective values, 3.2.2.
+    Source: IEEE 1459-2010, 3.1.2: P_H = P - P_1 and THD = sqrt((V/V_1)^2 - 1), which count whatever
+    is not the fundamental; of three phases together as in its effective values, 3.2.2.
     """
     K = X.shape[1] // 2
     channels = {"P_H": power.sum(axis=0) - np.real(X[0, :K] * X[0, K:].conj()).sum(axis=0)}
     channels |= {
-        f"P_{h}": np.real(V * I.conj()).sum(axis=0) for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)
+        f"P_{h}": np.real(V * I.conj()).sum(axis=0)
+        for h, V, I in zip(harmonics, X[1:, :K], X[1:, K:], strict=True)
     }
     for name, side in (("THD_u", slice(K)), ("THD_i", slice(K, None))):
         one = (np.abs(X[0, side]) ** 2).sum(axis=0)
@@ -302,9 +359,12 @@ def _distortion(
 
 
 def _measure_frequency(phasors: Phasors, rate: float, least: float) -> np.ndarray:
-    """Frequency (M,) [Hz] at which the voltage really turns; where it is dead, that before and after."""
+    """Frequency (M,) [Hz] at which the voltage really turns; where it is dead, that before and
+    after.
+    """
     dead = np.abs(phasors.V1) < least
-    alive = ~(dead | np.r_[dead[1:], False] | np.r_[False, dead[:-1]])  # a slope needs both neighbours
+    # a slope needs both neighbours
+    alive = ~(dead | np.r_[dead[1:], False] | np.r_[False, dead[:-1]])
     if not alive.any():
         return phasors.f
     k = np.arange(len(alive))
@@ -318,10 +378,11 @@ def _blocks(n: int, block: int) -> Iterator[tuple[int, int]]:
 def _cut_overlapping_blocks(
     n: int, rate: float, nominal: float, reach: int, block: int
 ) -> Iterator[tuple[tuple[int, int], tuple[int, int]]]:
-    """Samples to look at, and those within to give phasors of: wherever a cut lies, it changes nothing.
+    """Samples to look at, and those within to give phasors of: wherever a cut lies, it changes
+    nothing.
 
-    A pass of the tracking sees what lies a window and half a span away, and so many times as there are passes. Cuts
-    lie on the grid of tracked phasors.
+    A pass of the tracking sees what lies a window and half a span away, and so many times as there
+    are passes. Cuts lie on the grid of tracked phasors.
     """
     every, own, half = _choose_tracking_grid(rate, nominal)
     margin = (PASSES * (own + (half + 2) * every) + max(own, reach)) // every * every + every

@@ -28,9 +28,12 @@ class Reader(Plugin):
     """Base of the reader plugins, chosen by `data=NAME`."""
 
     group: ClassVar[str] = "data"
-    endings: ClassVar[tuple[str, ...]] = ()  # of the files that `tractexp.read` gives it, in lower case
-    parts: ClassVar[tuple[str, ...]] = ()  # endings of an instrument's files: of one stem they are one record
-    folders: ClassVar[bool] = False  # `data.path` is a folder, and `train` names events of its files
+    # of the files that `tractexp.read` gives it, in lower case
+    endings: ClassVar[tuple[str, ...]] = ()
+    # endings of an instrument's files: of one stem they are one record
+    parts: ClassVar[tuple[str, ...]] = ()
+    # `data.path` is a folder, and `train` names events of its files
+    folders: ClassVar[bool] = False
 
     @staticmethod
     def of(path: str) -> dict[str, Any]:
@@ -39,15 +42,21 @@ class Reader(Plugin):
 
     @classmethod
     def takes(cls, path: str) -> bool:
-        """Whether a file with one of its endings is meant for it: readers that share an ending look inside."""
+        """Whether a file with one of its endings is meant for it: readers that share an ending look
+        inside.
+        """
         return True
 
     @abstractmethod
     def read(self) -> Events:
-        """Read and check everything; raises `UserError` naming the file, the place and the value."""
+        """Read and check everything; raises `UserError` naming the file, the place
+        and the value.
+        """
 
     def table(self) -> tuple["Record", Sequence["FileDip"]] | None:
-        """The whole record of a file and its dips, from a reader of one table; None from other readers."""
+        """The whole record of a file and its dips, from a reader of one table; None from other
+        readers.
+        """
         return None
 
 
@@ -60,7 +69,9 @@ def reader_of(path: str) -> type[Any]:
     classes: list[Any] = list(discover()[Reader.group].values())
     readers = [cls for cls in classes if ending and ending in cls.endings]
     if Path(path).is_dir():
-        raise UserError(f"{path} is a folder; give a file of it, or make a table: {survey_of(path)}")
+        raise UserError(
+            f"{path} is a folder; give a file of it, or make a table: {survey_of(path)}"
+        )
     if not readers:
         reason = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
         raise UserError(f"{reason}; endings that can be read: {', '.join(endings())}")
@@ -69,4 +80,6 @@ def reader_of(path: str) -> type[Any]:
 
 def endings() -> list[str]:
     """The endings of the files that can be read."""
-    return sorted({e for cls in discover()[Reader.group].values() for e in getattr(cls, "endings", ())})
+    return sorted(
+        {e for cls in discover()[Reader.group].values() for e in getattr(cls, "endings", ())}
+    )

@@ -10,17 +10,20 @@ from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
 LARGEST_JITTER = 0.01  # of a step: times closer than this to a uniform grid count as uniform
-# s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant T' of 50 to 300 ms
-# cannot be identified. The slowest phasor units that record dips send 25 per second.
+# s: at coarser sampling a dip of 100 ms has fewer than two samples, and a transient time constant
+# T' of 50 to 300 ms cannot be identified. The slowest phasor units that record dips send 25 per
+# second.
 LONGEST_STEP = 0.05
 SELDOM = 0.05  # of the steps: where more than these are odd, a simulator chose them
-WHOLE_STEP_TOLERANCE = 0.02  # of a step: a step so close to a multiple of the usual one is of missing rows
+# of a step: a step so close to a multiple of the usual one is of missing rows
+WHOLE_STEP_TOLERANCE = 0.02
 FEWEST_SAMPLES = 20
 PLAUSIBLE_VOLTAGE = (0.5, 1.5)  # pu, at the start of a record
 DEAD_VOLTAGE_SHARE = 0.05  # of the voltage at the start: less is no voltage at all
 PLAUSIBLE_POWER = 20.0  # pu, at the start of a record
 GREATEST_CURRENT = 50.0  # kA, of a load before a dip
-SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}  # of a base [kV, MVA, Hz]
+# of a base [kV, MVA, Hz]
+SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}
 
 
 DECLARATION, LOAD = "given", "load"
@@ -30,8 +33,9 @@ DECLARATION, LOAD = "given", "load"
 class Base:
     """What one per unit stands for. Voltage is line-to-line RMS; power is three-phase.
 
-    `origin` says who chose it: "load", the steady state of the load itself before a dip, or "given", by a user or by
-    the file. A power of 1 from a user or a file means that nobody said how many MVA one per unit is.
+    `origin` says who chose it: "load", the steady state of the load itself before a dip, or
+    "given", by a user or by the file. A power of 1 from a user or a file means that nobody said how
+    many MVA one per unit is.
     """
 
     voltage: float = 1.0  # kV
@@ -64,11 +68,12 @@ class Record:
     """Positive-sequence voltage and power of one event, P and Q positive when consumed.
 
     Arrays have shape (N,), are finite except where `P` or `Q` is missing (nan: a gap, in no sum),
-    and are sampled uniformly. `window` is the averaging window of its phasors, None where no one says it; `more` are
-    further channels, which no model reads. `source` says where the record came from, `notes` what was changed in it or
-    is odd about it, one sentence each. `original_base` is the base of the file, None where that is `base`;
-    `identity` says which load it is: station, device, load, channels; `digest` is the SHA-256 of its
-    channels as they were read, "" where they still are that.
+    and are sampled uniformly. `window` is the averaging window of its phasors, None where no one
+    says it; `more` are further channels, which no model reads. `source` says where the record came
+    from, `notes` what was changed in it or is odd about it, one sentence each. `original_base` is
+    the base of the file, None where that is `base`; `identity` says which load it is: station,
+    device, load, channels; `digest` is the SHA-256 of its channels as they were read, "" where they
+    still are that.
     """
 
     name: str
@@ -125,12 +130,16 @@ class Record:
     def part(self, window: slice) -> "Record":
         """Some of its samples, as a record."""
         channels = {name: values[window] for name, values in self.channels.items()}
-        return replace(self, more={name: values[window] for name, values in self.more.items()}, **channels)
+        return replace(
+            self, more={name: values[window] for name, values in self.more.items()}, **channels
+        )
 
     def check(self, place: Callable[[int], str] | None = None) -> "Record":
-        """Return the record; raise `UserError` with the source, the place and the value of what is wrong.
+        """Return the record; raise `UserError` with the source, the place and the value of what is
+        wrong.
 
-        `place(i)` says where sample i stands in the file ("line 17"); by default sample and time are named.
+        `place(i)` says where sample i stands in the file ("line 17"); by default sample and time
+        are named.
         """
         place = place or self._place
         self._check_values(place)
@@ -139,10 +148,12 @@ class Record:
         return self
 
     def uniform(self, place: Callable[[int], str] | None = None) -> "Record":
-        """The record on a uniform time grid; a note says so where more than `JITTER` of a step was moved.
+        """The record on a uniform time grid; a note says so where more than `JITTER` of a step was
+        moved.
 
-        Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows of one time the
-        second holds from then on. Raises `UserError` for missing rows: steps that are multiples of the usual one.
+        Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows
+        of one time the second holds from then on. Raises `UserError` for missing rows: steps that
+        are multiples of the usual one.
         """
         place = place or self._place
         self._check_values(place, still=True)
@@ -159,7 +170,10 @@ class Record:
             grid = np.linspace(self.t[0], self.t[-1], round((self.t[-1] - self.t[0]) / usual) + 1)
             note = self._uneven(steps, usual)
         else:
-            note = f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled linearly"
+            note = (
+                f"times were up to {100 * off:.2g} % of a step off a uniform grid: resampled"
+                " linearly"
+            )
         moved = {name: np.interp(grid, self.t, values) for name, values in self.channels.items()}
         moved["t"] = grid
         more = {name: np.interp(grid, self.t, values) for name, values in self.more.items()}
@@ -171,8 +185,10 @@ class Record:
         if still.mean() > SELDOM:
             i = int(np.argmax(still)) + 1
             raise UserError(
-                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s, "
-                f"and so at {np.count_nonzero(still)} rows: t has too few digits; write it with more"
+                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after"
+                f" {self.t[i - 1]:.9g} s, "
+                f"and so at {np.count_nonzero(still)} rows: t has too few digits; write it with"
+                " more"
             )
         ratio = steps / usual
         long = ratio > 1.5
@@ -183,24 +199,33 @@ class Record:
         i = int(np.argmax(long)) + 1
         if i > 1 and still[i - 2]:
             raise UserError(
-                f"{self.where}: {place(i - 1)}: time does not increase: t = {self.t[i - 1]:.9g} s after "
-                f"{self.t[i - 2]:.9g} s, and a step of {steps[i - 1]:g} s follows where {usual:g} s is usual"
+                f"{self.where}: {place(i - 1)}: time does not increase: t = {self.t[i - 1]:.9g} s"
+                " after "
+                f"{self.t[i - 2]:.9g} s, and a step of {steps[i - 1]:g} s follows where {usual:g} s"
+                " is usual"
             )
         more = int(np.count_nonzero(long)) - 1
         places = f" here and at {more} more place{'s' * (more > 1)}" if more else ""
         raise UserError(
-            f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is usual: rows are "
+            f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is"
+            " usual: rows are "
             f"missing{places}; fill them in (P and Q may be nan, U may not) or cut the record there"
         )
 
     def _uneven(self, steps: np.ndarray, usual: float) -> str:
         """What is said of times that a simulator chose."""
-        short, long = int(np.count_nonzero(steps < 0.5 * usual)), int(np.count_nonzero(steps > 1.5 * usual))
+        short, long = (
+            int(np.count_nonzero(steps < 0.5 * usual)),
+            int(np.count_nonzero(steps > 1.5 * usual)),
+        )
         if not long:
             rows = "1 row lies" if short == 1 else f"{short} rows lie"
             what = f"{rows} between the usual ones, as a simulator writes the instants of events"
         else:
-            what = f"times are uneven (steps of {steps.min():.3g} to {steps.max():.3g} s), as a simulator chooses them"
+            what = (
+                f"times are uneven (steps of {steps.min():.3g} to {steps.max():.3g} s), as a"
+                " simulator chooses them"
+            )
         return f"{what}: resampled linearly every {usual:.6g} s"
 
     def _place(self, i: int) -> str:
@@ -211,27 +236,35 @@ class Record:
         n = self.samples
         for name, values in (*self.more.items(), *self.channels.items()):
             if values.shape != (n,):
-                raise UserError(f"{self.where}: {name} has shape {values.shape} where t has {n} samples")
+                raise UserError(
+                    f"{self.where}: {name} has shape {values.shape} where t has {n} samples"
+                )
         for name, values in self.channels.items():
             bad = np.isinf(values) if name in ("P", "Q") else ~np.isfinite(values)
             if bad.any():
                 i = int(np.argmax(bad))
                 gap = "" if name in ("P", "Q") else "; only P and Q may have gaps (nan)"
-                raise UserError(f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}")
+                raise UserError(
+                    f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}"
+                )
             if np.isnan(values).all():
                 raise UserError(f"{self.where}: {name} holds no number at all")
         if n < FEWEST_SAMPLES:
-            raise UserError(f"{self.where}: only {n} samples; a record needs at least {FEWEST_SAMPLES}")
+            raise UserError(
+                f"{self.where}: only {n} samples; a record needs at least {FEWEST_SAMPLES}"
+            )
         back = np.diff(self.t) < 0 if still and self.t[-1] > self.t[0] else np.diff(self.t) <= 0
         if back.any():
             i = int(np.argmax(back)) + 1
             raise UserError(
-                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after {self.t[i - 1]:.9g} s"
+                f"{self.where}: {place(i)}: time does not increase: t = {self.t[i]:.9g} s after"
+                f" {self.t[i - 1]:.9g} s"
             )
         if (self.U <= 0).any():
             i = int(np.argmax(self.U <= 0))
             raise UserError(
-                f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero everywhere; without it "
+                f"{self.where}: {place(i)}: U = {self.U[i]:g}, but voltage must be above zero"
+                " everywhere; without it "
                 "no load draws power: give the rows before it, or after it, as a file of their own"
             )
 
@@ -240,19 +273,23 @@ class Record:
         if off.max() > LARGEST_JITTER:
             i = int(np.argmax(off))
             raise UserError(
-                f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is {100 * off[i]:.2g} % of "
+                f"{self.where}: {place(i)}: sampling is not uniform: t = {self.t[i]:.9g} s is"
+                f" {100 * off[i]:.2g} % of "
                 f"a step off the uniform grid; at most {100 * LARGEST_JITTER:g} % is allowed"
             )
         span = self.samples * self.step
         if span < 1 / self.base.frequency:
             raise UserError(
-                f"{self.where}: the record lasts {span:.3g} s, less than one cycle of {self.base.frequency:g} Hz; t "
+                f"{self.where}: the record lasts {span:.3g} s, less than one cycle of"
+                f" {self.base.frequency:g} Hz; t "
                 f"must be in seconds ({DATA.units}={{t: ms}} says else)"
             )
         if self.step > LONGEST_STEP:
             raise UserError(
-                f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a dip within 50 to "
-                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be in "
+                f"{self.where}: one sample every {self.step:.3g} s is too coarse: a motor answers a"
+                " dip within 50 to "
+                f"300 ms, so at least {1 / LONGEST_STEP:g} samples per second are needed; t must be"
+                " in "
                 f"seconds (where a table has ms: {DATA.units}={{t: ms}})"
             )
 
@@ -261,13 +298,16 @@ class Record:
         U = float(np.median(self.U[:FEWEST_SAMPLES]))
         if not low <= U <= high:
             raise UserError(
-                f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is expected); if it is "
-                f"in V or kV, say so, {DATA.units}={{U: V}}, or give the base as {DATA.base_voltage} (kV, line to line)"
+                f"{self.where}: U starts at {U:g}, which is not per unit ({low:g} to {high:g} is"
+                " expected); if it is "
+                f"in V or kV, say so, {DATA.units}={{U: V}}, or give the base as"
+                f" {DATA.base_voltage} (kV, line to line)"
             )
         S = float(np.nanmax(np.abs([self.P, self.Q])))
         if S > PLAUSIBLE_POWER:
             raise UserError(
-                f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to {PLAUSIBLE_POWER:g} is expected); "
+                f"{self.where}: P or Q reaches {S:g}, which is not per unit (up to"
+                f" {PLAUSIBLE_POWER:g} is expected); "
                 f"if it is in kW or MW, say so, {DATA.units}={{P: kW, Q: kvar}}, or give the "
                 f"base as {DATA.base_power} (MVA)"
             )
@@ -278,8 +318,11 @@ class Record:
         if off.max() > 0.2:
             i = int(np.argmax(off))
             raise UserError(
-                f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the nominal "
-                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say its unit, "
-                f"{DATA.units}={{f: mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f out, "
+                f"{self.where}: {self._place(i)}: f = {self.f[i]:g} is more than 20 % off the"
+                " nominal "
+                f"{self.base.frequency:g} Hz at a voltage of {self.U[i]:.3g}; f must be in Hz; say"
+                " its unit, "
+                f"{DATA.units}={{f: mHz}}, the nominal frequency, {DATA.frequency}=60, or leave f"
+                " out, "
                 f"{DATA.columns}={{f: null}}"
             )

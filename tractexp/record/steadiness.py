@@ -1,4 +1,6 @@
-"""How steady a load is before an event: its steady state is that after its last step, where it is at rest."""
+"""How steady a load is before an event: its steady state is that after its last step, where it is
+at rest.
+"""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,41 +24,55 @@ REVERSED = 0.25  # of its range: a load that turns back by more swings
 REST = 0.5  # of its mean slope that a course has left at most where it has come to rest
 PARTS = 2, 4, 8  # the last half, quarter or eighth of a course may be at rest
 AT_THE_END = 0.1  # s before an event, to which the mean over its steady state is compared
-EARLY = 1.5, 0.5  # cycles before a dip within which a step of less than so much of the power is taken for its own
+# cycles before a dip within which a step of less than so much of the power is taken for its own
+EARLY = 1.5, 0.5
 HISTORY = 3.0  # s before an event in which steps are looked for
 
 
 def steady_part(record: Record, part: slice, least: int) -> tuple[slice, list[str]]:
     """What of the samples `part` before an event is steady, and what is to be said of it.
 
-    From the last step of the load or of its voltage on. Raises `UserError` where fewer than `least` samples are left.
+    From the last step of the load or of its voltage on. Raises `UserError` where fewer than `least`
+    samples are left.
     """
     begin, cycle = max(0, min(part.start, part.stop - round(HISTORY * record.rate))), smear(record)
     U, P, Q = (x[begin : part.stop] for x in (record.U, record.P, record.Q))
     notes: list[str] = []
     first = part.start
-    steps = [c for c in load_changes(U, P, Q, cycle) if begin + c.stop > first and not _early(c, len(U), cycle)]
+    steps = [
+        c
+        for c in load_changes(U, P, Q, cycle)
+        if begin + c.stop > first and not _early(c, len(U), cycle)
+    ]
     if last := steps[-1:]:
         first, what = begin + last[0].stop, clause(record, begin, last[0])
         lasts = (part.stop - first) * record.step
         if part.stop - first < least:
             raise UserError(
-                f"{record.where}: {what}, {1000 * lasts:.0f} ms before the dip at t = {record.t[part.stop - 1]:g} s: "
-                f"no steady state of {1000 * least * record.step:.0f} ms comes before it; choose another event"
+                f"{record.where}: {what}, {1000 * lasts:.0f} ms before the dip at t ="
+                f" {record.t[part.stop - 1]:g} s: "
+                f"no steady state of {1000 * least * record.step:.0f} ms comes before it; choose"
+                " another event"
             )
-        notes.append(f"{what}: the steady state before the dip is that of the {lasts:.2g} s after it")
+        notes.append(
+            f"{what}: the steady state before the dip is that of the {lasts:.2g} s after it"
+        )
     for change in voltage_changes(U, cycle):
         if begin + change.stop > first and part.stop - begin - change.stop >= least:
             first, middle = begin + change.stop, begin + (change.first + change.stop) // 2
             notes.append(
-                f"the voltage changes by {100 * (change.ratio - 1):+.2g} % at t = {record.t[middle]:g} s, before the "
-                f"dip: the steady state is that of the {(part.stop - first) * record.step:.2g} s after it"
+                f"the voltage changes by {100 * (change.ratio - 1):+.2g} % at t ="
+                f" {record.t[middle]:g} s, before the "
+                f"dip: the steady state is that of the {(part.stop - first) * record.step:.2g} s"
+                " after it"
             )
     return _at_rest(record, slice(first, part.stop), least, notes)
 
 
 def _early(change: Change, dip: int, cycle: float) -> bool:
-    """Whether a small step right before a dip may be the dip itself, where P and Q are stamped earlier than U."""
+    """Whether a small step right before a dip may be the dip itself, where P and Q are stamped
+    earlier than U.
+    """
     return dip - change.stop < EARLY[0] * cycle and abs(change.ratio - 1) < EARLY[1]
 
 
@@ -70,15 +86,23 @@ def _at_rest(record: Record, part: slice, least: int, notes: list[str]) -> tuple
         part, course = rest, _course(record, rest)
     lasts = (part.stop - part.start) * record.step
     if part != whole:
-        notes = [*notes, f"the load comes to rest before the dip: its steady state is that of the last {lasts:.2g} s"]
+        notes = [
+            *notes,
+            "the load comes to rest before the dip: its steady state is that of the last"
+            f" {lasts:.2g} s",
+        ]
     if course is None:
         return part, notes
     late = slice(max(part.start, part.stop - max(1, round(AT_THE_END * record.rate))), part.stop)
-    (P, Q), (P_late, Q_late) = ([float(np.nanmean(x[at])) for x in (record.P, record.Q)] for at in (part, late))
+    (P, Q), (P_late, Q_late) = (
+        [float(np.nanmean(x[at])) for x in (record.P, record.Q)] for at in (part, late)
+    )
     S = max(float(np.hypot(P, Q)), 1e-300)
     said = (
-        f"the load is not steady before the dip: {course}; P0 and Q0 are means over {lasts:.2g} s, and right before "
-        f"the dip P is {100 * (P_late - P) / S:+.2g} %, Q {100 * (Q_late - Q) / S:+.2g} % of the apparent power away"
+        f"the load is not steady before the dip: {course}; P0 and Q0 are means over {lasts:.2g} s,"
+        " and right before "
+        f"the dip P is {100 * (P_late - P) / S:+.2g} %, Q {100 * (Q_late - Q) / S:+.2g} % of the"
+        " apparent power away"
     )
     return part, [*notes, said]
 
@@ -92,7 +116,9 @@ def _late(part: slice, least: int) -> Iterator[slice]:
 
 
 def _rests(record: Record, late: slice, course: "Course") -> bool:
-    """Whether a load moves so much less in a late part of its course that it has come to rest there."""
+    """Whether a load moves so much less in a late part of its course that it has come to rest
+    there.
+    """
     rest = _course(record, late, at_all=True)
     return rest is not None and rest.span / rest.samples < REST * course.span / course.samples
 
@@ -119,11 +145,15 @@ class Course:
         return self.change == "swings"
 
     def __str__(self) -> str:
-        return f"{self.name} {self.change} by {100 * self.span / self.size:.2g} % of the apparent power"
+        return (
+            f"{self.name} {self.change} by {100 * self.span / self.size:.2g} % of the apparent"
+            " power"
+        )
 
 
 def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) -> Course | None:
-    """How a load moves whose P and Q (N,), without steps, leave their mean by more than noise does; None at rest.
+    """How a load moves whose P and Q (N,), without steps, leave their mean by more than noise does;
+    None at rest.
 
     `cycle` is in samples. With `at_all` however little it moves.
     """
@@ -133,11 +163,19 @@ def course_of(P: np.ndarray, Q: np.ndarray, cycle: float, at_all: bool = False) 
     smooth = np.convolve(S, np.full(n, 1 / n), "valid")
     size = max(float(np.abs(S.mean())), 1e-300)
     noise = float(np.hypot(*(np.median(np.abs(np.diff(x))) for x in (S.real, S.imag)))) / np.sqrt(n)
-    name, course = max((("P", smooth.real), ("Q", smooth.imag)), key=lambda each: float(np.ptp(each[1])))
+    name, course = max(
+        (("P", smooth.real), ("Q", smooth.imag)), key=lambda each: float(np.ptp(each[1]))
+    )
     span = float(np.ptp(course))
     if not at_all and span <= max(CHANGED * size, LARGEST_USUAL_CHANGE * noise):
         return None
-    change = "swings" if _turns(course, REVERSED * span) else "rises" if course[-1] > course[0] else "falls"
+    change = (
+        "swings"
+        if _turns(course, REVERSED * span)
+        else "rises"
+        if course[-1] > course[0]
+        else "falls"
+    )
     return Course(name, change, span, size, len(course))
 
 

@@ -1,9 +1,10 @@
-"""An event as its waveforms show it: space vectors in a frame that turns with the voltage before the dip.
+"""An event as its waveforms show it: space vectors in a frame that turns with the voltage before
+the dip.
 
-Before the dip the waveforms are periodic: an offset, the fundamental and its harmonics, fitted by least squares at the
-frequency really present. The offsets are the recorder's and are taken off; the fundamental gives the frame and the
-power; and the periodic voltage, continued to the time before the record, lets a simulation reach its periodic steady
-state.
+Before the dip the waveforms are periodic: an offset, the fundamental and its harmonics, fitted by
+least squares at the frequency really present. The offsets are the recorder's and are taken off; the
+fundamental gives the frame and the power; and the periodic voltage, continued to the time before
+the record, lets a simulation reach its periodic steady state.
 """
 
 from dataclasses import dataclass, fields, replace
@@ -20,26 +21,32 @@ from tractexp.record.record import Record
 from tractexp.record.waves import Waves
 
 COARSEST = 16  # samples per cycle
-LONGEST_SHORT_DIP = 5.0  # cycles: of a shorter dip phasors of one cycle show little but their own window
+# cycles: of a shorter dip phasors of one cycle show little but their own window
+LONGEST_SHORT_DIP = 5.0
 LEAST_UNBALANCE = 0.1  # of the voltage before
 FEWEST_CYCLES = 2  # before the event
-LEAD = 6  # cycles of the periodic voltage before the record, in which a simulation reaches its steady state
+# cycles of the periodic voltage before the record, in which a simulation reaches its steady state
+LEAD = 6
 HIGHEST_HARMONIC = 25  # harmonic that is fitted
-LARGEST_PERIODIC_DEPARTURE = 0.03  # of the voltage: how far it leaves its periodic course where an event begins
+# of the voltage: how far it leaves its periodic course where an event begins
+LARGEST_PERIODIC_DEPARTURE = 0.03
 NOISE_DEVIATIONS = 6.0  # standard deviations of its noise, if that is more
-SILENT, LOUDER = 0.02, 3.0  # of the current, and times what is there before: less zero sequence than this is none
+# of the current, and times what is there before: less zero sequence than this is none
+SILENT, LOUDER = 0.02, 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class WaveEvent(Event):
-    """An event in waveforms. `record` has t, U, P and Q on the waveforms' samples, as the last half cycle shows them.
+    """An event in waveforms. `record` has t, U, P and Q on the waveforms' samples, as the last half
+    cycle shows them.
 
-    v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero sequence, both
-    filtered of noise; `weights` (2 m + 1,) are the filter's response to the noise of one sample. `turn`
-    (N,) turns into the stationary frame of phase a; currents (3, N) are alpha, beta and zero sequence there [pu], nan
-    where not compared. The first `lead` samples stand before the record. `omega_s0` [rad/s] is the frame's speed
-    relative to nominal; `random` (3,) is what is not periodic in the currents before the dip [pu], `noise_U` in either
-    component of the voltage's space vector, `unexplained` (3, n) all that is no fundamental there. `offsets` (2 K,)
+    v (N,) complex is the voltage's space vector in the frame [pu of its peak], v_zero (N,) its zero
+    sequence, both filtered of noise; `weights` (2 m + 1,) are the filter's response to the noise of
+    one sample. `turn` (N,) turns into the stationary frame of phase a; currents (3, N) are alpha,
+    beta and zero sequence there [pu], nan where not compared. The first `lead` samples stand before
+    the record. `omega_s0` [rad/s] is the frame's speed relative to nominal; `random` (3,) is what
+    is not periodic in the currents before the dip [pu], `noise_U` in either component of the
+    voltage's space vector, `unexplained` (3, n) all that is no fundamental there. `offsets` (2 K,)
     [kV, kA] were taken off.
     """
 
@@ -68,7 +75,9 @@ class WaveEvent(Event):
 
     @property
     def levels(self) -> tuple[float, ...]:
-        """Standard deviation of all that no fundamental explains before the dip, of each current [pu]."""
+        """Standard deviation of all that no fundamental explains before the dip, of each current
+        [pu].
+        """
         return tuple(max(float(np.sqrt(np.mean(row**2))), 1e-9) for row in self.unexplained)
 
     @property
@@ -97,21 +106,27 @@ def phases_of(stationary: np.ndarray, phases: int) -> np.ndarray:
     return np.stack([(vector * TURN ** (-k)).real + zero for k in range(phases)])
 
 
-def stationary(phases: np.ndarray, rate: float, frequency: float) -> tuple[NDArray[np.complex128], np.ndarray]:
+def stationary(
+    phases: np.ndarray, rate: float, frequency: float
+) -> tuple[NDArray[np.complex128], np.ndarray]:
     """Space vector (N,) complex and zero sequence (N,) of phases (K, N).
 
-    A single phase is the real part of its vector; the imaginary part is what it was a quarter of a cycle ago, so that
-    the vector turns as that of three phases does.
+    A single phase is the real part of its vector; the imaginary part is what it was a quarter of a
+    cycle ago, so that the vector turns as that of three phases does.
     """
     if len(phases) == 3:
         return 2 / 3 * (phases[0] + TURN * phases[1] + TURN**2 * phases[2]), phases.mean(axis=0)
     at = np.arange(phases.shape[1])
-    return phases[0] + 1j * np.interp(at - rate / frequency / 4, at, phases[0]), np.zeros(phases.shape[1])
+    return phases[0] + 1j * np.interp(at - rate / frequency / 4, at, phases[0]), np.zeros(
+        phases.shape[1]
+    )
 
 
 @dataclass(frozen=True, eq=False)
 class Periodic:
-    """Offset, fundamental and harmonics (2 H + 1, channels) of channels before an event, about the time `origin`."""
+    """Offset, fundamental and harmonics (2 H + 1, channels) of channels before an event, about the
+    time `origin`.
+    """
 
     coefficients: np.ndarray
     frequency: float
@@ -121,7 +136,9 @@ class Periodic:
     @classmethod
     def of(cls, t: np.ndarray, x: np.ndarray, frequency: float, rate: float) -> "Periodic":
         """Fitted to channels x (channels, n) at times t (n,) [s]."""
-        highest = max(1, min(HIGHEST_HARMONIC, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2))
+        highest = max(
+            1, min(HIGHEST_HARMONIC, int(0.45 * rate / frequency), (len(t) // 3 - 1) // 2)
+        )
         series = cls(np.zeros((2 * highest + 1, len(x))), frequency, float(t[0]), np.zeros(len(x)))
         basis = series.basis(t)
         coefficients = np.linalg.lstsq(basis, x.T, rcond=None)[0]
@@ -131,7 +148,12 @@ class Periodic:
 
     def basis(self, t: np.ndarray) -> np.ndarray:
         """(n, 2 H + 1): one, then cosine and sine of each harmonic."""
-        angle = 2 * np.pi * self.frequency * np.outer(t - self.origin, 1 + np.arange(len(self.coefficients) // 2))
+        angle = (
+            2
+            * np.pi
+            * self.frequency
+            * np.outer(t - self.origin, 1 + np.arange(len(self.coefficients) // 2))
+        )
         waves = np.stack([np.cos(angle), np.sin(angle)], axis=2).reshape(len(t), -1)
         return np.concatenate([np.ones((len(t), 1)), waves], axis=1)
 
@@ -150,7 +172,8 @@ class Periodic:
 
 
 def in_waves(event: Event) -> WaveEvent:
-    """The event in waveforms. Raises `UserError` where its record has none, or too few samples per cycle or before it.
+    """The event in waveforms. Raises `UserError` where its record has none, or too few samples per
+    cycle or before it.
 
     An event that is in waveforms is returned as it is.
     """
@@ -164,8 +187,10 @@ def in_waves(event: Event) -> WaveEvent:
     if np.count_nonzero(before) < FEWEST_CYCLES * cycle * waves.rate:
         have = max(event.t_start - cycle - t[0], 0.0)
         raise UserError(
-            f"{record.where}: {1000 * have:.0f} ms of waveforms before the dip at t = {event.t_start:.3f} s, and the"
-            f" steady state needs {FEWEST_CYCLES} cycles ({1000 * FEWEST_CYCLES * cycle:.0f} ms); take domain=phasors,"
+            f"{record.where}: {1000 * have:.0f} ms of waveforms before the dip at t ="
+            f" {event.t_start:.3f} s, and the"
+            f" steady state needs {FEWEST_CYCLES} cycles ({1000 * FEWEST_CYCLES * cycle:.0f} ms);"
+            " take domain=phasors,"
             " or a record that starts earlier"
         )
     x = _per_unit(waves, record)
@@ -179,7 +204,10 @@ def in_waves(event: Event) -> WaveEvent:
     V, I = (_positive(part) for part in np.split(periodic.fundamentals, 2))
     turn = np.exp(1j * (2 * np.pi * frequency * (time - periodic.origin) + np.angle(V)))
     (v, v_zero), (i, i_zero) = (stationary(part, waves.rate, frequency) for part in np.split(x, 2))
-    noise, noise_U = periodic.rest[K:], np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1))
+    noise, noise_U = (
+        periodic.rest[K:],
+        np.sqrt(np.mean(periodic.rest[:K] ** 2) * (2 / 3 if K == 3 else 1)),
+    )
     noise_filter = NoiseFilter.at(waves.rate, frequency)
     course, course_zero = stationary(periodic.at(time)[:K], waves.rate, frequency)
     v = course + noise_filter(v - course, 2 * noise_U**2)
@@ -194,30 +222,61 @@ def in_waves(event: Event) -> WaveEvent:
     calm = np.stack([residual.real, residual.imag, i_zero[steady]])  # no fundamental
     compared = _choose_compared_components(currents[:, start:], calm, K)
     currents[~compared] = np.nan
-    levels = (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),) if K == 3 else (noise[0], 1.0, 1.0)
+    levels = (
+        (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),)
+        if K == 3
+        else (noise[0], 1.0, 1.0)
+    )
     slow = replace(
-        record, t=time, U=half[0], P=np.real(half[1]), Q=np.imag(half[1]), U2=half[2],
-        f=None, window=None, more={}, waves=None,
-    )  # fmt: skip
+        record,
+        t=time,
+        U=half[0],
+        P=np.real(half[1]),
+        Q=np.imag(half[1]),
+        U2=half[2],
+        f=None,
+        window=None,
+        more={},
+        waves=None,
+    )
     end = min(max(int(np.searchsorted(time, event.t_end)), start + 1), len(time) - 1)
     return WaveEvent(
         **{f.name: getattr(event, f.name) for f in fields(Event)}
         | {
-            "record": slow, "start": start, "end": end, "U0": float(np.abs(V)), "P0": float(power.real),
-            "Q0": float(power.imag), "f0": frequency, "noise_U": float(noise_U),
+            "record": slow,
+            "start": start,
+            "end": end,
+            "U0": float(np.abs(V)),
+            "P0": float(power.real),
+            "Q0": float(power.imag),
+            "f0": frequency,
+            "noise_U": float(noise_U),
             "steady": steady,
         },
-        phasors=event, v=v / turn, v_zero=v_zero, turn=turn, currents=currents, lead=lead,
-        omega_s0=2 * np.pi * (frequency - nominal), random=tuple(map(float, levels)), unexplained=calm,
-        offsets=periodic.offsets * _scale(record, K), phases=K,
+        phasors=event,
+        v=v / turn,
+        v_zero=v_zero,
+        turn=turn,
+        currents=currents,
+        lead=lead,
+        omega_s0=2 * np.pi * (frequency - nominal),
+        random=tuple(map(float, levels)),
+        unexplained=calm,
+        offsets=periodic.offsets * _scale(record, K),
+        phases=K,
         weights=noise_filter.weights,
-    )  # fmt: skip
+    )
 
 
 def describe_smearing(duration: float, U2: float, frequency: float) -> str:
-    """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; "" where no harm."""
+    """What phasors make of a dip of this duration [s] and share of U2, as the end of a sentence; ""
+    where no harm.
+    """
     if duration * frequency < LONGEST_SHORT_DIP:
-        return f"lasts {1000 * duration:.0f} ms, less than {LONGEST_SHORT_DIP:g} cycles, which phasors smear"
+        return (
+            f"lasts {1000 * duration:.0f} ms, less than {LONGEST_SHORT_DIP:g} cycles, which phasors"
+            " smear"
+        )
     if U2 > LEAST_UNBALANCE:
         return f"is unbalanced, U2 {U2:.0%} of U, which phasors leave out"
     return ""
@@ -228,12 +287,14 @@ def _waves(event: Event) -> Waves:
     record, waves = event.record, event.record.waves
     if waves is None:
         raise UserError(
-            f"{record.where} has no waveforms: domain=waves needs the samples of voltages and currents, as a COMTRADE"
+            f"{record.where} has no waveforms: domain=waves needs the samples of voltages and"
+            " currents, as a COMTRADE"
             " file or a table of waveforms has them; take domain=phasors"
         )
     if waves.rate < COARSEST * record.base.frequency:
         raise UserError(
-            f"{record.where}: {waves.rate:g} samples per second are {waves.rate / record.base.frequency:.3g} per cycle,"
+            f"{record.where}: {waves.rate:g} samples per second are"
+            f" {waves.rate / record.base.frequency:.3g} per cycle,"
             f" and domain=waves needs {COARSEST}; take domain=phasors"
         )
     cycle = 1.5 / record.base.frequency
@@ -254,7 +315,12 @@ def _per_unit(waves: Waves, record: Record) -> np.ndarray:
     if waves.late is None:
         return x
     at = np.arange(x.shape[1])
-    return np.stack([np.interp(at + late * waves.rate, at, row) for row, late in zip(x, waves.late, strict=True)])
+    return np.stack(
+        [
+            np.interp(at + late * waves.rate, at, row)
+            for row, late in zip(x, waves.late, strict=True)
+        ]
+    )
 
 
 def _positive(phasors: np.ndarray) -> complex:
@@ -263,16 +329,23 @@ def _positive(phasors: np.ndarray) -> complex:
 
 
 def _frequency(t: np.ndarray, v: np.ndarray, rate: float, guess: float) -> float:
-    """Frequency [Hz] of voltages (K, n), from how their fundamental turns from the first half to the second."""
+    """Frequency [Hz] of voltages (K, n), from how their fundamental turns from the first half to
+    the second.
+    """
     frequency = guess
     for _ in range(2):
         whole = max(1, int((t[-1] - t[0]) * frequency / 2)) / frequency  # s: cycles of a half
         n = round(whole * rate)
-        halves = (Periodic.of(t[part], v[:, part], frequency, rate) for part in (slice(0, n), slice(-n, None)))
+        halves = (
+            Periodic.of(t[part], v[:, part], frequency, rate)
+            for part in (slice(0, n), slice(-n, None))
+        )
         first, last = halves
         angle = np.angle(_positive(last.fundamentals) / _positive(first.fundamentals))
         between = last.origin - first.origin
-        frequency += float(np.angle(np.exp(1j * (angle - 2 * np.pi * frequency * between)))) / (2 * np.pi * between)
+        frequency += float(np.angle(np.exp(1j * (angle - 2 * np.pi * frequency * between)))) / (
+            2 * np.pi * between
+        )
     return frequency
 
 
@@ -289,7 +362,8 @@ def _onset(t: np.ndarray, v: np.ndarray, periodic: Periodic, K: int, before: np.
 def half_cycle(
     v: np.ndarray, i: np.ndarray, turn: np.ndarray, rate: float, frequency: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """|V1|, P + jQ and |V2| (N,) of vectors (N,) in the frame, as the mean over the last half cycle shows them.
+    """|V1|, P + jQ and |V2| (N,) of vectors (N,) in the frame, as the mean over the last half
+    cycle shows them.
 
     In half a cycle the other sequence turns whole.
     """
@@ -304,7 +378,9 @@ def half_cycle(
 
 
 def _choose_compared_components(after: np.ndarray, before: np.ndarray, phases: int) -> np.ndarray:
-    """Which of alpha, beta and zero (3, n) are compared: of one phase the first, of three zero if the dip shows it."""
+    """Which of alpha, beta and zero (3, n) are compared: of one phase the first, of three zero if
+    the dip shows it.
+    """
     if phases == 1:
         return np.array([True, False, False])
     size, vector, calm = _rms(after[2]), _rms(after[:2]), _rms(before[2])

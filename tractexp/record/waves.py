@@ -1,4 +1,6 @@
-"""Sampled waveforms of one load, as a fault recorder took them, from which a record's phasors were measured."""
+"""Sampled waveforms of one load, as a fault recorder took them, from which a record's phasors were
+measured.
+"""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -9,11 +11,13 @@ import numpy as np
 
 @dataclass(frozen=True, eq=False)
 class Waves:
-    """Voltages [kV, phase to ground; of a single-phase load its own] and as many currents [kA], into the load.
+    """Voltages [kV, phase to ground; of a single-phase load its own] and as many currents [kA],
+    into the load.
 
-    `samples` (2 K, M), K three or one, begins at `start` [s] of the record's time; an array, or what is read when it is
-    sliced like one. `late` (2 K,) [s] is how much later than stamped each channel is sampled. `estimator` names what
-    phasors were measured by, so that those of calculated waveforms compare with them.
+    `samples` (2 K, M), K three or one, begins at `start` [s] of the record's time; an array, or
+    what is read when it is sliced like one. `late` (2 K,) [s] is how much later than stamped each
+    channel is sampled. `estimator` names what phasors were measured by, so that those of calculated
+    waveforms compare with them.
     """
 
     samples: Any
@@ -36,7 +40,9 @@ class Waves:
         """The samples from time `first` to `last` [s], as an array."""
         a = max(0, int(np.ceil((first - self.start) * self.rate - 1e-6)))
         b = min(self.samples.shape[1], int(np.floor((last - self.start) * self.rate + 1e-6)) + 1)
-        return replace(self, samples=np.asarray(self.samples[:, a:b]), start=self.start + a / self.rate)
+        return replace(
+            self, samples=np.asarray(self.samples[:, a:b]), start=self.start + a / self.rate
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As plain data."""

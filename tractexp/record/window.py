@@ -1,8 +1,10 @@
-"""A recorder's window: what phasors are averages over, how a load's power looks through it, and the voltage behind it.
+"""A recorder's window: what phasors are averages over, how a load's power looks through it, and the
+voltage behind it.
 
-With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current is linear in the
-voltage would not show it; any other does wherever the voltage bends. u is computed back from U near the edges of the
-dip, where it is free to bend; the current a model draws at u is then averaged as the recorder does.
+With a window h, U = h * u and I = h * i are recorded, and P + jQ = U conj(I). A load whose current
+is linear in the voltage would not show it; any other does wherever the voltage bends. u is computed
+back from U near the edges of the dip, where it is free to bend; the current a model draws at u is
+then averaged as the recorder does.
 
 Source: IEC/IEEE 60255-118-1. Departures: the angle of the voltage is taken as steady over a window.
 """
@@ -25,7 +27,9 @@ ERROR = 2e-4  # pu: how exactly the average voltage must be the recorded one, if
 
 @dataclass(frozen=True, eq=False)
 class Window:
-    """A linear average: each phasor is the sum of weights times what was there at times about its stamp."""
+    """A linear average: each phasor is the sum of weights times what was there at times about its
+    stamp.
+    """
 
     name: str  # of the estimator
     at: np.ndarray  # (W,) s, about the time stamp, increasing
@@ -51,9 +55,16 @@ class Window:
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> "Window":
-        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or `OverflowError`."""
+        """What `to_dict` told; of anything else a `ValueError`, `TypeError`, `KeyError` or
+        `OverflowError`.
+        """
         at, weights = (np.array(content[key], dtype=float) for key in ("at", "weights"))
-        if at.ndim != 1 or at.shape != weights.shape or len(at) < 2 or not np.isfinite(weights).all():
+        if (
+            at.ndim != 1
+            or at.shape != weights.shape
+            or len(at) < 2
+            or not np.isfinite(weights).all()
+        ):
             raise ValueError("times and weights are two lists of as many numbers")
         if not (np.abs(at) <= LONGEST_WINDOW).all() or not (np.diff(at) > 0).all():
             raise ValueError("times increase")
@@ -61,7 +72,9 @@ class Window:
 
 
 def mean_weights(samples: float) -> np.ndarray:
-    """What each sample around the middle one counts in the mean over a window of so many samples, (odd,)."""
+    """What each sample around the middle one counts in the mean over a window of so many samples,
+    (odd,).
+    """
     whole, part = divmod(samples / 2, 1)
     half = np.zeros(int(whole) + 2)
     half[:-2] += 0.5
@@ -74,8 +87,9 @@ def mean_weights(samples: float) -> np.ndarray:
 def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     """Mean of y (..., N) with weights (odd,) about each sample.
 
-    Beyond its ends y goes on as over its last window, with the trend from one window to the next: a ring of whole
-    cycles, such as the offset of a stator flux, would not average out at the ends of a y that stood still there.
+    Beyond its ends y goes on as over its last window, with the trend from one window to the next: a
+    ring of whole cycles, such as the offset of a stator flux, would not average out at the ends of
+    a y that stood still there.
     """
     most, cycle = len(weights) // 2, max(round(1 / float(weights.max())), 1)
     if y.shape[-1] < 2 * cycle or most > cycle:
@@ -83,7 +97,12 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
     else:
         first, second, third, last = (
             y[..., part].mean(axis=-1, keepdims=True)
-            for part in (slice(cycle), slice(cycle, 2 * cycle), slice(-2 * cycle, -cycle), slice(-cycle, None))
+            for part in (
+                slice(cycle),
+                slice(cycle, 2 * cycle),
+                slice(-2 * cycle, -cycle),
+                slice(-cycle, None),
+            )
         )
         before = y[..., cycle - most : cycle] - (second - first)
         after = y[..., y.shape[-1] - cycle :][..., :most] + (last - third)
@@ -93,19 +112,25 @@ def average(y: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 @np.errstate(over="ignore")  # likewise
 def averaged_power(power: np.ndarray, u: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show it."""
+    """The power (..., N) that a load draws at the voltage u (N,), as phasors of these weights show
+    it.
+    """
     return average(power / u, weights) * average(u, weights)
 
 
 def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Event":
-    """The event with the voltage that the load saw, where the record's was average with weights over `window` [s].
+    """The event with the voltage that the load saw, where the record's was average with weights
+    over `window` [s].
 
     That which bends least, weighted, among those whose average is the recorded one: least squares.
     """
     from scipy.linalg import cho_solve_banded
 
     step, U = event.record.step, event.record.U
-    at, near = np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1), (window + BEND_SECONDS) / step
+    at, near = (
+        np.arange(1 - len(weights) // 2, len(U) + len(weights) // 2 - 1),
+        (window + BEND_SECONDS) / step,
+    )
     free = (np.abs(at - event.start) < near) | (np.abs(at - event.end) < near)
     error = max(ERROR, event.noise_U)
     factor = _factor(weights.tobytes(), len(U), free.tobytes(), error)
@@ -115,15 +140,20 @@ def sharpen_voltage(event: "Event", weights: np.ndarray, window: float) -> "Even
 
 @functools.lru_cache(maxsize=32)
 def _factor(weights: bytes, n: int, free: bytes, error: float) -> np.ndarray:
-    """The banded Cholesky factor of the normal equations: the same for every voltage of one event."""
+    """The banded Cholesky factor of the normal equations: the same for every voltage
+    of one event.
+    """
     from scipy.linalg import cholesky_banded
     from scipy.sparse import diags_array
 
     w, bends = np.frombuffer(weights), np.where(np.frombuffer(free, bool), BENT, CALM) ** -2.0
     wide, most = n + len(w) - 1, max(len(w) - 1, 2)
-    across: Any = list(range(len(w)))  # SciPy's type of it is inferred from its default, one diagonal
+    # SciPy's type of it is inferred from its default, one diagonal
+    across: Any = list(range(len(w)))
     second: Any = [0, 1, 2]
     box = diags_array(list(w), offsets=across, shape=(n, wide))
     bend = diags_array([1.0, -2.0, 1.0], offsets=second, shape=(wide - 2, wide))
     normal = box.T @ box / error**2 + bend.T @ diags_array(bends) @ bend
-    return cholesky_banded(np.array([np.pad(normal.diagonal(k), (k, 0)) for k in range(most, -1, -1)]))
+    return cholesky_banded(
+        np.array([np.pad(normal.diagonal(k), (k, 0)) for k in range(most, -1, -1)])
+    )

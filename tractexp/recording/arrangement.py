@@ -1,8 +1,9 @@
 """Checks of the chosen channels: phases or lines, their order, and the direction of the currents.
 
-Each check uses times at which voltage and current are alive: a dead line after a trip has no order. Labels and
-waveforms must agree. Where the order makes no sense and another one does, it is refused and the other one proposed. It
-is never changed silently, because two orders can both look plausible where the load is unusual.
+Each check uses times at which voltage and current are alive: a dead line after a trip has no order.
+Labels and waveforms must agree. Where the order makes no sense and another one does, it is refused
+and the other one proposed. It is never changed silently, because two orders can both look plausible
+where the load is unusual.
 """
 
 from collections.abc import Sequence
@@ -36,14 +37,22 @@ ZERO = 0.02  # V0 over V2 of line voltages in a fault to earth, whose sum is zer
 LEAST_FAULT_UNBALANCE = 0.05  # V2 over V1 of such a fault
 EARTH = 0.1  # I0 over I1 of such a fault
 ROOT3 = 0.02  # line over phase voltages may be so far from sqrt 3, and 3 degrees from 30
-ANSWERS = (-110.0, 30.0)  # degrees of I2 / V2 of a passive load: inductive, at most a little capacitive
+# degrees of I2 / V2 of a passive load: inductive, at most a little capacitive
+ANSWERS = (-110.0, 30.0)
 ADDED = 0.02  # V2 over V1 that must be added before the answer in I2 counts
-FAULT = 2.5  # times the current before: more feeds a fault behind the current transformer, and says nothing of a load
-TURNED = "has the opposite polarity of the other two; mend its sign in the file (in a .cfg, that of its factor)"
+# times the current before: more feeds a fault behind the current transformer, and says nothing of a
+# load
+FAULT = 2.5
+TURNED = (
+    "has the opposite polarity of the other two; mend its sign in the file (in a .cfg, that of its"
+    " factor)"
+)
 
 
 # {recording: its voltages to ground and their levels}, which are compared with those of each load
-_known_levels: WeakKeyDictionary[Recording, list[tuple[tuple[int, ...], float]]] = WeakKeyDictionary()
+_known_levels: WeakKeyDictionary[Recording, list[tuple[tuple[int, ...], float]]] = (
+    WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,27 +68,38 @@ class _LivePhasors:
 class _OtherOrder(UserError):
     """An order of channels that makes no sense, with another one that should."""
 
-    def __init__(self, why: str, remedy: str, voltages: Sequence[int], currents: Sequence[int]) -> None:
+    def __init__(
+        self, why: str, remedy: str, voltages: Sequence[int], currents: Sequence[int]
+    ) -> None:
         super().__init__(f"{why}{remedy}")
         self.why, self.voltages, self.currents = why, tuple(voltages), tuple(currents)
 
 
 def tune_frequency(recording: Recording, numbers: Sequence[int]) -> Recording:
-    """The recording with the nominal frequency that its voltages `numbers` really have, and a note where it differs."""
+    """The recording with the nominal frequency that its voltages `numbers` really have, and a note
+    where it differs.
+    """
     f = frequency(recording, numbers)
-    if f is None or (nominal := nearest_nominal(f)) is None or abs(nominal / recording.frequency - 1) < OTHER_FREQUENCY:
+    if (
+        f is None
+        or (nominal := nearest_nominal(f)) is None
+        or abs(nominal / recording.frequency - 1) < OTHER_FREQUENCY
+    ):
         return recording
     note = (
-        f"the file declares {recording.frequency:g} Hz, but the voltage has {f:.5g} Hz while it is alive: "
+        f"the file declares {recording.frequency:g} Hz, but the voltage has {f:.5g} Hz while it is"
+        " alive: "
         f"{nominal:.3g} Hz is taken for nominal"
     )
     return replace(recording, frequency=nominal, notes=(*recording.notes, note))
 
 
 def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
-    """The feeder unchanged, or with line voltages taken as such, and a sentence for each observation in `why`.
+    """The feeder unchanged, or with line voltages taken as such, and a sentence for each
+    observation in `why`.
 
-    Raises `UserError` where the order makes no sense: with another one, its P and Q, where that one is accepted.
+    Raises `UserError` where the order makes no sense: with another one, its P and Q, where that one
+    is accepted.
     """
     try:
         return _arrange_order(recording, feeder)
@@ -90,7 +110,8 @@ def arrange_feeder(recording: Recording, feeder: Feeder) -> Feeder:
         _arrange_order(recording, advised)
     except UserError:
         raise UserError(
-            f"{refused.why}; no other order of these channels makes sense either: they are not those of one load, or "
+            f"{refused.why}; no other order of these channels makes sense either: they are not"
+            " those of one load, or "
             "one is connected wrongly; 'tractexp look' shows what the file holds"
         ) from refused
     raise refused
@@ -104,7 +125,10 @@ def _arrange_order(recording: Recording, feeder: Feeder) -> Feeder:
     live = _live_phasors(recording, feeder)
     if live is None:
         _labels(recording, feeder, None)
-        return replace(feeder, why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"))
+        return replace(
+            feeder,
+            why=(*feeder.why, "the order of the channels cannot be checked: nothing is alive"),
+        )
     if len(live.V) < 3:
         return _note_direction(feeder, live)
     _lines(recording, feeder)
@@ -127,19 +151,28 @@ def _residuals(recording: Recording, feeder: Feeder) -> None:
             rest = [i for i in numbers if i not in odd]
             where = setting(f"data.{key}")
             raise UserError(
-                f"{where}={[*numbers]}: {_name_channel(recording, odd[0])} is the residual of all phases, and no phase; "
-                f"give the phases, or with two line voltages or two current transformers those alone: {where}={rest}"
+                f"{where}={[*numbers]}: {_name_channel(recording, odd[0])} is the residual of all"
+                " phases, and no phase; "
+                "give the phases, or with two line voltages or two current transformers those"
+                f" alone: {where}={rest}"
             )
 
 
 def _lines_by_label(recording: Recording, feeder: Feeder) -> Feeder:
     """Voltages that their labels call line to line, put in the order AB, BC, CA."""
-    labels = order([recording.channels[i] for i in feeder.voltages]) if len(feeder.voltages) == 3 else None
+    labels = (
+        order([recording.channels[i] for i in feeder.voltages])
+        if len(feeder.voltages) == 3
+        else None
+    )
     if not _to_ground(feeder) or labels is None or not labels[1]:
         return feeder
     voltages = tuple(feeder.voltages[labels[0].index(k)] for k in range(3))
     names = ", ".join(f"'{recording.channels[i].name}'" for i in voltages)
-    why = f"the voltages {names} are line to line, as their labels say: data.connection={_between(feeder)} is used"
+    why = (
+        f"the voltages {names} are line to line, as their labels say:"
+        f" data.connection={_between(feeder)} is used"
+    )
     if backward([recording.channels[i] for i in voltages]):
         why += ", U21 as V1 - V2 (where it is V2 - V1, the power is the opposite)"
     return replace(feeder, voltages=voltages, connection=_between(feeder), why=(*feeder.why, why))
@@ -161,10 +194,14 @@ def _lines(recording: Recording, feeder: Feeder) -> None:
     labels = order([recording.channels[i] for i in feeder.voltages])
     if not connection.lines or labels is None or labels[1]:
         return
-    names = ", ".join(f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]" for i in feeder.voltages)
+    names = ", ".join(
+        f"{i} '{recording.channels[i].name}' [{recording.channels[i].unit}]"
+        for i in feeder.voltages
+    )
     raise UserError(
         f"{DATA.voltages}={[*feeder.voltages]}: {names} are labelled as phases to ground, and "
-        f"{DATA.connection}={connection.name} takes line-to-line voltages; give three channels to ground, or lines"
+        f"{DATA.connection}={connection.name} takes line-to-line voltages; give three channels to"
+        " ground, or lines"
     )
 
 
@@ -191,7 +228,8 @@ def _live_phasors(recording: Recording, feeder: Feeder) -> _LivePhasors | None:
         even = alive
     calm = np.zeros(len(size), bool)
     calm[even] = at_level(size[even], LARGEST_CALM_VOLTAGE_SHARE)
-    alive &= load > LOADED * np.median(load[calm])  # not of all: a fault may last longer than the calm
+    # not of all: a fault may last longer than the calm
+    alive &= load > LOADED * np.median(load[calm])
     if not (alive & calm).any():
         return None
     turns = any(windows.pure(i) for i in feeder.currents)
@@ -203,36 +241,57 @@ def _zero(x: np.ndarray) -> np.ndarray:
 
 
 def _lines_by_shape(recording: Recording, feeder: Feeder, live: _LivePhasors) -> str:
-    """Why three voltages must be line to line though no label says so; "" where nothing shows it."""
+    """Why three voltages must be line to line though no label says so; "" where
+    nothing shows it.
+    """
     used = f"they are line to line, and data.connection={_between(feeder)} is used"
     V1, V2 = (np.abs(x) for x in sequences(live.V))
     I0, I1 = _zero(live.I), np.median(np.abs(sequences(live.I)[0])[live.calm])
-    fault = (V2 > LEAST_FAULT_UNBALANCE * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
+    fault = (
+        (V2 > LEAST_FAULT_UNBALANCE * V1) & (I0 > EARTH * I1) & (5 * np.median(I0[live.calm]) < I0)
+    )
     if np.count_nonzero(fault) >= 2 and (_zero(live.V)[fault] < ZERO * V2[fault]).all():
-        return f"the voltages add up to zero even in a fault to earth, where the currents do not: {used}"
+        return (
+            "the voltages add up to zero even in a fault to earth, where the currents do not:"
+            f" {used}"
+        )
     size = _level(recording, feeder.voltages)
     for numbers, other in _levels(recording):
         alike = abs(size / max(other, 1e-12) / np.sqrt(3) - 1) < 5 * ROOT3
-        if alike and not {*numbers} & {*feeder.voltages} and _root3(recording, feeder.voltages, numbers):
+        if (
+            alike
+            and not {*numbers} & {*feeder.voltages}
+            and _root3(recording, feeder.voltages, numbers)
+        ):
             others = ", ".join(_name_channel(recording, i) for i in numbers)
-            return f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
+            return (
+                f"the voltages are sqrt 3 times, and 30 degrees ahead of, those of {others}: {used}"
+            )
     level = float(np.median(V1[live.calm]))
-    if is_between_phases(level) and not any(is_to_ground(recording.channels[i]) for i in feeder.voltages):
+    if is_between_phases(level) and not any(
+        is_to_ground(recording.channels[i]) for i in feeder.voltages
+    ):
         return f"{level:.4g} kV is near a nominal voltage, and times sqrt 3 near none: {used}"
     return ""
 
 
 def _levels(recording: Recording) -> list[tuple[tuple[int, ...], float]]:
-    """The voltages to ground of a recording, three by three, with their median positive sequence."""
+    """The voltages to ground of a recording, three by three, with their median
+    positive sequence.
+    """
     if recording not in _known_levels:
         volts = {i: c for i, c in enumerate(recording.channels) if kind(c) == "voltage"}
-        three = [group.numbers for group in groups(volts) if len(group.numbers) == 3 and not group.pairs]
+        three = [
+            group.numbers for group in groups(volts) if len(group.numbers) == 3 and not group.pairs
+        ]
         _known_levels[recording] = [(numbers, _level(recording, numbers)) for numbers in three]
     return _known_levels[recording]
 
 
 def _level(recording: Recording, numbers: Sequence[int]) -> float:
-    """Median positive sequence of three voltages while they are alive; 0 where they have no waveform."""
+    """Median positive sequence of three voltages while they are alive; 0 where they have no
+    waveform.
+    """
     windows = snapshots(recording, numbers)
     if windows is None:
         return 0.0
@@ -249,7 +308,9 @@ def _root3(recording: Recording, ours: Sequence[int], theirs: Sequence[int]) -> 
     large = np.nan_to_num(np.abs(y)) > LEAST_LIVE_SEQUENCE * np.nanmax(np.abs(y), initial=0)
     if not large.any():
         return False
-    ratio = np.median(np.abs(x[large] / y[large])) * np.exp(1j * np.median(np.angle(x[large] / y[large])))
+    ratio = np.median(np.abs(x[large] / y[large])) * np.exp(
+        1j * np.median(np.angle(x[large] / y[large]))
+    )
     return abs(np.abs(ratio) / np.sqrt(3) - 1) < ROOT3 and abs(np.degrees(np.angle(ratio)) - 30) < 3
 
 
@@ -259,32 +320,50 @@ def _voltages(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
     if UNEVEN * V1 < V2 <= V1:
         names = ", ".join(_name_channel(recording, i) for i in feeder.voltages)
         raise UserError(
-            f"{DATA.voltages}={[*feeder.voltages]}: in the calm, the negative sequence is {100 * V2 / V1:.0f} % of the "
-            f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the file holds"
+            f"{DATA.voltages}={[*feeder.voltages]}: in the calm, the negative sequence is"
+            f" {100 * V2 / V1:.0f} % of the "
+            f"positive one: {names} are not the voltages of one bus; 'tractexp look' shows what the"
+            " file holds"
         )
     if V2 <= V1:
         return
     if _to_ground(feeder) and (k := _find_reversed_phase(live.V[:, live.calm])) is not None:
-        raise UserError(f"{DATA.voltages}={[*feeder.voltages]}: {_name_channel(recording, feeder.voltages[k])} {TURNED}")
+        raise UserError(
+            f"{DATA.voltages}={[*feeder.voltages]}: {_name_channel(recording, feeder.voltages[k])}"
+            f" {TURNED}"
+        )
     voltages, currents = _propose_other_order(feeder)
     raise _OtherOrder(
-        f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while alive, the negative "
+        f"{DATA.voltages}={[*feeder.voltages]}: the phases are not in the order a, b, c: while"
+        " alive, the negative "
         f"sequence is {V2 / max(V1, 1e-12):.3g} times the positive one",
-        f"; give {_describe_arrangement(voltages, currents)}", voltages, currents,
-    )  # fmt: skip
+        f"; give {_describe_arrangement(voltages, currents)}",
+        voltages,
+        currents,
+    )
 
 
 def _propose_other_order(feeder: Feeder) -> tuple[list[int], Sequence[int]]:
-    """(voltages, currents) in the other order of phases, in ascending numbers where that is possible."""
+    """(voltages, currents) in the other order of phases, in ascending numbers where that is
+    possible.
+    """
     n = len(feeder.voltages)
-    turns = [(0, 2, 1), (2, 1, 0), (1, 0, 2)] if n == 3 == len(feeder.currents) else [(*range(n)[::-1],)]
+    turns = (
+        [(0, 2, 1), (2, 1, 0), (1, 0, 2)]
+        if n == 3 == len(feeder.currents)
+        else [(*range(n)[::-1],)]
+    )
     best = min(turns, key=lambda p: [feeder.voltages[k] for k in p])
-    currents = [feeder.currents[k] for k in best] if len(feeder.currents) == n else feeder.currents[::-1]
+    currents = (
+        [feeder.currents[k] for k in best] if len(feeder.currents) == n else feeder.currents[::-1]
+    )
     return [feeder.voltages[k] for k in best], currents
 
 
 def _find_reversed_phase(X: np.ndarray) -> int | None:
-    """The one of three phasors that must be turned round for them to be balanced; None where that does not help."""
+    """The one of three phasors that must be turned round for them to be balanced; None where that
+    does not help.
+    """
     for k in range(3):
         tried = X.copy()
         tried[k] *= -1
@@ -296,7 +375,11 @@ def _find_reversed_phase(X: np.ndarray) -> int | None:
 
 def _describe_arrangement(voltages: Sequence[int] | None, currents: Sequence[int]) -> str:
     currents_text = f"{DATA.currents}=[{', '.join(map(str, currents))}]"
-    return currents_text if voltages is None else f"{DATA.voltages}=[{', '.join(map(str, voltages))}] {currents_text}"
+    return (
+        currents_text
+        if voltages is None
+        else f"{DATA.voltages}=[{', '.join(map(str, voltages))}] {currents_text}"
+    )
 
 
 def _name_channel(recording: Recording, number: int) -> str:
@@ -304,30 +387,44 @@ def _name_channel(recording: Recording, number: int) -> str:
 
 
 def _labels(recording: Recording, feeder: Feeder, live: _LivePhasors | None) -> str:
-    """Refuse currents that are labelled in another order than the voltages; what is said where the waves contradict."""
+    """Refuse currents that are labelled in another order than the voltages; what is said where the
+    waves contradict.
+    """
     channels = recording.channels
-    volts, amps = (order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents))
+    volts, amps = (
+        order([channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)
+    )
     if volts is None or amps is None or volts[1] or amps[1] or volts[0] == amps[0]:
         return ""
     (v, _), (c, _) = volts, amps
     if len(v) < 3 or len(c) < 3:
         return ""
     labelled = tuple(feeder.currents[c.index(k)] for k in v)
-    said = f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)}, says "
+    said = (
+        f"{DATA.currents} are the phases {_letters(c)} where {DATA.voltages} are {_letters(v)},"
+        " says "
+    )
     both = ""
     if live is not None:
         present, other = (0, 1, 2), tuple(feeder.currents.index(i) for i in labelled)
         if _is_balanced(live, present) and not _is_balanced(live, other):
             return f"{said}the file; the waves say that they are in the same order, which is taken"
-        both = f", which gives {_mw(_power(live, other))} where the present order has {_mw(_power(live, present))}"
+        both = (
+            f", which gives {_mw(_power(live, other))} where the present order has"
+            f" {_mw(_power(live, present))}"
+        )
     raise _OtherOrder(
-        f"{said}{recording.source}", f"; give both in the same order: {_describe_arrangement(None, labelled)}{both}",
-        feeder.voltages, labelled,
-    )  # fmt: skip
+        f"{said}{recording.source}",
+        f"; give both in the same order: {_describe_arrangement(None, labelled)}{both}",
+        feeder.voltages,
+        labelled,
+    )
 
 
 def _is_balanced(live: _LivePhasors, permutation: tuple[int, ...]) -> bool:
-    """Whether currents in an order have a positive sequence, and an angle that a load has or power fed back."""
+    """Whether currents in an order have a positive sequence, and an angle that a load has or power
+    fed back.
+    """
     first, second = (np.median(np.abs(x)[live.calm]) for x in sequences(live.I[[*permutation]]))
     angle = abs(_angle(_power(live, permutation)))
     return bool(second < LARGEST_SENSIBLE_UNBALANCE * first) and not SENSIBLE < angle < BACKWARD
@@ -354,28 +451,48 @@ def _mw(S: complex) -> str:
 
 
 def _currents(recording: Recording, feeder: Feeder, live: _LivePhasors) -> None:
-    """Refuse an order of the currents that is impossible, or that makes no sense where another does."""
+    """Refuse an order of the currents that is impossible, or that makes no sense where another
+    does.
+    """
     I1, I2 = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I))
     S = _power(live, (0, 1, 2))
     if I2 > I1:
         _negative(recording, feeder, live, S, I2 / max(I1, 1e-12))
         return
-    labelled = [order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)]
+    labelled = [
+        order([recording.channels[i] for i in each]) for each in (feeder.voltages, feeder.currents)
+    ]
     confirmed = None not in labelled
-    middle = SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > LARGEST_REACTIVE_ANGLE
+    middle = (
+        SENSIBLE < abs(_angle(S)) < BACKWARD and abs(abs(_angle(S)) - 90) > LARGEST_REACTIVE_ANGLE
+    )
     if confirmed or not middle or I2 > LARGEST_SENSIBLE_UNBALANCE * I1:
         return
-    better = [p for p in ((1, 2, 0), (2, 0, 1)) if abs(_angle(_power(live, p))) <= SENSIBLE and _answers(live, p) >= 0]
+    better = [
+        p
+        for p in ((1, 2, 0), (2, 0, 1))
+        if abs(_angle(_power(live, p))) <= SENSIBLE and _answers(live, p) >= 0
+    ]
     if len(better) == 1:
         _refuse(
-            feeder, live, better[0], f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages"
+            feeder,
+            live,
+            better[0],
+            f"P and Q make no sense ({_mw(S)}): the currents are rotated against the voltages",
         )
 
 
-def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: complex, ratio: float) -> None:
-    """Refuse currents of the opposite sequence where another order, or one turned round, is balanced."""
+def _negative(
+    recording: Recording, feeder: Feeder, live: _LivePhasors, S: complex, ratio: float
+) -> None:
+    """Refuse currents of the opposite sequence where another order, or one turned round, is
+    balanced.
+    """
     if (k := _find_reversed_phase(live.I[:, live.calm])) is not None:
-        raise UserError(f"{DATA.currents}={[*feeder.currents]}: {_name_channel(recording, feeder.currents[k])} {TURNED}")
+        raise UserError(
+            f"{DATA.currents}={[*feeder.currents]}: {_name_channel(recording, feeder.currents[k])}"
+            f" {TURNED}"
+        )
     tried = []
     for p in permutations(range(3)):
         first, second = (float(np.median(np.abs(x)[live.calm])) for x in sequences(live.I[[*p]]))
@@ -383,7 +500,10 @@ def _negative(recording: Recording, feeder: Feeder, live: _LivePhasors, S: compl
             tried.append(p)
     if tried:
         best = min(tried, key=lambda p: abs(_angle(_power(live, p))))
-        why = f"the currents' negative sequence is {ratio:.3g} times the positive one ({_mw(S)}): two are swapped"
+        why = (
+            f"the currents' negative sequence is {ratio:.3g} times the positive one ({_mw(S)}): two"
+            " are swapped"
+        )
         _refuse(feeder, live, best, why)
 
 
@@ -391,12 +511,16 @@ def _refuse(feeder: Feeder, live: _LivePhasors, permutation: tuple[int, ...], wh
     proposal = tuple(feeder.currents[k] for k in permutation)
     raise _OtherOrder(
         f"{DATA.currents}={[*feeder.currents]}: {why}",
-        f"; {_describe_arrangement(None, proposal)} gives {_mw(_power(live, permutation))}", feeder.voltages, proposal,
-    )  # fmt: skip
+        f"; {_describe_arrangement(None, proposal)} gives {_mw(_power(live, permutation))}",
+        feeder.voltages,
+        proposal,
+    )
 
 
 def _answers(live: _LivePhasors, permutation: tuple[int, ...] = (0, 1, 2)) -> int:
-    """1 where the added I2 is what a passive load draws from the added V2, -1 where it is turned round, else 0."""
+    """1 where the added I2 is what a passive load draws from the added V2, -1 where it is turned
+    round, else 0.
+    """
     V2, I2 = sequences(live.V)[1], sequences(live.I[[*permutation]])[1]
     V1 = np.abs(sequences(live.V)[0])
     V2, I2 = V2 * _still(live), I2 * _still(live)

@@ -1,4 +1,6 @@
-"""The interface of connection plugins: the voltages and currents of a load from recorded channels."""
+"""The interface of connection plugins: the voltages and currents of a load from
+recorded channels.
+"""
 
 from abc import abstractmethod
 from collections.abc import Mapping
@@ -9,8 +11,10 @@ import numpy as np
 from tractexp.plugin import Plugin, discover
 
 SINGLE = (
-    "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and converters' effects "
-    "apply as they stand, but the models' motors are three-phase on balanced voltages: here they are equivalents, "
+    "a single-phase load: U is its own voltage, P + jQ = V I* of the fundamental; static loads and"
+    " converters' effects "
+    "apply as they stand, but the models' motors are three-phase on balanced voltages: here they"
+    " are equivalents, "
     "whose parameters are those of no machine"
 )
 
@@ -24,12 +28,15 @@ class Connection(Plugin):
     group: ClassVar[str] = "connection"
     chosen: ClassVar[bool] = False
     lines: ClassVar[bool] = False  # its voltages are measured between phases
-    # {(voltages, currents, between phases): settings}: it is taken for so many channels where nothing else is said
+    # {(voltages, currents, between phases): settings}: it is taken for so many channels where
+    # nothing else is said
     usual: ClassVar[Mapping[tuple[int, int, bool], Mapping[str, Any]]] = {}
 
     @abstractmethod
     def voltage(self) -> np.ndarray:
-        """(K, voltages): the load's phase voltages from those recorded; K is 3, or 1 for a single-phase load."""
+        """(K, voltages): the load's phase voltages from those recorded; K is 3, or 1 for a
+        single-phase load.
+        """
 
     @abstractmethod
     def current(self) -> np.ndarray:
@@ -52,7 +59,9 @@ class Connection(Plugin):
 
 
 def usual(voltages: int, currents: int, lines: bool = False) -> Any:
-    """The default connection of so many channels, voltages between phases or to ground; None where there is none."""
+    """The default connection of so many channels, voltages between phases or to ground; None where
+    there is none.
+    """
     for name, cls in sorted(discover()[Connection.group].items()):
         settings = getattr(cls, "usual", {}).get((voltages, currents, lines))
         if settings is not None:

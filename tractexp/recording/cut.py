@@ -11,7 +11,8 @@ from tractexp.recording.recording import Recording, Segment
 
 
 def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
-    """The samples from `begin` to `end` [s since the first], as a recording of its own that starts at 0.
+    """The samples from `begin` to `end` [s since the first], as a recording of its own that starts
+    at 0.
 
     Raises `UserError` where nothing was recorded then.
     """
@@ -26,7 +27,9 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
             segments.append(Segment(count, count + stop - first, segment.rate, float(t[first])))
             count += stop - first
     if not segments:
-        raise UserError(f"{recording.source}: nothing was recorded between {begin:.3f} and {end:.3f} s")
+        raise UserError(
+            f"{recording.source}: nothing was recorded between {begin:.3f} and {end:.3f} s"
+        )
     origin = segments[0].start
     trigger = None if recording.trigger is None else recording.trigger - origin
     return replace(
@@ -37,10 +40,17 @@ def cut_recording(recording: Recording, begin: float, end: float) -> Recording:
         start=recording.start and recording.start + timedelta(seconds=origin),
         trigger=trigger if trigger is not None and 0 <= trigger <= end - origin else None,
         notes=[*recording.notes, f"cut from {recording.source}, {begin:.3f} to {end:.3f} s"],
-        extra={key: recording.extra[key] for key in ("format", "revision", "kind", "sides") if key in recording.extra},
+        extra={
+            key: recording.extra[key]
+            for key in ("format", "revision", "kind", "sides")
+            if key in recording.extra
+        },
     )
 
 
 def _part(channel: Any, parts: list[slice]) -> Any:
     raw = np.asarray(channel.raw)
-    return replace(channel, raw=raw[parts[0]] if len(parts) == 1 else np.concatenate([raw[part] for part in parts]))
+    return replace(
+        channel,
+        raw=raw[parts[0]] if len(parts) == 1 else np.concatenate([raw[part] for part in parts]),
+    )

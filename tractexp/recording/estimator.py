@@ -16,9 +16,9 @@ SPACING = 1e-3  # s between the weights that a record stores, as phasors are a m
 class Estimator(Plugin):
     """Base of the phasor estimators, chosen by `data.estimator=NAME`, or by name and settings.
 
-    An estimator is the window over which the least-squares sinusoid of the frequency really present is taken
-    (`tractexp.record.phasor.fundamental`), so that any is exact in steady state; they differ in what they do to
-    changes, harmonics and noise.
+    An estimator is the window over which the least-squares sinusoid of the frequency really present
+    is taken (`tractexp.record.phasor.fundamental`), so that any is exact in steady state; they
+    differ in what they do to changes, harmonics and noise.
     """
 
     group: ClassVar[str] = "estimator"
@@ -27,11 +27,15 @@ class Estimator(Plugin):
 
     @abstractmethod
     def half(self, nominal: float) -> float:
-        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] that it does not support."""
+        """Half of the window's length [s]. Raises `UserError` for a nominal frequency [Hz] that it
+        does not support.
+        """
 
     @abstractmethod
     def weight(self, at: np.ndarray, nominal: float) -> np.ndarray:
-        """Symmetric weights (W,), of any scale, at times (W,) [s] about the center, none further away than half."""
+        """Symmetric weights (W,), of any scale, at times (W,) [s] about the center, none further
+        away than half.
+        """
 
     def averager(self, rate: float, nominal: float) -> Averager:
         """The window on samples taken at `rate` [Hz]."""
@@ -48,8 +52,14 @@ class Estimator(Plugin):
 
 
 def estimator_of(setting: Any = None) -> Estimator:
-    """The estimator of a setting: a name, a mapping of name and settings, or None for the usual one."""
-    usual = (name for name, cls in sorted(discover()[Estimator.group].items()) if getattr(cls, "usual", False))
+    """The estimator of a setting: a name, a mapping of name and settings, or None for the usual
+    one.
+    """
+    usual = (
+        name
+        for name, cls in sorted(discover()[Estimator.group].items())
+        if getattr(cls, "usual", False)
+    )
     return chosen(Estimator.group, next(usual) if setting is None else setting)
 
 

@@ -1,8 +1,10 @@
-"""Where a voltage leaves its sliding reference, and when it is back: IEC 61000-4-30, with finer thresholds.
+"""Where a voltage leaves its sliding reference, and when it is back: IEC 61000-4-30, with finer
+thresholds.
 
-The standard's 10 % would hide dips that a load answers. Here an excursion is a deviation from the reference by 3 %
-(positive sequence, which drives the models) or 5 % (any phase, as for the standard's rapid voltage changes).
-Hysteresis 2 % of the reference as in the standard, which also gives the reference's time constant, a minute.
+The standard's 10 % would hide dips that a load answers. Here an excursion is a deviation from the
+reference by 3 % (positive sequence, which drives the models) or 5 % (any phase, as for the
+standard's rapid voltage changes). Hysteresis 2 % of the reference as in the standard, which also
+gives the reference's time constant, a minute.
 """
 
 from dataclasses import dataclass
@@ -14,9 +16,11 @@ from tractexp.record.record import DEAD_VOLTAGE_SHARE
 from tractexp.recording.trace import Trace
 
 LARGEST_USUAL_DEPARTURE = 0.03  # of the reference, positive sequence
-LEAVES_PHASE = 0.05  # of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
+# of the reference, any phase (of the 1 to 6 % considered in IEC 61000-4-30:2015, 5.11)
+LEAVES_PHASE = 0.05
 HYSTERESIS = 0.02  # of the reference (IEC 61000-4-30, 5.4.2)
-DIP = 0.1  # of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
+# of the reference: what the standard calls a dip or a swell (5.4), over once it is within 8 %
+DIP = 0.1
 SLIDING = 60.0  # s, time constant of the reference (IEC 61000-4-30, 5.4.4)
 HALF_CYCLES_AT_ONCE = 1024  # half cycles that are compared with their reference at once
 FLAT = 1.0  # s that a new level must last to be one (IEC 61000-4-30, 5.11: 100 half cycles)
@@ -26,11 +30,15 @@ LONGEST_ABRUPT_CYCLES = 3.0  # cycles within which a fault or a switch changes t
 
 @dataclass(frozen=True)
 class Excursion:
-    """Samples `start` up to but not including `end` of a trace, relative to the reference before."""
+    """Samples `start` up to but not including `end` of a trace, relative to the
+    reference before.
+    """
 
     start: int
     end: int
-    worst: float  # deviation of the positive sequence (or of the phase that crossed the limit): negative for a fall
+    # deviation of the positive sequence (or of the phase that crossed the limit): negative for a
+    # fall
+    worst: float
     returned: bool  # to the reference
     new_level: bool  # at a new level
     sudden: bool  # at its start
@@ -45,17 +53,22 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     if not levels.any() or len(trace.t) < 4:
         return []
     alive = levels.max(axis=0) > DEAD_VOLTAGE_SHARE * np.percentile(levels.max(axis=0), 95)
-    levels = np.maximum(levels, DEAD_VOLTAGE_SHARE * levels.max(axis=1, keepdims=True))  # what is gone does not change
+    # what is gone does not change
+    levels = np.maximum(levels, DEAD_VOLTAGE_SHARE * levels.max(axis=1, keepdims=True))
     events: list[Excursion] = []
     k = int(np.argmax(alive))
     count = max(2, round(REFERENCE / trace.step))
     if k > 0:
         k = min(k + round(2 * trace.cycle / trace.step), len(trace.t) - 1)
-        events.append(Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True))
+        events.append(
+            Excursion(0, k, -1.0, True, False, False, max(float(trace.U.max()), 1e-12), True)
+        )
     reference = starting_level(trace.t[k:], levels[:, k:], limits, count, trigger)
     reference = np.maximum(reference, DEAD_VOLTAGE_SHARE * levels.max(axis=1))
     while k < len(trace.t):
-        inside, reference = _inside(levels[:, k : k + HALF_CYCLES_AT_ONCE], limits, reference, trace.step)
+        inside, reference = _inside(
+            levels[:, k : k + HALF_CYCLES_AT_ONCE], limits, reference, trace.step
+        )
         if inside:
             k += inside
             continue
@@ -69,18 +82,26 @@ def excursions(trace: Trace, trigger: float | None = None) -> list[Excursion]:
     return events
 
 
-def _inside(levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, step: float) -> tuple[int, np.ndarray]:
-    """How many samples of the levels (K, M) stay within the limits of the reference, which slides, and its end."""
+def _inside(
+    levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, step: float
+) -> tuple[int, np.ndarray]:
+    """How many samples of the levels (K, M) stay within the limits of the reference, which slides,
+    and its end.
+    """
     decay = np.exp(-step / SLIDING * np.arange(levels.shape[1] + 1))
     reached = np.cumsum(levels / decay[1:], axis=1) * (1 - decay[1])
-    references = decay * (reference[:, None] + np.concatenate([np.zeros((len(levels), 1)), reached], axis=1))
+    references = decay * (
+        reference[:, None] + np.concatenate([np.zeros((len(levels), 1)), reached], axis=1)
+    )
     inside = (np.abs(levels / references[:, :-1] - 1) <= limits[:, None]).all(axis=0)
     count = len(inside) if inside.all() else int(np.argmin(inside))
     return count, references[:, count]
 
 
 def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
-    """The positive sequence and each phase that is ever alive, and by how much of its reference each must leave it."""
+    """The positive sequence and each phase that is ever alive, and by how much of its reference
+    each must leave it.
+    """
     levels = np.concatenate([trace.U[None], trace.phases])
     most = np.percentile(levels, 95, axis=1)
     levels = levels[most > DEAD_VOLTAGE_SHARE * most.max()]
@@ -91,7 +112,12 @@ def _levels(trace: Trace) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _one(
-    trace: Trace, levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, k: int, earliest: int
+    trace: Trace,
+    levels: np.ndarray,
+    limits: np.ndarray,
+    reference: np.ndarray,
+    k: int,
+    earliest: int,
 ) -> Excursion:
     """The excursion to which sample k belongs."""
     off = levels[:, k:] / reference[:, None] - 1
@@ -106,12 +132,16 @@ def _one(
     back = back[back * trace.step <= LONGEST_EXCURSION]
     start = _onset(levels[row], reference[row], limits[row], k, earliest)
     flat = _flat(levels, limits, k, trace.step)
-    leaves = len(back) and (inside[back[0]] or flat is None or k + back[0] - flat < FLAT / trace.step)
+    leaves = len(back) and (
+        inside[back[0]] or flat is None or k + back[0] - flat < FLAT / trace.step
+    )
     if leaves:
         end, returned, new_level = k + int(back[0]), True, False
     else:
         stop = k + int(back[0]) if len(back) else len(trace.t)
-        end, returned, new_level = (flat, False, True) if flat is not None and flat < stop else (stop, False, False)
+        end, returned, new_level = (
+            (flat, False, True) if flat is not None and flat < stop else (stop, False, False)
+        )
     end = max(end, k + 1)
     whole = levels[:, start:end] / reference[:, None] - 1
     first = trace.U[start:end] / reference[0] - 1
@@ -120,14 +150,18 @@ def _one(
         after = trace.U[end : end + max(2, round(REFERENCE / trace.step))]
         most = float(np.median(after)) / reference[0] - 1 if len(after) else most
     within = max(2, round(LONGEST_ABRUPT_CYCLES * trace.cycle / trace.step))
-    sudden = _fastest(levels[row, max(start - 2, 0) : end + 1] / reference[row], within) > 0.5 * max(
-        np.abs(whole[row]).max(), limits[row]
+    sudden = _fastest(
+        levels[row, max(start - 2, 0) : end + 1] / reference[row], within
+    ) > 0.5 * max(np.abs(whole[row]).max(), limits[row])
+    return Excursion(
+        start, end, float(most), returned, new_level, bool(sudden), max(float(reference[0]), 1e-12)
     )
-    return Excursion(start, end, float(most), returned, new_level, bool(sudden), max(float(reference[0]), 1e-12))
 
 
 def _onset(level: np.ndarray, reference: float, limit: float, k: int, earliest: int) -> int:
-    """The sample after the last one, not before `earliest`, that was still within a tenth of the threshold."""
+    """The sample after the last one, not before `earliest`, that was still within a tenth of the
+    threshold.
+    """
     near = np.flatnonzero(np.abs(level[earliest:k] / reference - 1) <= limit / 10)
     return earliest + int(near[-1]) + 1 if len(near) else k
 
@@ -139,7 +173,9 @@ def _fastest(level: np.ndarray, within: int) -> float:
 
 
 def _flat(levels: np.ndarray, limits: np.ndarray, k: int, step: float) -> int | None:
-    """The first sample from k on after which the voltages stay level for a second, or to the end if that is nearer."""
+    """The first sample from k on after which the voltages stay level for a second, or to the end if
+    that is nearer.
+    """
     window = max(4, round(FLAT / step))
     part = levels[:, k:]
     if part.shape[1] < max(4, round(0.2 * FLAT / step)):
@@ -154,7 +190,9 @@ def _flat(levels: np.ndarray, limits: np.ndarray, k: int, step: float) -> int | 
 def _find_next_reference(
     trace: Trace, levels: np.ndarray, limits: np.ndarray, reference: np.ndarray, k: int, count: int
 ) -> tuple[int, np.ndarray]:
-    """Where to go on after a return, and the reference: a slow rest of the recovery is no excursion of its own."""
+    """Where to go on after a return, and the reference: a slow rest of the recovery is no excursion
+    of its own.
+    """
     off = levels[:, k:] / reference[:, None] - 1
     if not off.shape[1] or (np.abs(off[:, 0]) <= limits).all():
         return k, reference
@@ -168,5 +206,9 @@ def _find_next_reference(
 
 
 def _reference(levels: np.ndarray, k: int, count: int) -> np.ndarray:
-    """The level from sample k on; never zero, so that a phase that is dead there is far below what it becomes."""
-    return np.maximum(np.median(levels[:, k : k + count], axis=1), DEAD_VOLTAGE_SHARE * levels.max(axis=1))
+    """The level from sample k on; never zero, so that a phase that is dead there is far below what
+    it becomes.
+    """
+    return np.maximum(
+        np.median(levels[:, k : k + count], axis=1), DEAD_VOLTAGE_SHARE * levels.max(axis=1)
+    )

@@ -13,7 +13,15 @@ from tractexp.plugin import chosen
 from tractexp.record.phasor import TURN, sequences
 from tractexp.recording.connection import usual
 from tractexp.recording.kirchhoff import closed_sums
-from tractexp.recording.label import Group, groups, kind, other_quantity, residual, shared_name, words
+from tractexp.recording.label import (
+    Group,
+    groups,
+    kind,
+    other_quantity,
+    residual,
+    shared_name,
+    words,
+)
 from tractexp.recording.railway import (
     conductor_pairs,
     contact_first,
@@ -22,17 +30,19 @@ from tractexp.recording.railway import (
     is_return,
     opposite_pair,
     other_conductor,
-)  # fmt: skip
+)
 from tractexp.recording.recording import Recording
 from tractexp.recording.snapshot import UNLOADED, Snapshots, frequency, nearest_nominal, snapshots
 from tractexp.recording.unit import in_doubt
 
-LARGEST_PHASE_DIFFERENCE = 0.1  # three magnitudes this close, as a share of their mean, may be three phases
+# three magnitudes this close, as a share of their mean, may be three phases
+LARGEST_PHASE_DIFFERENCE = 0.1
 SYMMETRIC = 15.0  # degrees off 120 that three phasors may be
 STEPS_LOADED = 3.0  # quantisation steps that a current must exceed
 LEAST_SEQUENCE_SHARE = 0.75  # of the RMS: what three phases have of one sequence at some time
 PICK_UP = 1e-3  # of the greatest voltage: what a dead line picks up is less
-LARGEST_RESIDUAL_SHARE = 0.5  # of another bus's residual: by less the currents do not follow a bus better
+# of another bus's residual: by less the currents do not follow a bus better
+LARGEST_RESIDUAL_SHARE = 0.5
 COUPLER = re.compile(r"coupler|bus[ _-]?tie|sectionali[sz]|kuppl|母联|分段|шсв|секцион|acoplador")
 ALONE = "no current is recorded: there is no load to fit"
 HALF = "half of an autotransformer feeder"
@@ -48,7 +58,8 @@ class Feeder:
     connection: Any  # the plugin that makes phase quantities of them: a name, or name and settings
     reverse_current: bool = False  # the recorder counts current out of the load as positive
     name: str = ""
-    why: tuple[str, ...] = ()  # the evidence for it, and what was changed in the order, one sentence each
+    # the evidence for it, and what was changed in the order, one sentence each
+    why: tuple[str, ...] = ()
     loaded: bool = True
     question: str = ""  # where other voltages may as well be its own: which there are, one sentence
 
@@ -68,9 +79,11 @@ class Feeder:
 
 
 def propose(recording: Recording) -> list[Feeder]:
-    """The feeders that a recording of any number of channels shows; loaded ones first, [] where there are none.
+    """The feeders that a recording of any number of channels shows; loaded ones first, [] where
+    there are none.
 
-    By what the names share, else by magnitudes and angles; each with the voltages its name or its behaviour says.
+    By what the names share, else by magnitudes and angles; each with the voltages its name or its
+    behaviour says.
     """
     waves = {i: c for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c)}
     volts = [i for i in waves if kind(waves[i]) == "voltage"]
@@ -80,14 +93,20 @@ def propose(recording: Recording) -> list[Feeder]:
     if not volts or not amps or phasors is None or direct_voltage(recording):
         return []
     buses = _groups(recording, phasors, volts)
-    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)  # without them two currents are two feeders
+    # without them two currents are two feeders
+    three = any(len(bus.numbers) == 3 or bus.pairs for bus in buses)
     loads = [g for g in _groups(recording, phasors, amps) if len(g.numbers) == 3 or three]
     level = max(phasors.size(each) for each in (*(g.numbers for g in loads), *((i,) for i in amps)))
-    two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)  # with which two currents are enough
+    # with which two currents are enough
+    two = any(len(bus.numbers) == 2 or not bus.pairs for bus in buses)
     fitting = [load for load in loads if buses and (two or len(load.numbers) == 3)]
     options = [_feeders(recording, phasors, load, buses, level) for load in fitting]
     options += _conductors(recording, phasors, volts, amps, [*buses, *loads])
-    taken = [*buses, *loads, *(Group(f.channels["I"], False, "", False, "") for each in options for f in each)]
+    taken = [
+        *buses,
+        *loads,
+        *(Group(f.channels["I"], False, "", False, "") for each in options for f in each),
+    ]
     options += _single(recording, phasors, volts, amps, taken, level)
     feeders = _with_others(closed_sums(phasors, [each[0] for each in options]), options)
     level = max((phasors.size(f.currents) for f in feeders), default=0.0)
@@ -96,47 +115,77 @@ def propose(recording: Recording) -> list[Feeder]:
 
 
 def buses_alone(recording: Recording) -> list[Feeder]:
-    """The buses of a recording that shows no load, by their voltages; [] where none turns as a network does."""
-    volts = [i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == "voltage"]
+    """The buses of a recording that shows no load, by their voltages; [] where none turns as a
+    network does.
+    """
+    volts = [
+        i for i, c in enumerate(recording.channels) if c.form == "waveform" and kind(c) == "voltage"
+    ]
     f, strange = _frequency(recording, volts, [])
     phasors = snapshots(recording, volts, f)
     if not volts or phasors is None or strange or direct_voltage(recording):
         return []
-    grouped = [g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)]
+    grouped = [
+        g for g in _groups(recording, phasors, volts) if any(phasors.pure(i) for i in g.numbers)
+    ]
     taken = {i for g in grouped for i in g.numbers}
-    alone = [i for i in volts if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)]
+    alone = [
+        i
+        for i in volts
+        if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)
+    ]
     feeders = [_bus_alone(recording, phasors, group) for group in grouped]
     return feeders + [
-        Feeder((i,), (), usual(1, 1), name=recording.channels[i].name.strip(), why=(ALONE,), loaded=False)
+        Feeder(
+            (i,),
+            (),
+            usual(1, 1),
+            name=recording.channels[i].name.strip(),
+            why=(ALONE,),
+            loaded=False,
+        )
         for i in alone
     ]
 
 
 def _bus_alone(recording: Recording, phasors: Snapshots, group: Group) -> Feeder:
     """A bus without currents, its voltages in the order in which they turn."""
-    numbers, said = group.numbers, [f"voltages {_names(recording, group.numbers)}: {group.evidence}", ALONE]
+    numbers, said = (
+        group.numbers,
+        [f"voltages {_names(recording, group.numbers)}: {group.evidence}", ALONE],
+    )
     if len(numbers) == 3:
         first, second = (float(np.nanmedian(np.abs(x))) for x in sequences(phasors.of(numbers)))
         if second > first:
             numbers = (numbers[0], numbers[2], numbers[1])
             said.append("they turn in the order a, c, b")
     name = group.name or "the voltages"
-    return Feeder(numbers, (), usual(len(numbers), 3, group.pairs), name=name, why=tuple(said), loaded=False)
+    return Feeder(
+        numbers, (), usual(len(numbers), 3, group.pairs), name=name, why=tuple(said), loaded=False
+    )
 
 
 def can_be_named(recording: Recording) -> bool:
-    """Whether settings that name voltages and currents can help: there are waves that may be one and the other."""
+    """Whether settings that name voltages and currents can help: there are waves that may be one
+    and the other.
+    """
     if direct_voltage(recording):
         return False
     try:
         recording.waveforms()
     except UserError:
         return False
-    numbers = [i for i, c in enumerate(recording.channels) if c.form == "waveform" and not other_quantity(c)]
+    numbers = [
+        i
+        for i, c in enumerate(recording.channels)
+        if c.form == "waveform" and not other_quantity(c)
+    ]
     f = frequency(recording, numbers)
     phasors = snapshots(recording, numbers, f) if f and nearest_nominal(f) else None
     waves = [recording.channels[i] for i in numbers if phasors is not None and phasors.pure(i)]
-    volts, amps = (sum(c.quantity in (quantity, "") for c in waves) for quantity in ("voltage", "current"))
+    volts, amps = (
+        sum(c.quantity in (quantity, "") for c in waves) for quantity in ("voltage", "current")
+    )
     return volts > 0 and amps > 0 and len(waves) > 1
 
 
@@ -150,11 +199,16 @@ def explain_unrecognized(recording: Recording) -> str:
     except UserError as error:
         return direct_voltage(recording) or str(error).removeprefix(f"{recording.source}: ")
     if 2 / recording.frequency >= seconds:
-        return f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of {recording.frequency:g} Hz"
+        return (
+            f"it lasts {seconds:.3g} s at {longest.rate:g} Hz, less than two cycles of"
+            f" {recording.frequency:g} Hz"
+        )
     for wanted in ("voltage", "current"):
         if wanted not in kinds:
             units = ", ".join(sorted({f"'{c.unit.strip()}'" for c in recording.channels}))
-            return f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
+            return (
+                f"no channel is a {wanted} by its unit, of which there are {units}, or by its name"
+            )
     if direct := direct_voltage(recording):
         return direct
     volts = [i for i, c in enumerate(recording.channels) if kind(c) == "voltage"]
@@ -172,29 +226,45 @@ def _with_others(feeders: Sequence[Feeder], options: Sequence[Sequence[Feeder]])
     result = []
     for feeder, (first, *others) in zip(feeders, options, strict=True):
         said, reverse = feeder.why[len(first.why) :], feeder.reverse_current
-        result += [feeder, *(replace(f, reverse_current=reverse, why=(*f.why, *said)) for f in others)]
+        result += [
+            feeder,
+            *(replace(f, reverse_current=reverse, why=(*f.why, *said)) for f in others),
+        ]
     return result
 
 
-def _frequency(recording: Recording, volts: Sequence[int], amps: Sequence[int]) -> tuple[float, str]:
-    """(Hz to look at the channels with, what is said of voltages that have no network's frequency)."""
+def _frequency(
+    recording: Recording, volts: Sequence[int], amps: Sequence[int]
+) -> tuple[float, str]:
+    """(Hz to look at the channels with, what is said of voltages that have no
+    network's frequency).
+    """
     f = frequency(recording, volts) or frequency(recording, amps)
     if f is None or nearest_nominal(f) is not None:
         return f or recording.frequency, ""
     phasors = snapshots(recording, volts, f)
     turns = phasors is not None and any(phasors.pure(i) for i in volts)
-    return recording.frequency, f"the voltages have {f:.3g} Hz, which is no network's" if turns else ""
+    return (
+        recording.frequency,
+        f"the voltages have {f:.3g} Hz, which is no network's" if turns else "",
+    )
 
 
 def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) -> list[Group]:
     """Groups among the channels of one quantity: by label, and the rest by magnitude and angle."""
     result = [
-        g for g in groups({i: recording.channels[i] for i in numbers})
-        if len(g.numbers) == 3 or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
-    ]  # fmt: skip
+        g
+        for g in groups({i: recording.channels[i] for i in numbers})
+        if len(g.numbers) == 3
+        or g.pairs == (recording.channels[g.numbers[0]].quantity != "current")
+    ]
     result = [g for g in result if g.certain or all(phasors.pure(i) for i in g.numbers)]
     taken = {i for g in result for i in g.numbers}
-    free = [i for i in numbers if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)]
+    free = [
+        i
+        for i in numbers
+        if i not in taken and not residual(recording.channels[i]) and phasors.pure(i)
+    ]
     k = 0
     while k + 3 <= len(free):
         ordered = _symmetric(phasors, free[k : k + 3])
@@ -208,12 +278,16 @@ def _groups(recording: Recording, phasors: Snapshots, numbers: Sequence[int]) ->
 
 
 def _symmetric(phasors: Snapshots, numbers: Sequence[int]) -> tuple[int, ...]:
-    """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart; else ()."""
+    """The three channels in the order a, b, c where their phasors are equal and 120 degrees apart;
+    else ().
+    """
     X = phasors.of(numbers)
     level = np.abs(X).mean(axis=0)
     if not np.isfinite(level).any() or np.nanmax(level) == 0:
         return ()
-    X = np.nanmedian(X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1)
+    X = np.nanmedian(
+        X[:, level > 0.5 * np.nanmax(level)] / _unit(X[0, level > 0.5 * np.nanmax(level)]), axis=1
+    )
     size = np.abs(X)
     if not size.min() > 0 or np.ptp(size) > LARGEST_PHASE_DIFFERENCE * size.mean():
         return ()
@@ -232,7 +306,9 @@ def _unit(x: np.ndarray) -> np.ndarray:
 def _feeders(
     recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group], level: float
 ) -> list[Feeder]:
-    """The feeder of a group of currents; one for each bus where it cannot be told which they belong to."""
+    """The feeder of a group of currents; one for each bus where it cannot be told which they belong
+    to.
+    """
     feeders = []
     for bus, why in _buses(recording, phasors, load, buses, level):
         voltages, connection = _connection(load, bus)
@@ -243,20 +319,32 @@ def _feeders(
         if bus.pairs:
             said.append("the voltages are line to line, as their names say")
         if len(load.numbers) == 2:
-            said.append("two currents are recorded: the third is minus their sum, as where no current returns to earth")
+            said.append(
+                "two currents are recorded: the third is minus their sum, as where no current"
+                " returns to earth"
+            )
         name = load.name or bus.name or "the feeder"
         feeders.append(Feeder(voltages, load.numbers, connection, name=name, why=tuple(said)))
     return _add_question(recording, phasors, feeders)
 
 
 def _add_question(recording: Recording, phasors: Snapshots, feeders: list[Feeder]) -> list[Feeder]:
-    """The same, and where they are several that exclude each other, the question which it is in each of them."""
+    """The same, and where they are several that exclude each other, the question which it is in
+    each of them.
+    """
     if len(feeders) == 1:
         return feeders
-    which = " or ".join(f"{_names(recording, f.voltages)} ({_size_of(recording, phasors, f)})" for f in feeders)
+    which = " or ".join(
+        f"{_names(recording, f.voltages)} ({_size_of(recording, phasors, f)})" for f in feeders
+    )
     question = f"which voltages these currents belong to cannot be told: {which}"
     return [
-        replace(f, name=f"{f.name} at {', '.join(map(str, f.voltages))}", why=(*f.why, question), question=question)
+        replace(
+            f,
+            name=f"{f.name} at {', '.join(map(str, f.voltages))}",
+            why=(*f.why, question),
+            question=question,
+        )
         for f in feeders
     ]
 
@@ -299,15 +387,21 @@ def _names(recording: Recording, numbers: Sequence[int]) -> str:
 def _buses(
     recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group], level: float
 ) -> list[tuple[Group, str]]:
-    """The voltages that a group of currents belongs to, and what says so; several where that cannot be told.
+    """The voltages that a group of currents belongs to, and what says so; several where that cannot
+    be told.
 
-    `level` [kA] is the greatest current in the file. What carries a load has no dead voltage, whatever its name.
+    `level` [kA] is the greatest current in the file. What carries a load has no dead voltage,
+    whatever its name.
     """
     if len(buses) == 1:
         return [(buses[0], "the only ones in the file")]
     loaded = phasors.size(load.numbers) > UNLOADED * level
     greatest = max(phasors.size(bus.numbers) for bus in buses)
-    alive = [b for b in buses if not _dead(phasors, b.numbers) and phasors.size(b.numbers) > PICK_UP * greatest]
+    alive = [
+        b
+        for b in buses
+        if not _dead(phasors, b.numbers) and phasors.size(b.numbers) > PICK_UP * greatest
+    ]
     buses = alive if alive and loaded else buses
     if len(buses) == 1:
         return [(buses[0], "the only ones alive")]
@@ -316,12 +410,24 @@ def _buses(
         return [(ties[0], why)]
     apart = max(_measure_difference(phasors, a, b) for a, b in combinations(ties, 2))
     if apart < SAME_BUS:
-        return [(ties[0], f"{len(ties)} groups of voltages differ by at most {100 * apart:.2g} %, the first is taken")]
+        return [
+            (
+                ties[0],
+                f"{len(ties)} groups of voltages differ by at most {100 * apart:.2g} %, the first"
+                " is taken",
+            )
+        ]
     stray = {id(bus): _stray(phasors, bus, load) for bus in buses}
     best = min(buses, key=lambda bus: stray[id(bus)])
-    if LARGEST_RESIDUAL_SHARE * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:  # one of those whose names say as much
+    # one of those whose names say as much
+    if LARGEST_RESIDUAL_SHARE * min(stray[id(bus)] for bus in ties) <= stray[id(best)]:
         best = min(ties, key=lambda bus: stray[id(bus)])
-    others = [b for b in buses if LARGEST_RESIDUAL_SHARE * stray[id(b)] < stray[id(best)] and _measure_difference(phasors, best, b) >= SAME_BUS]
+    others = [
+        b
+        for b in buses
+        if LARGEST_RESIDUAL_SHARE * stray[id(b)] < stray[id(best)]
+        and _measure_difference(phasors, best, b) >= SAME_BUS
+    ]
     if not (loaded and any(b in ties for b in others)):
         return [(best, "the currents follow these voltages best")]
     return [(bus, "the currents may follow them") for bus in buses if bus is best or bus in others]
@@ -330,16 +436,24 @@ def _buses(
 def _named_alike(
     recording: Recording, phasors: Snapshots, load: Group, buses: Sequence[Group]
 ) -> tuple[list[Group], str]:
-    """(the voltages whose names share most with those of the currents, what they share where it is one group)."""
-    texts = [phasors.remember(("text", *g.numbers), lambda g=g: _text(recording, g)) for g in (load, *buses)]
+    """(the voltages whose names share most with those of the currents, what they share where it is
+    one group).
+    """
+    texts = [
+        phasors.remember(("text", *g.numbers), lambda g=g: _text(recording, g))
+        for g in (load, *buses)
+    ]
     own = sorted(texts[0])
     common = [sum(w in t for t in texts[1:]) for w in own]
     scores = [
-        sum(1 / n for w, n in zip(own, common, strict=True) if n and w in text) for text in texts[1:]
+        sum(1 / n for w, n in zip(own, common, strict=True) if n and w in text)
+        for text in texts[1:]
     ]  # a word that names one bus only weighs most
     best = max(scores)
     ties = [bus for bus, score in zip(buses, scores, strict=True) if score >= best - 1e-9]
-    shared = sorted(w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses))
+    shared = sorted(
+        w for w in texts[0] & texts[1 + buses.index(ties[0])] if common[own.index(w)] < len(buses)
+    )
     return ties, f"their names share '{' '.join(shared)}' with the currents'"
 
 
@@ -352,7 +466,9 @@ def _text(recording: Recording, group: Group) -> set[str]:
 
 
 def _positive(X: np.ndarray, pairs: bool) -> np.ndarray:
-    """Positive sequence (M,) of three phasors; of two line voltages that which they say, to a constant factor."""
+    """Positive sequence (M,) of three phasors; of two line voltages that which they say, to a
+    constant factor.
+    """
     if len(X) == 3:
         return sequences(X)[0]
     return (X[0] - TURN**2 * X[1]) / 3 if pairs else X[0]
@@ -374,11 +490,19 @@ def _stray(phasors: Snapshots, bus: Group, load: Group) -> float:
 
 
 def _conductors(
-    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group]
+    recording: Recording,
+    phasors: Snapshots,
+    volts: Sequence[int],
+    amps: Sequence[int],
+    taken: Sequence[Group],
 ) -> list[list[Feeder]]:
-    """Railway feeders of two conductors: contact line and negative feeder, each with its current."""
+    """Railway feeders of two conductors: contact line and negative feeder, each with
+    its current.
+    """
     used = {i for group in taken for i in group.numbers}
-    volts, amps = ([i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps))
+    volts, amps = (
+        [i for i in numbers if i not in used and phasors.pure(i)] for numbers in (volts, amps)
+    )
     pair = opposite_pair(phasors, volts)
     if pair is None and len(volts) != 1:
         return []
@@ -388,50 +512,87 @@ def _conductors(
     for k, currents in enumerate(conductor_pairs(recording, phasors, voltages, amps), 1):
         why = f"the currents {_names(recording, currents)} are those of its two conductors"
         of = (
-            f"contact line and negative feeder, {_names(recording, voltages)}: opposite to each other"
+            f"contact line and negative feeder, {_names(recording, voltages)}: opposite to each"
+            " other"
             if pair
-            else f"{_names(recording, voltages)} is the voltage between contact line and negative feeder"
+            else f"{_names(recording, voltages)} is the voltage between contact line and negative"
+            " feeder"
         )
-        name = shared_name([recording.channels[i] for i in currents]) or f"autotransformer feeder {k}"
-        feeders.append([Feeder(voltages, currents, connection, name=name, why=(of, why))] if connection else [])
+        name = (
+            shared_name([recording.channels[i] for i in currents]) or f"autotransformer feeder {k}"
+        )
+        feeders.append(
+            [Feeder(voltages, currents, connection, name=name, why=(of, why))] if connection else []
+        )
     return [each for each in feeders if each]
 
 
 def _single(
-    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], taken: Sequence[Group],
+    recording: Recording,
+    phasors: Snapshots,
+    volts: Sequence[int],
+    amps: Sequence[int],
+    taken: Sequence[Group],
     level: float,
-) -> list[list[Feeder]]:  # fmt: skip
-    """Single-phase feeders among the channels no group has taken: each current with its voltage, or with several."""
+) -> list[list[Feeder]]:
+    """Single-phase feeders among the channels no group has taken: each current with its voltage, or
+    with several.
+    """
     used = {i for group in taken for i in group.numbers}
-    free = [i for i in volts if i not in used and not residual(recording.channels[i]) and phasors.pure(i)]
+    free = [
+        i
+        for i in volts
+        if i not in used and not residual(recording.channels[i]) and phasors.pure(i)
+    ]
     single = []
     for i in amps:
         if i in used or residual(recording.channels[i]) or not free or not phasors.pure(i):
             continue
         group = Group((i,), False, recording.channels[i].name.strip(), False, "")
-        buses = _buses(recording, phasors, group, [Group((v,), False, "", False, "") for v in free], level)
+        buses = _buses(
+            recording, phasors, group, [Group((v,), False, "", False, "") for v in free], level
+        )
         feeders = []
         for bus, why in buses:
-            said = (f"one current {_names(recording, [i])}", f"one voltage {_names(recording, bus.numbers)}: {why}")
+            said = (
+                f"one current {_names(recording, [i])}",
+                f"one voltage {_names(recording, bus.numbers)}: {why}",
+            )
             said += _part_of_railway(recording, phasors, volts, amps, bus.numbers[0], i)
             loaded = not is_return(recording, i)
             name = f"{group.name} ({HALF})" if any(HALF in each for each in said) else group.name
-            feeders.append(Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded))
+            feeders.append(
+                Feeder(bus.numbers, (i,), usual(1, 1), name=name, why=said, loaded=loaded)
+            )
         single.append(_add_question(recording, phasors, feeders))
     return single
 
 
 def _part_of_railway(
-    recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int], voltage: int, current: int
+    recording: Recording,
+    phasors: Snapshots,
+    volts: Sequence[int],
+    amps: Sequence[int],
+    voltage: int,
+    current: int,
 ) -> tuple[str, ...]:
     """What is said of a current that carries a part of a load only, or brings it back."""
     if is_return(recording, current):
-        return ("the current of a return conductor or the rail: what the contact line brings flows back in it",)
-    others = [i for i in volts if i != voltage and phasors.pure(i) and is_opposite(phasors, voltage, i)]
+        return (
+            "the current of a return conductor or the rail: what the contact line brings flows back"
+            " in it",
+        )
+    others = [
+        i for i in volts if i != voltage and phasors.pure(i) and is_opposite(phasors, voltage, i)
+    ]
     if others:
         return (f"{HALF}: no current goes with the other voltage, {_names(recording, others[:1])}",)
     other = other_conductor(recording, phasors, current, [i for i in amps if phasors.pure(i)])
-    return () if other is None else (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
+    return (
+        ()
+        if other is None
+        else (f"{HALF}: no voltage goes with the other current, {_names(recording, [other])}",)
+    )
 
 
 def _dead(phasors: Snapshots, numbers: Sequence[int]) -> bool:
@@ -448,23 +609,36 @@ def _never_turn(phasors: Snapshots, numbers: Sequence[int]) -> bool:
     return not (np.abs(sequences(X)).max(axis=0) > LEAST_SEQUENCE_SHARE * size).any()
 
 
-def _mark_unloaded(recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str) -> Feeder:
+def _mark_unloaded(
+    recording: Recording, phasors: Snapshots, feeder: Feeder, level: float, strange: str
+) -> Feeder:
     """The feeder, marked as unloaded where it carries no load."""
     if not feeder.loaded:
         return feeder
     if _dead(phasors, feeder.voltages):
-        why = strange or "the voltages are no three phases: the line is dead, or they were named otherwise"
+        why = (
+            strange
+            or "the voltages are no three phases: the line is dead, or they were named otherwise"
+        )
         return replace(feeder, why=(*feeder.why, why), loaded=False)
     if named := COUPLER.search(feeder.name.lower()):
-        said = f"no load here: a bus coupler, as its name says ('{named[0]}'): its current is that of other feeders"
+        said = (
+            f"no load here: a bus coupler, as its name says ('{named[0]}'): its current is that of"
+            " other feeders"
+        )
         return replace(feeder, why=(*feeder.why, said), loaded=False)
     if not any(phasors.pure(i) for i in feeder.currents):
         said = "no load here: the currents are no more than noise or harmonics"
         return replace(feeder, why=(*feeder.why, said), loaded=False)
     size = phasors.size(feeder.currents)
-    step = max(abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents))
+    step = max(
+        abs(c.gain * c.ratio * c.factor) for c in (recording.channels[i] for i in feeder.currents)
+    )
     integral = all(recording.channels[i].raw.dtype.kind in "iu" for i in feeder.currents)
     if size > UNLOADED * level and not (integral and size < STEPS_LOADED * step):
         return feeder
-    said = f"unloaded: {1000 * size:.3g} A where the greatest current of the file is {1000 * level:.3g} A"
+    said = (
+        f"unloaded: {1000 * size:.3g} A where the greatest current of the file is"
+        f" {1000 * level:.3g} A"
+    )
     return replace(feeder, why=(*feeder.why, said), loaded=False)

@@ -12,8 +12,10 @@ from tractexp.record.record import Record
 from tractexp.recording.excursion import DEAD_VOLTAGE_SHARE, Excursion, excursions
 from tractexp.recording.trace import Trace, of_record, of_waves
 
-LARGEST_SWITCHING_STEP = 0.15  # of the voltage: a larger change that stays is no tap or switching step
-LEAST_POSITIVE_SHARE = 0.75  # of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
+# of the voltage: a larger change that stays is no tap or switching step
+LARGEST_SWITCHING_STEP = 0.15
+# of the RMS: positive sequence that three phases have at some time; a zero sequence leaves none
+LEAST_POSITIVE_SHARE = 0.75
 SWING = 0.1  # of the voltage: how deep the swings of a pole slip are at least
 SWINGS = 2  # so many at least
 SWING_PERIOD = (0.15, 5.0)  # s
@@ -21,14 +23,17 @@ LARGEST_PERIOD_RATIO = 3.0  # the longest period of a pole slip over its shortes
 LARGEST_SWING_UNBALANCE = 0.05  # U2 over U1: swings are balanced, faults are not
 OPEN_CURRENT = 0.05  # of the mean of the other two: a phase that carries less is open
 OPEN_CYCLES = 3.0  # so long at least
-SECOND = 0.15  # of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential relays)
+# of the fundamental: second harmonic of an inrush (IEEE C37.91, usual restraint of differential
+# relays)
+SECOND = 0.15
 INRUSH_CYCLES = 5.0  # so long at least: the offset of a fault current lasts less
 CLEAN = 0.5  # of a current's energy is in its fundamental and second harmonic, or it is noise
 OF_LOADS = ("load loss", "load step")  # kinds of which the voltage shows nothing
 LEAST_LISTED_STEP = 0.2  # of the apparent power: a smaller step of a load is no event
 LARGEST_CURRENT_CHANGE = 0.1  # of a current: within it the current stays while a voltage is lost
 BLOWN = 0.1  # of a phase: less is left where a fuse has blown
-LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03  # the same, longer than a fault lasts; how little the others change
+# the same, longer than a fault lasts; how little the others change
+LOST_VOLTAGE, UNTOUCHED = 0.7, 0.03
 FUSE_CYCLES = 3.0  # so long at least
 FUSE_SAMPLES = 50  # half cycles before it, whose median it is compared with
 CARRIES = 0.05  # of the record's greatest current: what is less is no load
@@ -51,11 +56,18 @@ class Happening:
 
 
 def happenings(
-    waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors, trigger: float | None = None
+    waves: WaveSource,
+    rate: float,
+    start: float,
+    nominal: float,
+    phasors: Phasors,
+    trigger: float | None = None,
 ) -> list[Happening]:
-    """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from `start` [s] on.
+    """The events in waveforms (2 K, N) [kV, kA], voltages first, sampled at `rate` [Hz] from
+    `start` [s] on.
 
-    `phasors` are those measured from the same waveforms, which give sequence components, powers and frequency.
+    `phasors` are those measured from the same waveforms, which give sequence components, powers and
+    frequency.
     """
     return happenings_in(of_waves(waves, rate, start, nominal, phasors), trigger)
 
@@ -70,17 +82,29 @@ def happenings_in(trace: Trace, trigger: float | None = None) -> list[Happening]
     if len(trace.t) < 4:
         return []
     if _no_system(trace):
-        whole = Excursion(0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True)
+        whole = Excursion(
+            0, len(trace.t), -1.0, False, False, False, max(float(np.median(trace.U)), 1e-12), True
+        )
         return [replace(_describe(trace, "dead line", whole, []), why=NO_SYSTEM)]
     slips = _pole_slips(trace)
-    outside = [e for e in excursions(trace, trigger) if not any(_part(trace, e, slip) for slip in slips)]
+    outside = [
+        e for e in excursions(trace, trigger) if not any(_part(trace, e, slip) for slip in slips)
+    ]
     spans = [(kind, part) for e in outside for kind, part in _kinds(trace, e)]
     spans += [("pole slip", slip) for slip in slips]
     spans += _open_alone(trace, spans)
-    spans += [(kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)]
+    spans += [
+        (kind, e) for kind, e in _inrush(trace) if not any(_part(trace, e, slip) for slip in slips)
+    ]
     changes = _own_changes(trace, [e for _, e in spans])
     listed = (c for c in changes if abs(c.ratio - 1) > LEAST_LISTED_STEP)
-    spans += [("load loss" if c.ratio < SMALL_LOAD_SHARE else "load step", _build_current_span(trace, c.first + 1, c.stop)) for c in listed]
+    spans += [
+        (
+            "load loss" if c.ratio < SMALL_LOAD_SHARE else "load step",
+            _build_current_span(trace, c.first + 1, c.stop),
+        )
+        for c in listed
+    ]
     spans.sort(key=lambda each: (each[1].start, each[1].end))
     bounds = [*((e.start, e.end) for _, e in spans), *((c.first + 1, c.stop) for c in changes)]
     return [_describe(trace, kind, e, bounds) for kind, e in _merge_ramps(spans)]
@@ -101,15 +125,27 @@ def _merge_ramps(spans: list[tuple[str, Excursion]]) -> list[tuple[str, Excursio
 
 def _own_changes(trace: Trace, outside: list[Excursion]) -> list[Change]:
     """The steps of the load beside what happens to the voltage."""
-    changes, near = load_changes(trace.U, trace.P, trace.Q, trace.cycle / trace.step), round(trace.cycle / trace.step)
-    return [c for c in changes if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)]
+    changes, near = (
+        load_changes(trace.U, trace.P, trace.Q, trace.cycle / trace.step),
+        round(trace.cycle / trace.step),
+    )
+    return [
+        c
+        for c in changes
+        if not any(e.start - near < c.stop and e.end + near > c.first for e in outside)
+    ]
 
 
 def _no_system(trace: Trace) -> bool:
-    """Whether three voltages never turn as three phases do: pick-up on a dead line, or one quantity three times."""
+    """Whether three voltages never turn as three phases do: pick-up on a dead line, or one quantity
+    three times.
+    """
     if len(trace.phases) < 3:
         return False
-    return not (np.maximum(trace.U, trace.U2) > LEAST_POSITIVE_SHARE * np.sqrt((trace.phases**2).mean(axis=0))).any()
+    return not (
+        np.maximum(trace.U, trace.U2)
+        > LEAST_POSITIVE_SHARE * np.sqrt((trace.phases**2).mean(axis=0))
+    ).any()
 
 
 def _part(trace: Trace, e: Excursion, slip: Excursion) -> bool:
@@ -122,13 +158,22 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
     """The kind of an excursion; two parts of a fault that leaves a pole open."""
     if (fuse := _fuse(trace, e)) is not None:
         return [("blown fuse", fuse)]
-    until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)  # with the level that it leads to
+    # with the level that it leads to
+    until = e.end + 2 * e.new_level * round(trace.cycle / trace.step)
     if e.dead or _dead(trace, e)[e.start : until].any():
-        return [("interruption", e)] if e.returned and not e.dead else [("dead line", _until_alive(trace, e))]
+        return (
+            [("interruption", e)]
+            if e.returned and not e.dead
+            else [("dead line", _until_alive(trace, e))]
+        )
     opened = _open(trace, e)
     if opened is not None:
         fault = replace(e, end=opened.start, cleared=False)
-        return [("dip", fault), ("open pole", opened)] if fault.end - fault.start >= 3 else [("open pole", opened)]
+        return (
+            [("dip", fault), ("open pole", opened)]
+            if fault.end - fault.start >= 3
+            else [("open pole", opened)]
+        )
     if not e.returned and abs(e.worst) <= LARGEST_SWITCHING_STEP and e.new_level:
         return [("step" if e.sudden else "ramp", e)]
     if not e.sudden:
@@ -141,27 +186,43 @@ def _kinds(trace: Trace, e: Excursion) -> list[tuple[str, Excursion]]:
 def _until_alive(trace: Trace, e: Excursion) -> Excursion:
     """The excursion up to where a phase is back for good, or to the end."""
     dead = _dead(trace, e)[e.end :]
-    return replace(e, end=e.end + int(np.flatnonzero(dead)[-1])) if dead.any() and e.new_level else e
+    return (
+        replace(e, end=e.end + int(np.flatnonzero(dead)[-1])) if dead.any() and e.new_level else e
+    )
 
 
 def _dead(trace: Trace, e: Excursion) -> np.ndarray:
     """When (M,) every phase is gone."""
-    return np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD_VOLTAGE_SHARE * e.reference
+    return (
+        np.concatenate([trace.U[None], trace.phases]).max(axis=0) < DEAD_VOLTAGE_SHARE * e.reference
+    )
 
 
 def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
-    """The span in which voltages are lost while all currents stay: a fuse of the voltage transformers; else None."""
-    edge, before = round(trace.cycle / trace.step), slice(max(e.start - FUSE_SAMPLES, 0), max(e.start - 1, 0))
+    """The span in which voltages are lost while all currents stay: a fuse of the voltage
+    transformers; else None.
+    """
+    edge, before = (
+        round(trace.cycle / trace.step),
+        slice(max(e.start - FUSE_SAMPLES, 0), max(e.start - 1, 0)),
+    )
     if e.dead or not len(trace.I) or e.start < 4:
         return None
-    current, voltage = (np.maximum(np.median(x[:, before], axis=1), 1e-12) for x in (trace.I, trace.phases))
+    current, voltage = (
+        np.maximum(np.median(x[:, before], axis=1), 1e-12) for x in (trace.I, trace.phases)
+    )
     lost = (trace.phases / voltage[:, None])[:, e.start + edge :].min(axis=0) < LOST_VOLTAGE
     end = e.start + edge + (len(lost) if lost.all() else int(np.argmin(lost)))
     inside = slice(e.start + edge, end - edge * (end < len(trace.t)))
-    flows = current.min() > CARRIES * np.percentile(trace.I, 95) and np.median(_clean(trace)[:, before], axis=1).all()
+    flows = (
+        current.min() > CARRIES * np.percentile(trace.I, 95)
+        and np.median(_clean(trace)[:, before], axis=1).all()
+    )
     if not flows or (inside.stop - inside.start) * trace.step < FUSE_CYCLES * trace.cycle:
         return None
-    stays = np.abs(trace.I[:, inside] - current[:, None]) < LARGEST_CURRENT_CHANGE * current[:, None]
+    stays = (
+        np.abs(trace.I[:, inside] - current[:, None]) < LARGEST_CURRENT_CHANGE * current[:, None]
+    )
     left = np.median(trace.phases[:, inside], axis=1) / voltage
     lasts = (end - e.start) * trace.step > UNCLEARED
     gone, others = left < (LOST_VOLTAGE if lasts else BLOWN), np.abs(left - 1) < UNTOUCHED
@@ -171,13 +232,19 @@ def _fuse(trace: Trace, e: Excursion) -> Excursion | None:
 
 
 def _open(trace: Trace, e: Excursion) -> Excursion | None:
-    """The part of an excursion in which one phase carries no current, or is unbalanced too long for a fault."""
+    """The part of an excursion in which one phase carries no current, or is unbalanced too long for
+    a fault.
+    """
     if len(trace.I) == 3:
         spans = [span for span in _open_runs(trace) if span[0] < e.end and span[1] > e.start]
         if not spans:
             return None
         first, stop = max(spans[0][0], e.start), min(max(span[1] for span in spans), e.end)
-        return replace(e, start=first, end=max(stop, first + 1)) if stop - first > 0.5 * (e.end - first) else None
+        return (
+            replace(e, start=first, end=max(stop, first + 1))
+            if stop - first > 0.5 * (e.end - first)
+            else None
+        )
     unbalanced = trace.U2[e.start : e.end] > OPEN_POLE * trace.U[e.start : e.end]
     if np.count_nonzero(unbalanced) * trace.step > UNCLEARED:
         return e
@@ -185,16 +252,19 @@ def _open(trace: Trace, e: Excursion) -> Excursion | None:
 
 
 def _open_runs(trace: Trace) -> list[tuple[int, int]]:
-    """Spans in which exactly one of three currents is gone while the other two carry load as it did before."""
+    """Spans in which exactly one of three currents is gone while the other two carry load as it did
+    before.
+    """
     carries = CARRIES * np.percentile(trace.I, 95)
     spans = []
     for k in range(3):
         others = np.delete(trace.I, k, axis=0)
         gone = (trace.I[k] < OPEN_CURRENT * others.mean(axis=0)) & (others.min(axis=0) > carries)
         spans += [
-            (run.start, run.stop) for run in runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
+            (run.start, run.stop)
+            for run in runs(gone, max(3, round(OPEN_CYCLES * trace.cycle / trace.step)))
             if run.start >= 4 and (trace.I[k, : run.start] > carries).any()
-        ]  # fmt: skip
+        ]
     return sorted(spans)
 
 
@@ -216,11 +286,15 @@ def _inrush(trace: Trace) -> list[tuple[str, Excursion]]:
     carries = CARRIES * np.percentile(trace.I, 99)
     rich = ((trace.second > SECOND * trace.I) & (carries < trace.I) & _clean(trace)).any(axis=0)
     least = max(3, round(INRUSH_CYCLES * trace.cycle / trace.step))
-    return [("inrush", _build_current_span(trace, run.start, run.stop)) for run in runs(rich, least)]
+    return [
+        ("inrush", _build_current_span(trace, run.start, run.stop)) for run in runs(rich, least)
+    ]
 
 
 def _clean(trace: Trace) -> np.ndarray:
-    """Where (K, M) a current is more than noise: fundamental and second harmonic hold most of its energy."""
+    """Where (K, M) a current is more than noise: fundamental and second harmonic hold most of its
+    energy.
+    """
     return trace.I**2 + trace.second**2 > CLEAN * trace.content**2
 
 
@@ -248,7 +322,9 @@ def _pole_slips(trace: Trace) -> list[Excursion]:
             a, b = max(lows[first] - half, 0), min(lows[last - 1] + half + 1, len(U))
             if slips and a - slips[-1].end < 2 * half:
                 a = slips.pop().start
-            slips.append(Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level))
+            slips.append(
+                Excursion(a, b, float(U[a:b].min() / level - 1), True, False, False, level)
+            )
         first = last
     return slips
 
@@ -270,7 +346,9 @@ def _swings(u: np.ndarray) -> list[int]:
 
 
 def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
-    """Whether the fall to a minimum and the rise from it both take their time: no fault begins or ends so."""
+    """Whether the fall to a minimum and the rise from it both take their time: no fault begins or
+    ends so.
+    """
     within = max(2, round(2 * trace.cycle / trace.step))
     reach = round(SWING_PERIOD[1] / 2 / trace.step)
     for part in (u[max(k - reach, 0) : k + 1][::-1], u[k : k + reach + 1]):
@@ -284,7 +362,11 @@ def _smooth(u: np.ndarray, k: int, trace: Trace) -> bool:
 def _even(t: np.ndarray) -> bool:
     steps = np.diff(t)
     low, high = SWING_PERIOD
-    return bool(steps.min() >= low and steps.max() <= high and steps.max() <= LARGEST_PERIOD_RATIO * steps.min())
+    return bool(
+        steps.min() >= low
+        and steps.max() <= high
+        and steps.max() <= LARGEST_PERIOD_RATIO * steps.min()
+    )
 
 
 def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int]]) -> Happening:
@@ -295,38 +377,63 @@ def _describe(trace: Trace, kind: str, e: Excursion, bounds: list[tuple[int, int
     before = _power(trace, max(first, e.start - count - 1), max(e.start - 1, first))
     after = _power(trace, min(e.end + 1, stop), min(e.end + 1 + count // 2, stop))
     inside = slice(e.start, max(e.end, e.start + 1))
-    edge = round(trace.cycle / trace.step)  # where a window holds two states, whose difference looks unbalanced
+    # where a window holds two states, whose difference looks unbalanced
+    edge = round(trace.cycle / trace.step)
     U2 = trace.U2[inside][edge : -edge or None] if e.end - e.start > 3 * edge else trace.U2[inside]
     extreme = np.max if e.worst > 0 else np.min
     depth = -e.worst if e.new_level or e.dead else 1 - float(extreme(trace.U[inside])) / e.reference
     last = min(e.end, len(trace.t) - 1)
     worth, why = _worth(trace, kind, e, depth, first, (before, after))
     return Happening(
-        kind, float(trace.t[e.start]), float(trace.t[last]), float(depth), trace.jump(e.start),
-        float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"), before, after, worth, why,
-    )  # fmt: skip
+        kind,
+        float(trace.t[e.start]),
+        float(trace.t[last]),
+        float(depth),
+        trace.jump(e.start),
+        float(np.nanmax(U2) / e.reference) if np.isfinite(U2).any() else float("nan"),
+        before,
+        after,
+        worth,
+        why,
+    )
 
 
 def _power(trace: Trace, first: int, stop: int) -> tuple[float, float]:
     """Mean P and Q; nan without samples."""
     P, Q = trace.P[first:stop], trace.Q[first:stop]
     valid = np.isfinite(P) & np.isfinite(Q)
-    return (float(P[valid].mean()), float(Q[valid].mean())) if valid.any() else (float("nan"), float("nan"))
+    return (
+        (float(P[valid].mean()), float(Q[valid].mean()))
+        if valid.any()
+        else (float("nan"), float("nan"))
+    )
 
 
 def _worth(
-    trace: Trace, kind: str, e: Excursion, depth: float, first: int, powers: tuple[tuple[float, float], ...]
+    trace: Trace,
+    kind: str,
+    e: Excursion,
+    depth: float,
+    first: int,
+    powers: tuple[tuple[float, float], ...],
 ) -> tuple[bool, str]:
-    """Whether a load model can be fitted to it, and why (not); `powers` are P and Q before and after."""
+    """Whether a load model can be fitted to it, and why (not); `powers` are P and Q before and
+    after.
+    """
     before, after = powers
     if kind != "dip":
         return False, NO_FIT[kind]
     lead = (e.start - first) * trace.step
     size = f"the voltage falls by {100 * depth:.3g} %"
     if len(trace.phases) == 3:
-        usual = np.maximum(np.median(trace.phases[:, first : max(e.start, first + 1)], axis=1), 1e-12)
+        usual = np.maximum(
+            np.median(trace.phases[:, first : max(e.start, first + 1)], axis=1), 1e-12
+        )
         lowest = (trace.phases[:, e.start : e.end] / usual[:, None]).min()
-        size = f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to {100 * lowest:.3g} %"
+        size = (
+            f"the positive sequence falls by {100 * depth:.3g} %, the lowest phase to"
+            f" {100 * lowest:.3g} %"
+        )
     if lead < FEWEST_BEFORE * 1e-3 or e.start - first < 2:
         return False, f"{size}, but only {1000 * lead:.0f} ms of steady state come before it"
     if not e.cleared:
@@ -346,23 +453,35 @@ def _worth(
         return False, f"{size}, but slowly: it determines only the static part of the load"
     if before[0] < 0:
         why = (
-            "power is fed back, or the current is counted out of the load (then data.reverse_current=true makes it one)"
+            "power is fed back, or the current is counted out of the load (then"
+            " data.reverse_current=true makes it one)"
         )
         return False, f"{size}, but P is negative before it: {why}"
-    short = f"; only the {1000 * lead:.0f} ms before it tell voltage and power before" if lead < REFERENCE else ""
+    short = (
+        f"; only the {1000 * lead:.0f} ms before it tell voltage and power before"
+        if lead < REFERENCE
+        else ""
+    )
     return True, f"{size}, {lead:.2g} s before it and the recovery are recorded{short}"
 
 
-NO_SYSTEM = "the voltages are no three phases of this frequency: the line is dead, or other channels were meant"
+NO_SYSTEM = (
+    "the voltages are no three phases of this frequency: the line is dead, or other channels were"
+    " meant"
+)
 NO_FIT = {
     "swell": "a swell: loads answer it, but the models here are fitted to dips",
-    "interruption": "an interruption: without voltage there is no load to model, and what follows is a start-up",
+    "interruption": "an interruption: without voltage there is no load to model, and what follows"
+    " is a start-up",
     "step": "the voltage stays at its new level, which determines only the static part of the load",
     "ramp": "the voltage changes slowly, which determines only the static part of the load",
-    "open pole": "one phase is open: the unbalance is not that of a fault, and single-phase power decides",
+    "open pole": "one phase is open: the unbalance is not that of a fault, and single-phase power"
+    " decides",
     "dead line": "the line is dead: there is no voltage to draw a load from",
-    "pole slip": "the voltage swings with machines that have lost synchronism: frequency and angle swing with it",
-    "blown fuse": "voltage is lost while the currents stay: a fuse of the voltage transformers, not the network",
+    "pole slip": "the voltage swings with machines that have lost synchronism: frequency and angle"
+    " swing with it",
+    "blown fuse": "voltage is lost while the currents stay: a fuse of the voltage transformers, not"
+    " the network",
     "load loss": "the load is switched off while the voltage stays: it is no answer to the voltage",
     "load step": "the load changes while the voltage stays: it is no answer to the voltage",
     "inrush": "the currents are rich in the second harmonic: a transformer's inrush, not the load",

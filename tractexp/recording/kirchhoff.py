@@ -1,4 +1,6 @@
-"""Feeders whose currents add up to nothing belong to one bus, as they are or with one counted the other way."""
+"""Feeders whose currents add up to nothing belong to one bus, as they are or with one counted the
+other way.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -14,7 +16,8 @@ CLOSES = 0.03  # of the sum of magnitudes: currents that add up to less belong t
 
 
 def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
-    """The feeders, with a note where the sum of their currents is zero, as they are or with one reversed.
+    """The feeders, with a note where the sum of their currents is zero, as they are or with one
+    reversed.
 
     The whole station first, then the feeders of each bus.
     """
@@ -30,8 +33,12 @@ def closed_sums(phasors: Snapshots, feeders: "list[Feeder]") -> "list[Feeder]":
     return feeders
 
 
-def _find_closed_sum(phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]) -> tuple[np.ndarray, float] | None:
-    """(signs, residual) of the simplest sum of three or more currents that closes; None where none does."""
+def _find_closed_sum(
+    phasors: Snapshots, feeders: "list[Feeder]", loaded: list[int]
+) -> tuple[np.ndarray, float] | None:
+    """(signs, residual) of the simplest sum of three or more currents that closes; None where none
+    does.
+    """
     if len(loaded) < 3:
         return None
     X = np.array([phasors.of(feeders[k].currents) for k in loaded])  # (F, 3, M)
@@ -47,7 +54,9 @@ def _find_closed_sum(phasors: Snapshots, feeders: "list[Feeder]", loaded: list[i
 
 
 def _signs(count: int) -> np.ndarray:
-    """Signs (T, count) that are tried: all as they are, one left out or turned round, and two left out of five."""
+    """Signs (T, count) that are tried: all as they are, one left out or turned round, and two left
+    out of five.
+    """
     plain, each = np.ones(count), np.eye(count)
     tried = [plain[None], *(plain - s * each[k : k + 1] for k in range(count) for s in (1, 2))]
     if count > 4:
@@ -58,20 +67,29 @@ def _signs(count: int) -> np.ndarray:
 
 
 def _closures(X: np.ndarray, signs: np.ndarray) -> np.ndarray:
-    """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean square over time."""
+    """Sums (T,) of currents (F, M) over the sums of their magnitudes, by signs (T, F), root mean
+    square over time.
+    """
     total, magnitudes = np.real(X.conj() @ X.T), np.abs(X) @ np.abs(X).T
     sums = np.maximum(((signs @ total) * signs).sum(axis=1), 0.0)
     most = ((np.abs(signs) @ magnitudes) * np.abs(signs)).sum(axis=1)
     return np.sqrt(sums / np.maximum(most, 1e-300))
 
 
-def _describe_closure(feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float) -> "list[Feeder]":
+def _describe_closure(
+    feeders: "list[Feeder]", loaded: list[int], signs: np.ndarray, closes: float
+) -> "list[Feeder]":
     marked = list(feeders)
     out = [feeders[k].name for k, s in zip(loaded, signs, strict=True) if s == 0]
     for k, sign in zip(loaded, signs, strict=True):
-        said = f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of their magnitudes"
+        said = (
+            f"the currents of {np.count_nonzero(signs)} feeders add up to {100 * closes:.2g} % of"
+            " their magnitudes"
+        )
         if out:
-            said += f", without {' and '.join(out)}" + (": a bus tie, or one of another bus" if sign == 0 else "")
+            said += f", without {' and '.join(out)}" + (
+                ": a bus tie, or one of another bus" if sign == 0 else ""
+            )
         if sign < 0:
             said += " once this one's polarity is reversed"
         others = {feeders[i].voltages for i in loaded if i != k}

@@ -1,7 +1,9 @@
-"""What the names of channels say: which three (or two) belong together as phases, which one is residual.
+"""What the names of channels say: which three (or two) belong together as phases, which one is
+residual.
 
-One mark in a name stands for its phase: `Ia`, `UL1`, `VRS`. Three names equal but for that mark are a group, so that
-no list of naming schemes is needed: only the alphabets that number phases, and where in a name the mark may stand.
+One mark in a name stands for its phase: `Ia`, `UL1`, `VRS`. Three names equal but for that mark are
+a group, so that no list of naming schemes is needed: only the alphabets that number phases, and
+where in a name the mark may stand.
 """
 
 import functools
@@ -12,13 +14,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import zip_longest
 
-from tractexp.recording.phase_mark import DIGITS, ORDERS, QUANTITY, pairs, plain, quantity_before, spell_marks
+from tractexp.recording.phase_mark import (
+    DIGITS,
+    ORDERS,
+    QUANTITY,
+    pairs,
+    plain,
+    quantity_before,
+    spell_marks,
+)
 from tractexp.recording.recording import Channel
 
 RESIDUAL = re.compile(
-    r"3[uvi][o0]|(?<![a-z])[uvi][_ ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
+    r"3[uvi][o0]|(?<![a-z])[uvi][_"
+    r" ]?[ong0](?![a-z])|(?<![a-z])3?[uvi]_?(?:res|gnd|neutral)|零序|нулев"
 )
-COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")  # "12-Ia", "F5-VA": a number of its own before the name
+# "12-Ia", "F5-VA": a number of its own before the name
+COUNTER = re.compile(r"^[a-z]{0,2}\d+[-_. :)]+")
 # U21 is V1 - V2 where that name is used (an arrow from 2 to 1), as U12 is elsewhere
 PLACE = {"ab": 0, "bc": 1, "ca": 2, "ba": 0, "cb": 1, "ac": 2}
 SURE = 3.0  # score of a mark right after the letter of a quantity: "Ia", "UL1", "U21"
@@ -26,11 +38,47 @@ BY_NAME = "their names differ in the phase alone"
 GLUED = 0.5  # score of a mark at the end of a word, where any word may end
 MOST_MARKS = 3  # in a name: "HCSA -HVS1A" has two
 NO_WAVE = re.compile(r"(?<![a-z])(?:mag|magnitude|rms|ang|angle|diff|bias)(?![a-z])")
-OTHER_UNITS = frozenset((  # of what is neither voltage nor current, whatever its name begins with
-    "hz", "mhz", "hz/s", "w", "kw", "mw", "gw", "var", "kvar", "mvar", "va", "kva", "mva", "wh", "kwh", "deg", "°",
-    "degree", "degrees", "rad", "s", "ms", "us", "min", "h", "%", "rpm", "1/min", "°c", "bar", "pa", "kpa", "ohm", "ω",
-    "cos", "pf", "dimensionless",
-))  # fmt: skip
+OTHER_UNITS = frozenset(
+    (  # of what is neither voltage nor current, whatever its name begins with
+        "hz",
+        "mhz",
+        "hz/s",
+        "w",
+        "kw",
+        "mw",
+        "gw",
+        "var",
+        "kvar",
+        "mvar",
+        "va",
+        "kva",
+        "mva",
+        "wh",
+        "kwh",
+        "deg",
+        "°",
+        "degree",
+        "degrees",
+        "rad",
+        "s",
+        "ms",
+        "us",
+        "min",
+        "h",
+        "%",
+        "rpm",
+        "1/min",
+        "°c",
+        "bar",
+        "pa",
+        "kpa",
+        "ohm",
+        "ω",
+        "cos",
+        "pf",
+        "dimensionless",
+    )
+)
 ROMAN = {"i": "1", "ii": "2", "iii": "3", "iv": "4", "v": "5", "vi": "6"}
 
 
@@ -48,23 +96,39 @@ class Group:
 
 def residual(channel: Channel) -> bool:
     """Whether the name or the phase says that this is a neutral or zero-sequence quantity."""
-    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in ("n", "g", "e", "3i0", "3u0")
+    return bool(RESIDUAL.search(plain(channel.name))) or plain(channel.phase) in (
+        "n",
+        "g",
+        "e",
+        "3i0",
+        "3u0",
+    )
 
 
 def is_to_ground(channel: Channel) -> bool:
-    """Whether the name or the phase of a voltage says that it is to ground: AN, L1-G, phase to ground."""
-    return any(spell_marks(text, letters)[1] for text in (channel.name, channel.phase) for letters in ORDERS)
+    """Whether the name or the phase of a voltage says that it is to ground: AN, L1-G, phase to
+    ground.
+    """
+    return any(
+        spell_marks(text, letters)[1]
+        for text in (channel.name, channel.phase)
+        for letters in ORDERS
+    )
 
 
 def kind(channel: Channel) -> str:
-    """voltage or current, by unit, else by the letter that starts a word of its name; "" for what is no wave."""
+    """voltage or current, by unit, else by the letter that starts a word of its name; "" for what
+    is no wave.
+    """
     if NO_WAVE.search(plain(channel.name)):
         return ""
     if channel.quantity:
         return channel.quantity if channel.quantity in ("voltage", "current") else ""
     if channel.unit.strip().lower() in OTHER_UNITS:
         return ""
-    letter = re.search(r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))", plain(channel.name))
+    letter = re.search(
+        r"(?<![a-z])(u|v|i)(?=[_ ]?(?:l?[123]|l?[abcrstuvwyn]{1,2})(?![a-z]))", plain(channel.name)
+    )
     return "" if letter is None else "current" if letter[1] == "i" else "voltage"
 
 
@@ -75,23 +139,33 @@ def other_quantity(channel: Channel) -> bool:
 
 
 def phase(channel: Channel, orders: Sequence[str] = ORDERS) -> str:
-    """The phase that a channel's label gives in one of the orders: one or two of a, b, c; "" where it gives none."""
+    """The phase that a channel's label gives in one of the orders: one or two of a, b, c; "" where
+    it gives none.
+    """
     label = re.sub(r"phasen?|phase|fase|фaзa|[-_/ 相]", "", plain(channel.phase))
     label = re.sub(r"(?<=.)(?:n|g|e|pe|gnd)$", "", label)  # to ground, as a phase by itself is
     for text in (label, label.removeprefix("l"), label[1:] if label[:1] in QUANTITY else ""):
         marks = [*text.replace("l", "")]
         for letters in orders:
-            if 1 <= len(marks) <= 2 and all(m in letters for m in marks) and len(set(marks)) == len(marks):
+            if (
+                1 <= len(marks) <= 2
+                and all(m in letters for m in marks)
+                and len(set(marks)) == len(marks)
+            ):
                 return "".join("abc"[letters.index(m)] for m in marks)
     return ""
 
 
 def groups(channels: Mapping[int, Channel]) -> list[Group]:
-    """The groups among channels of one quantity, without residual ones, by their names and phases."""
+    """The groups among channels of one quantity, without residual ones, by their
+    names and phases.
+    """
     free = {i: c for i, c in channels.items() if not residual(c)}
     result: list[Group] = []
     readings = [(True, True), (False, True), (True, False), (False, False)]
-    searches = [functools.partial(_by_name, full=full, counters=counters) for full, counters in readings]
+    searches = [
+        functools.partial(_by_name, full=full, counters=counters) for full, counters in readings
+    ]
     for search, size in itertools.product((*searches, _by_column), (3, 2)):
         matches = search(free, size)
         result += matches
@@ -100,7 +174,8 @@ def groups(channels: Mapping[int, Channel]) -> list[Group]:
 
 
 def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
-    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None: no label says.
+    """Which phase (0, 1, 2) each channel is labelled as, and whether they are line to line; None:
+    no label says.
 
     What the file's phases say comes first, then what the names share.
     """
@@ -114,7 +189,9 @@ def order(channels: Sequence[Channel]) -> tuple[tuple[int, ...], bool] | None:
         texts = [plain(c.name) if counters else COUNTER.sub("", plain(c.name)) for c in channels]
         read = [{m[:3]: m[3:] for m in _marks(text)} for text in texts]
         shared = set.intersection(*(set(each) for each in read))
-        readings = [(max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared]
+        readings = [
+            (max(r[s][1] for r in read), tuple(r[s][0] for r in read), s[2]) for s in shared
+        ]
         readings = [each for each in readings if len(set(each[1])) == len(channels)]
         if readings:
             _, places, two = max(readings)
@@ -129,7 +206,9 @@ def backward(channels: Sequence[Channel]) -> bool:
 
 def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: bool) -> list[Group]:
     """Groups of names that are equal but for the mark; with their circuits where `full`."""
-    buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
+    buckets: dict[tuple[str, str, bool], dict[int, list[int]]] = defaultdict(
+        lambda: defaultdict(list)
+    )
     worth: dict[tuple[str, str, bool], float] = defaultdict(float)
     for i, channel in channels.items():
         text = plain(channel.name)
@@ -139,7 +218,9 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
             buckets[label][place].append(i)
             own = phase(channel, (letters,)) or phase(channel)
             agrees = own == ("ab", "bc", "ca")[place] or own == "abc"[place]
-            worth[label] = max(worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1))
+            worth[label] = max(
+                worth[label], score + 4 * agrees - 4 * (bool(own) and not agrees and len(own) == 1)
+            )
     result, used = [], set()
     for label in sorted(buckets, key=lambda each: -worth[each]):
         places = buckets[label]
@@ -156,13 +237,17 @@ def _by_name(channels: Mapping[int, Channel], size: int, full: bool, counters: b
 
 
 def _two_may_do(label: tuple[str, str, bool], places: Mapping[int, list[int]], sure: bool) -> bool:
-    """Two voltages AB and BC, or two currents a and c, are enough; two numbered things, or ...V and ...W, are none."""
+    """Two voltages AB and BC, or two currents a and c, are enough; two numbered things, or ...V and
+    ...W, are none.
+    """
     have = {k for k, numbers in places.items() if numbers}
     return len(have) == 2 and (label[2] or (label[1] != "123" and (sure or label[1] != "uvw")))
 
 
 def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
-    """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how likely)."""
+    """Every reading of a name: (the name without the mark, alphabet, whether a pair, 0 to 2, how
+    likely).
+    """
     for letters in ORDERS:
         for mark in pairs(text, letters):
             x, y = mark.places
@@ -173,10 +258,13 @@ def _marks(text: str) -> Iterable[tuple[str, str, bool, int, float]]:
 
 
 def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int, float]]:
-    """The readings of a name with one phase: a mark that stands alone, after a word ("HCSA"), or several times."""
+    """The readings of a name with one phase: a mark that stands alone, after a word ("HCSA"), or
+    several times.
+    """
     digits = letters == DIGITS
     word, glued = (r"\d", r"(?<!\d)") if digits else ("[a-z]", "")
-    marks: dict[int, list[tuple[int, float]]] = defaultdict(list)  # {place: [(where it stands, how likely)]}
+    # {place: [(where it stands, how likely)]}
+    marks: dict[int, list[tuple[int, float]]] = defaultdict(list)
     for match in re.finditer(rf"{glued}[{letters}](?!{word}(?<![ng]))", text):
         at = match.start()
         alone = digits or not text[:at][-1:].isalpha() or text[at - 1] in f"{QUANTITY}l"
@@ -190,7 +278,9 @@ def _single_marks(text: str, letters: str) -> Iterable[tuple[str, str, bool, int
 
 
 def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
-    """Groups by the file's phase column: in order, within a circuit; each channel in the first order that fits."""
+    """Groups by the file's phase column: in order, within a circuit; each channel in the first
+    order that fits.
+    """
     result, used = [], set()
     for letters in ORDERS:
         rows: dict[tuple[str, bool], dict[int, list[int]]] = defaultdict(lambda: defaultdict(list))
@@ -207,8 +297,12 @@ def _by_column(channels: Mapping[int, Channel], size: int) -> list[Group]:
     return result
 
 
-def _sets(places: Mapping[int, list[int]], size: int) -> Iterator[tuple[tuple[int, ...], int | None]]:
-    """Channels, one of each phase, so many together, in the order in which they stand; the phase that is missing."""
+def _sets(
+    places: Mapping[int, list[int]], size: int
+) -> Iterator[tuple[tuple[int, ...], int | None]]:
+    """Channels, one of each phase, so many together, in the order in which they stand; the phase
+    that is missing.
+    """
     for numbers in zip_longest(*(places.get(k, []) for k in range(3))):
         have = tuple(n for n in numbers if n is not None)
         if len(have) == size:
@@ -216,7 +310,9 @@ def _sets(places: Mapping[int, list[int]], size: int) -> Iterator[tuple[tuple[in
 
 
 def shared_name(channels: list[Channel]) -> str:
-    """What the group is called: its circuit where the names say no more, else what the names share."""
+    """What the group is called: its circuit where the names say no more, else what the
+    names share.
+    """
     names = [c.name.strip() for c in channels]
     start = 0
     while start < min(map(len, names)) and len({n[start] for n in names}) == 1:
@@ -226,7 +322,9 @@ def shared_name(channels: list[Channel]) -> str:
         stop += 1
     head, tail = names[0][:start], names[0][len(names[0]) - stop :]
     if len({*map(len, names)}) == 1:  # the mark may stand in several places
-        tail = "".join(c for c, *others in zip(*(n[start:] for n in names), strict=True) if {c} == {*others})
+        tail = "".join(
+            c for c, *others in zip(*(n[start:] for n in names), strict=True) if {c} == {*others}
+        )
     counters = [COUNTER.match(plain(n)) for n in names]
     head = "" if counters[0] and len({counter and counter[0] for counter in counters}) > 1 else head
     head = re.sub(r"(?i)(?:^|(?<=[^a-z]))[uvi]l?$", "", head)
@@ -238,10 +336,13 @@ def shared_name(channels: list[Channel]) -> str:
 
 
 def words(text: str) -> set[str]:
-    """The parts of a name, to be compared with another: words, numbers, single Chinese characters."""
+    """The parts of a name, to be compared with another: words, numbers, single
+    Chinese characters.
+    """
     text = plain(text)
     parts: set[str] = set(re.findall(r"[a-z]+|\d+|[^\W\d_a-z\u2e80-\u9fff]+|[\u2e80-\u9fff]", text))
-    parts |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))  # "2СШ", "T1"
+    # "2СШ", "T1"
+    parts |= set(re.findall(r"\d+[^\W\d_\u2e80-\u9fff]+|[^\W\d_\u2e80-\u9fff]+\d+", text))
     single = {"1", "5"} if re.search(r"[\u2e80-\u9fff][iv](?![a-z])", text) else set()  # "母线I"
     result = {ROMAN.get(word, word) for word in parts if len(word) > 1 or word not in ROMAN}
     return result | {ROMAN[word] for word in parts & {"i", "v"} if ROMAN[word] in single}

@@ -16,9 +16,11 @@ from tractexp.recording.recording import Recording, Segment
 
 @dataclass(frozen=True, eq=False)
 class FeederWaves:
-    """The load's voltages [kV] and as many currents [kA] into it, (2 K, M), read from a segment where sliced.
+    """The load's voltages [kV] and as many currents [kA] into it, (2 K, M), read from a segment
+    where sliced.
 
-    K is 3, or 1 for a single-phase load. `waves[:, a:b]` raises `UserError` where a value is missing.
+    K is 3, or 1 for a single-phase load. `waves[:, a:b]` raises `UserError` where a value is
+    missing.
     """
 
     recording: Recording
@@ -29,7 +31,10 @@ class FeederWaves:
     @classmethod
     def of(cls, recording: Recording, feeder: Feeder, segment: Segment) -> "FeederWaves":
         connection = chosen("connection", feeder.connection)
-        V, I = connection.voltage(), (-1.0 if feeder.reverse_current else 1.0) * connection.current()
+        V, I = (
+            connection.voltage(),
+            (-1.0 if feeder.reverse_current else 1.0) * connection.current(),
+        )
         I = I if feeder.currents else np.zeros((len(V), 0))  # of a bus alone
         sums = np.zeros((len(V) + len(I), V.shape[1] + I.shape[1]))
         sums[: len(V), : V.shape[1]], sums[len(V) :, V.shape[1] :] = V, I
@@ -46,7 +51,9 @@ class FeederWaves:
 
     def __getitem__(self, at: tuple[slice, slice]) -> np.ndarray:
         sums, (first, stop, _) = self.sums[at[0]], at[1].indices(self.shape[1])
-        part = replace(self.segment, first=self.segment.first + first, stop=self.segment.first + stop)
+        part = replace(
+            self.segment, first=self.segment.first + first, stop=self.segment.first + stop
+        )
         waves = np.zeros((len(sums), stop - first))
         for number, weights in zip(self.numbers, sums.T, strict=True):
             if weights.any():
@@ -64,9 +71,12 @@ class FeederWaves:
         delays, skew = [], np.array([self.recording.channels[i].skew for i in self.numbers])
         for used in self.sums != 0:
             if np.ptp(skew[used]) > 1e-9:
-                names = ", ".join(self.recording.channels[i].name for i in np.array(self.numbers)[used])
+                names = ", ".join(
+                    self.recording.channels[i].name for i in np.array(self.numbers)[used]
+                )
                 raise UserError(
-                    f"{DATA.skew}=true: the channels {names} are sampled at different times, and the connection "
+                    f"{DATA.skew}=true: the channels {names} are sampled at different times, and"
+                    " the connection "
                     f"needs them at once; leave {DATA.skew} out"
                 )
             delays.append(skew[used][0])
@@ -82,21 +92,32 @@ def phasors_of(
     harmonics: Sequence[int] = (),
     tracked: dict[int, np.ndarray] | None = None,
 ) -> Phasors:
-    """The phasors of a feeder within one segment, by an estimator: its name, or name and settings; None: the usual one.
+    """The phasors of a feeder within one segment, by an estimator: its name, or name and settings;
+    None: the usual one.
 
-    `skew` corrects what the file says of late channels; `harmonics` are measured besides the fundamental; `tracked` is
-    what the loads of a bus share (`measure`). Raises `UserError` for a segment that is too short, and for harmonics
-    the sampling cannot show.
+    `skew` corrects what the file says of late channels; `harmonics` are measured besides the
+    fundamental; `tracked` is what the loads of a bus share (`measure`). Raises `UserError` for a
+    segment that is too short, and for harmonics the sampling cannot show.
     """
     for h in harmonics:
         if h < 2 or h * 1.1 * recording.frequency >= segment.rate / 2:
             most = int(segment.rate / 2 / 1.1 / recording.frequency)
-            raise UserError(f"{DATA.harmonics}={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}")
+            raise UserError(
+                f"{DATA.harmonics}={[*harmonics]}: at {segment.rate:g} Hz they can be 2 to {most}"
+            )
     waves = FeederWaves.of(recording, feeder, segment)
     try:
         return measure(
-            waves, segment.rate, recording.frequency, segment.start, skew=waves.late if skew else None,
-            window=estimator_of(estimator).averager, harmonics=harmonics, tracked=tracked,
-        )  # fmt: skip
+            waves,
+            segment.rate,
+            recording.frequency,
+            segment.start,
+            skew=waves.late if skew else None,
+            window=estimator_of(estimator).averager,
+            harmonics=harmonics,
+            tracked=tracked,
+        )
     except UserError as error:
-        raise UserError(f"{recording.source}: segment from {segment.start:.3f} s: {error}") from error
+        raise UserError(
+            f"{recording.source}: segment from {segment.start:.3f} s: {error}"
+        ) from error

@@ -1,21 +1,63 @@
-"""The nominal voltages of networks: whether a voltage is one between phases or to ground, by its size alone."""
+"""The nominal voltages of networks: whether a voltage is one between phases or to ground, by its
+size alone.
+"""
 
 import numpy as np
 
 # kV line to line (IEC 60038, EN 50163, China, North America), and 27.5 kV of traction substations
 NOMINAL_VOLTAGES = (
-    0.23, 0.4, 0.48, 0.69, 1.0, 3.0, 3.3, 6.0, 6.6, 10.0, 11.0, 13.8, 15.0, 20.0, 22.0, 25.0, 27.5, 33.0, 35.0, 66.0,
-    69.0, 110.0, 115.0, 132.0, 138.0, 150.0, 161.0, 220.0, 230.0, 275.0, 330.0, 345.0, 380.0, 400.0, 500.0, 765.0,
-)  # fmt: skip
+    0.23,
+    0.4,
+    0.48,
+    0.69,
+    1.0,
+    3.0,
+    3.3,
+    6.0,
+    6.6,
+    10.0,
+    11.0,
+    13.8,
+    15.0,
+    20.0,
+    22.0,
+    25.0,
+    27.5,
+    33.0,
+    35.0,
+    66.0,
+    69.0,
+    110.0,
+    115.0,
+    132.0,
+    138.0,
+    150.0,
+    161.0,
+    220.0,
+    230.0,
+    275.0,
+    330.0,
+    345.0,
+    380.0,
+    400.0,
+    500.0,
+    765.0,
+)
 LARGEST_NOMINAL_DISTANCE = 0.03  # of a nominal voltage: what is nearer has it
 FAR = 0.08  # of every nominal voltage: what is farther has none
 
 
 def off_nominal(voltage: float) -> float:
     """How far a line voltage [kV] is off the nearest nominal one, as a natural logarithm."""
-    return min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES) if voltage > 0 else np.inf
+    return (
+        min(abs(float(np.log(voltage / each))) for each in NOMINAL_VOLTAGES)
+        if voltage > 0
+        else np.inf
+    )
 
 
 def is_between_phases(voltage: float) -> bool:
     """Whether a voltage [kV] is near a nominal one as it stands, and times sqrt 3 near none."""
-    return off_nominal(voltage) < LARGEST_NOMINAL_DISTANCE and off_nominal(np.sqrt(3) * voltage) > FAR
+    return (
+        off_nominal(voltage) < LARGEST_NOMINAL_DISTANCE and off_nominal(np.sqrt(3) * voltage) > FAR
+    )

@@ -30,14 +30,18 @@ LATEST_START = 0.06  # s: three cycles, within which what happened and the dip t
 
 @dataclass(frozen=True)
 class _Bus:
-    """What the loads of one bus have in common, by segment: tracked frequencies, phasors of the voltages."""
+    """What the loads of one bus have in common, by segment: tracked frequencies, phasors of the
+    voltages.
+    """
 
     tracked: dict[Segment, dict[int, np.ndarray]] = field(default_factory=dict)
     phasors: dict[Segment, Phasors] = field(default_factory=dict)
 
     def measure(self, recording: Recording, feeder: Feeder, segment: Segment) -> Phasors:
         """The phasors of a load."""
-        measured = phasors_of(recording, feeder, segment, tracked=self.tracked.setdefault(segment, {}))
+        measured = phasors_of(
+            recording, feeder, segment, tracked=self.tracked.setdefault(segment, {})
+        )
         first = self.phasors.setdefault(segment, measured)
         return replace(measured, t=first.t, V=first.V, f=first.f)
 
@@ -59,17 +63,21 @@ class LoadEvent:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """One load that a file shows: its channels and their phasors by segment, or the record that the file is."""
+    """One load that a file shows: its channels and their phasors by segment, or the record that the
+    file is.
+    """
 
     name: str
     events: tuple[LoadEvent, ...] = ()
     feeder: Feeder | None = None
     phasors: tuple[Phasors, ...] = ()
     record: Record | None = None
-    unexamined: str = ""  # why nothing can be said of what happened to it, one sentence; "" where it was examined
+    # why nothing can be said of what happened to it, one sentence; "" where it was examined
+    unexamined: str = ""
     secondary: bool = False  # its values are secondary, of an unknown ratio: no kV, no MW
     said: tuple[str, ...] = ()  # why parts of it could not be analysed, one sentence each
-    settings: Mapping[str, Any] = field(default_factory=dict)  # by which a reader reads it, without the dips
+    # by which a reader reads it, without the dips
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def loaded(self) -> bool:
@@ -82,10 +90,15 @@ class Sight:
         return [s.dip for s in self.events if s.worth and s.dip is not None]
 
     def choice(self) -> dict[str, Any] | None:
-        """The reader's settings that fit what is worth it, first dip first, others held out; None where nothing is."""
+        """The reader's settings that fit what is worth it, first dip first, others held out; None
+        where nothing is.
+        """
         if not any(s.worth for s in self.events):
             return None
-        return {**self.settings, **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {})}
+        return {
+            **self.settings,
+            **({"train": self.dips[:1], "validate": self.dips[1:]} if self.dips else {}),
+        }
 
     @property
     def per_unit(self) -> bool:
@@ -93,7 +106,8 @@ class Sight:
         return self.record is not None and self.record.base.voltage == self.record.base.power == 1
 
     def powers(self) -> tuple[float, float, float] | None:
-        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else before the first event.
+        """Voltage [kV], P [MW] and Q [Mvar] before the dip that is worth fitting, else before the
+        first event.
 
         Of a load's own steps, what it draws after the last before that. None without measurements.
         """
@@ -103,13 +117,17 @@ class Sight:
                 return event.U0 * base.voltage, event.P0 * base.power, event.Q0 * base.power
         if self.record is not None:
             first, base = slice(0, max(1, self.record.samples // 20)), self.record.base
-            U, P, Q = (float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q))
+            U, P, Q = (
+                float(np.nanmedian(v[first])) for v in (self.record.U, self.record.P, self.record.Q)
+            )
             return U * base.voltage, P * base.power, Q * base.power
         if not self.phasors:
             return None
         p = self.phasors[0]
         changes = [each.what for each in self.events]
-        first = next((what for what in changes if what.kind not in OF_LOADS), changes[0] if changes else None)
+        first = next(
+            (what for what in changes if what.kind not in OF_LOADS), changes[0] if changes else None
+        )
         stop = np.inf if first is None else first.start
         begin = max((what.end for what in changes if what.end < stop), default=-np.inf)
         before = np.flatnonzero((p.t > begin) & (p.t < stop))
@@ -134,7 +152,9 @@ class View:
         """The moment of t = 0, where the file says it."""
         if self.recording is not None:
             return self.recording.start
-        said = (shown.record.identity.get("time") for shown in self.sights if shown.record is not None)
+        said = (
+            shown.record.identity.get("time") for shown in self.sights if shown.record is not None
+        )
         return next((datetime.fromisoformat(moment) for moment in said if moment), None)
 
     @functools.cached_property
@@ -149,7 +169,9 @@ class View:
 
     @functools.cached_property
     def operations(self) -> list[tuple[str, np.ndarray, np.ndarray]]:
-        """Status channels that change (trips, breakers), first change first: name, times [s], state from each on."""
+        """Status channels that change (trips, breakers), first change first: name, times [s], state
+        from each on.
+        """
         if self.recording is None:
             return []
         t = np.concatenate([segment.t for segment in self.recording.segments])
@@ -163,16 +185,24 @@ class View:
         return sorted(courses, key=lambda course: course[1][1])
 
     def powers(self, shown: Sight) -> tuple[float, float, float] | None:
-        """As `Sight.powers`, with the voltage that all loads of a bus have: that of the first that can be fitted.
+        """As `Sight.powers`, with the voltage that all loads of a bus have: that of the first that
+        can be fitted.
 
-        Where none can, it is that of the first with events: only they tell what was before anything happened.
+        Where none can, it is that of the first with events: only they tell what was before anything
+        happened.
         """
         own = shown.powers()
         if shown.feeder is None or own is None:
             return own
         wired = (shown.feeder.voltages, shown.feeder.connection)
-        bus = [s for s in self.sights if s.feeder is not None and (s.feeder.voltages, s.feeder.connection) == wired]
-        telling = next((s for s in bus if s.dips), next((s for s in bus if s.events), bus[0])).powers()
+        bus = [
+            s
+            for s in self.sights
+            if s.feeder is not None and (s.feeder.voltages, s.feeder.connection) == wired
+        ]
+        telling = next(
+            (s for s in bus if s.dips), next((s for s in bus if s.events), bus[0])
+        ).powers()
         return own if telling is None else (telling[0], *own[1:])
 
     @property
@@ -181,12 +211,16 @@ class View:
         for shown in self.sights:
             source = shown.phasors[0] if shown.phasors else shown.record
             if source is not None and source.f is not None:
-                return float(np.median(source.f[LEAST_MEASURED_VOLTAGE * source.U.max() <= source.U]))
+                return float(
+                    np.median(source.f[LEAST_MEASURED_VOLTAGE * source.U.max() <= source.U])
+                )
         return None
 
 
 def view_of(source: str, node: Mapping[str, Any]) -> View:
-    """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be read."""
+    """One file, looked at by the reader that `node` chooses. Raises `UserError` where it cannot be
+    read.
+    """
     reader = build("data", node)
     if not isinstance(reader, WaveformReader):
         table = reader.table()
@@ -201,7 +235,9 @@ def view_of(source: str, node: Mapping[str, Any]) -> View:
 
 
 def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
-    """The loads of a recording as they are proposed, each with what happened to it; `reader` is that of its file."""
+    """The loads of a recording as they are proposed, each with what happened to it; `reader` is
+    that of its file.
+    """
     feeders = propose(recording)
     if not feeders:
         return [sight(reader, recording, bus) for bus in buses_alone(recording)]
@@ -222,17 +258,24 @@ def overview(reader: WaveformReader, recording: Recording) -> list[Sight]:
 
 
 def sight(
-    reader: WaveformReader, recording: Recording, feeder: Feeder, events: bool = True, bus: _Bus | None = None
+    reader: WaveformReader,
+    recording: Recording,
+    feeder: Feeder,
+    events: bool = True,
+    bus: _Bus | None = None,
 ) -> Sight:
-    """The view of one load of a recording. What cannot be analysed is noted in `said`, and raises nothing.
+    """The view of one load of a recording. What cannot be analysed is noted in `said`, and raises
+    nothing.
 
-    Without `events` no event is sought: beside loaded feeders, an unloaded one shows noise only. What loads of
-    the same `bus` share is measured once.
+    Without `events` no event is sought: beside loaded feeders, an unloaded one shows noise only.
+    What loads of the same `bus` share is measured once.
     """
     bus = bus or _Bus()
     phasors, changes, said = [], [], []
     blank = Sight(feeder.name or "load", feeder=feeder, settings=feeder.settings)
-    if feeder.currents and any(in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)):
+    if feeder.currents and any(
+        in_doubt(recording.channels[i]) for i in (*feeder.voltages, *feeder.currents)
+    ):
         try:
             check_doubt(recording, feeder.channels)
         except UserError as error:
@@ -266,8 +309,14 @@ def sight(
     numbered = _number_events(changes, dips, reader.path, refused)
     unexamined = "; ".join(said) if said and not phasors else ""
     secondary = secondary_of(recording, feeder.channels)
-    shown = replace(blank, phasors=tuple(phasors), events=tuple(numbered), said=tuple(said), unexamined=unexamined,
-                    secondary=secondary)  # fmt: skip
+    shown = replace(
+        blank,
+        phasors=tuple(phasors),
+        events=tuple(numbered),
+        said=tuple(said),
+        unexamined=unexamined,
+        secondary=secondary,
+    )
     return replace(shown, said=(*said, *_improbable(reader.path, shown)))
 
 
@@ -289,10 +338,13 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
     """
     power = record.base.power
     changes = [
-        replace(what, before=(power * what.before[0], power * what.before[1]),
-                after=(power * what.after[0], power * what.after[1]))
+        replace(
+            what,
+            before=(power * what.before[0], power * what.before[1]),
+            after=(power * what.after[0], power * what.after[1]),
+        )
         for what in happenings_of(record)
-    ]  # fmt: skip
+    ]
     numbered = list(_number_events(changes, _own(record) if dips is None else dips, record.source))
     if dips is None:
         numbered = [replace(each, dip=None) for each in numbered]
@@ -301,9 +353,17 @@ def sight_of(record: Record, dips: Sequence[FileDip] | None = None) -> Sight:
 
 def _own(record: Record) -> list[FileDip]:
     """The dips of a record that is fitted as it is: its first is the one that is meant."""
-    later, t = UserError("another dip of the record comes first, and is the one that is fitted"), record.t
+    later, t = (
+        UserError("another dip of the record comes first, and is the one that is fitted"),
+        record.t,
+    )
     return [
-        FileDip(number, float(t[a]), float(t[min(b, record.samples - 1)]), record if number == 1 else later)
+        FileDip(
+            number,
+            float(t[a]),
+            float(t[min(b, record.samples - 1)]),
+            record if number == 1 else later,
+        )
         for number, (a, b) in enumerate(find_dips(t, record.U), 1)
     ]
 
@@ -316,8 +376,13 @@ def _number_events(
     for what, number in zip(changes, _numbers(changes, dips), strict=True):
         event, why = _event(results.get(number) if number else None, refused)
         if event is not None and abs(event.t_start - what.start) > LATEST_START:
-            why, event = f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else", None
-        yield LoadEvent(what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: ")))
+            why, event = (
+                f"the reader's dip {number} begins at {event.t_start:.3f} s, with something else",
+                None,
+            )
+        yield LoadEvent(
+            what, number, event, _why(what, event, why.removeprefix(f"{source} dip {number}: "))
+        )
 
 
 def _event(result: Record | UserError | None, refused: str) -> tuple[Event | None, str]:
@@ -332,7 +397,9 @@ def _event(result: Record | UserError | None, refused: str) -> tuple[Event | Non
 
 
 def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int | None]:
-    """For each happening the dip, counted from 1, that shares more of its time with it than with any other."""
+    """For each happening the dip, counted from 1, that shares more of its time with it than with
+    any other.
+    """
     numbers: list[int | None] = [None] * len(changes)
     for dip in dips:
         # a cycle more on either side, for windows blur both
@@ -343,7 +410,13 @@ def _numbers(changes: Sequence[Happening], dips: Sequence[FileDip]) -> list[int 
 
 
 def _why(what: Happening, event: Event | None, refused: str) -> str:
-    """What makes it (not) worth fitting: the event itself, or that it gives no record; what the detection noted."""
+    """What makes it (not) worth fitting: the event itself, or that it gives no record; what the
+    detection noted.
+    """
     if not what.worth:
         return what.why
-    return f"{what.why}; {refused}".removesuffix("; ") if event is not None else f"it gives no record: {refused}"
+    return (
+        f"{what.why}; {refused}".removesuffix("; ")
+        if event is not None
+        else f"it gives no record: {refused}"
+    )

@@ -1,7 +1,8 @@
-"""The marks of phases in names, one vocabulary for tables, phasors and channels: a phase, two phases, ground.
+"""The marks of phases in names, one vocabulary for tables, phasors and channels: a phase, two
+phases, ground.
 
-A, B, C   L1, L2, L3   R, S, T   R, Y, B   R, W, B   U, V, W     AB   L1-L2   U_L1_L2   Ua-Ub   V_R-Y   V12   YB
-AN   L1N   A-G   1-PE     фаза А   A相   fase R     LL, line to line     LN, phase to ground
+A, B, C L1, L2, L3 R, S, T R, Y, B R, W, B U, V, W AB L1-L2 U_L1_L2 Ua-Ub V_R-Y V12 YB AN L1N A-G
+1-PE фаза А A相 fase R LL, line to line LN, phase to ground
 """
 
 import functools
@@ -10,15 +11,20 @@ import unicodedata
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-ORDERS = ("abc", "rst", "uvw", "123", "ryb", "rwb")  # letters that stand for the phases, in their order
+# letters that stand for the phases, in their order
+ORDERS = ("abc", "rst", "uvw", "123", "ryb", "rwb")
 DIGITS = "123"
-CYRILLIC = str.maketrans("авсеіо", "abceio")  # letters that look like Latin ones, as phases are often typed
+# letters that look like Latin ones, as phases are often typed
+CYRILLIC = str.maketrans("авсеіо", "abceio")
 LATIN = {latin: other for other, latin in CYRILLIC.items()}
 QUANTITY = "uvie"  # letters before a phase's: U, V, E of a voltage, I of a current
 GROUND = r"n|g|e|pe|gnd|neutral|ground|earth|neutro|tierra|terre|erde"
 SAID = (  # what is said in words, and the word that stands for it
     (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:l|line|ph|phase)(?![a-z\d])", " ll "),
-    (r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])", " ln "),
+    (
+        r"(?<![a-z])(?:l|line|ph|phase)[- ]?(?:to[- ])?(?:n|g|neutral|ground|earth)(?![a-z\d])",
+        " ln ",
+    ),
     (r"линейн\w*|междуфазн\w*|compuesta|compos[ée]e|verkettet\w*", " ll "),
     (r"фазн\w*|strang\w*|stern", " ln "),
     ("线电压", " ll 电压 "),
@@ -32,7 +38,9 @@ END = rf"(?=(?:rms|mag|ang|avg|max|min|m)?(?![{LETTER}\d]))"
 
 @dataclass(frozen=True)
 class PhaseMark:
-    """One reading of a name: which phases (0, 1, 2) a mark stands for, one or two, and where it stands."""
+    """One reading of a name: which phases (0, 1, 2) a mark stands for, one or two, and where it
+    stands.
+    """
 
     places: tuple[int, ...]
     begin: int
@@ -65,7 +73,9 @@ def _build_beginning(letters: str) -> tuple[str, str]:
 
 
 def pairs(text: str, letters: str) -> Iterator[PhaseMark]:
-    """Each reading of two phases in a plain name; of two digits only where L, a quantity or a dash says so."""
+    """Each reading of two phases in a plain name; of two digits only where L, a quantity or a dash
+    says so.
+    """
     pattern = pair_pattern(letters)
     for match in filter(None, (pattern.match(text, at) for at in range(len(text)))):
         places = letters.index(match[1]), letters.index(match[3])
@@ -78,15 +88,22 @@ def pairs(text: str, letters: str) -> Iterator[PhaseMark]:
 
 
 def quantity_before(text: str, at: int) -> bool:
-    """Whether a quantity, by its letter but for an L or a line below, or by its name, comes right before the mark."""
-    return bool(re.search(rf"(?<![a-z])(?:[{QUANTITY}][_ ]?l?|[uv](?:ll|rms)[_ ]?|{VOLTAGE}[_ ])$", text[:at]))
+    """Whether a quantity, by its letter but for an L or a line below, or by its name, comes right
+    before the mark.
+    """
+    return bool(
+        re.search(
+            rf"(?<![a-z])(?:[{QUANTITY}][_ ]?l?|[uv](?:ll|rms)[_ ]?|{VOLTAGE}[_ ])$", text[:at]
+        )
+    )
 
 
 def spell_marks(name: str, letters: str) -> tuple[str, bool]:
-    """(a name in plain letters with the mark of its phases as a, b, c or ab, bc, ca, whether ground is said).
+    """(a name in plain letters with the mark of its phases as a, b, c or ab, bc, ca, whether ground
+    is said).
 
-    `letters` is the order of phases of the table, in capitals where two letters side by side are no two phases (UU, UV,
-    UW); L1, L2, L3 mean the same in any.
+    `letters` is the order of phases of the table, in capitals where two letters side by side are no
+    two phases (UU, UV, UW); L1, L2, L3 mean the same in any.
     """
     name = unicodedata.normalize("NFKC", name).strip().lower()
     for pattern, word in SAID:
@@ -102,7 +119,9 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
             if re.search(rf"(?:(?<![a-z])|(?<=(?<![a-z])[{QUANTITY}pq]))l$", text[:begin]):
                 begin -= 1
             head = (
-                f"{name[: begin - 1]}u" if re.search(r"(?<![a-z])e$", text[:begin]) else name[:begin]
+                f"{name[: begin - 1]}u"
+                if re.search(r"(?<![a-z])e$", text[:begin])
+                else name[:begin]
             )  # E is a voltage
             glue = "" if head[-1:].isascii() else " "
             return f"{head}{glue}{mark.letters} {name[mark.end :]}", mark.ground
@@ -110,8 +129,12 @@ def spell_marks(name: str, letters: str) -> tuple[str, bool]:
 
 
 def _find_mark(text: str, letters: str) -> PhaseMark | None:
-    """The mark of a name; where U and V are phases, the first letter may be that of the quantity (U U-V, V_W)."""
-    quantity = re.search(r"(?<![a-z])[uv][ _(]*(?=[a-z])", text) if letters.lower() == "uvw" else None
+    """The mark of a name; where U and V are phases, the first letter may be that of the quantity (U
+    U-V, V_W).
+    """
+    quantity = (
+        re.search(r"(?<![a-z])[uv][ _(]*(?=[a-z])", text) if letters.lower() == "uvw" else None
+    )
     if quantity is not None:
         at = quantity.end()
         mark = _first_mark(text[at:], letters)
@@ -121,17 +144,28 @@ def _find_mark(text: str, letters: str) -> PhaseMark | None:
 
 
 def _first_mark(text: str, letters: str) -> PhaseMark | None:
-    """The mark of a name: two phases, else one to ground, else one that is no letter of a quantity by itself."""
+    """The mark of a name: two phases, else one to ground, else one that is no letter of a quantity
+    by itself.
+    """
     digits, alone, letters = letters == DIGITS, letters.isupper(), letters.lower()
     two = next((mark for mark in pairs(text, letters) if _ends(text, mark.end)), None)
     two = None if alone and two is not None and two.end - two.begin == len("uv") else two
     if two is not None:
         return two
-    start = rf"(?:(?<![{LETTER}\d.])|(?<=(?<![a-z])[{QUANTITY}pql])|(?<=(?<![a-z])[{QUANTITY}pq]l)|(?<=rms))"
+    start = (
+        rf"(?:(?<![{LETTER}\d.])|(?<=(?<![a-z])[{QUANTITY}pql])"
+        rf"|(?<=(?<![a-z])[{QUANTITY}pq]l)|(?<=rms))"
+    )
     least = "l" if digits else ""  # "1 N" alone is no mark, "L1 N" and "U1N" are
-    if match := re.search(rf"{start}l?([{letters}])(?:[-_/]?(?:{GROUND}|0)| (?:n|g|pe|gnd)){END}", text):
+    if match := re.search(
+        rf"{start}l?([{letters}])(?:[-_/]?(?:{GROUND}|0)| (?:n|g|pe|gnd)){END}", text
+    ):
         sure = not digits or not match[0].endswith("0")
-        if sure and (not digits or least in text[: match.start() + 1] or quantity_before(text, match.start(1))):
+        if sure and (
+            not digits
+            or least in text[: match.start() + 1]
+            or quantity_before(text, match.start(1))
+        ):
             return PhaseMark((letters.index(match[1]),), *match.span(), ground=True)
     if digits:
         return None

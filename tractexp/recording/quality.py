@@ -23,18 +23,23 @@ SORTED = 1 << 20  # samples among which the least difference of two is sought
 CYCLES_AT_ONCE = 1024  # cycles that are compared at once
 WINDOWS_AT_ONCE = 64  # of ten cycles each
 FEWEST_CALM = 2  # cycles in a row that repeat: one alone is no calm
-LARGEST_REPEAT_DIFFERENCE = 0.2  # of the energy of two cycles: what they differ by at most where one repeats the other
+# of the energy of two cycles: what they differ by at most where one repeats the other
+LARGEST_REPEAT_DIFFERENCE = 0.2
 LARGEST_RMS_DIFFERENCE = 0.05  # by which their RMS differs at most
-AT_WORK = {"voltage": 0.5}  # of the RMS of the largest calm: less is a dead line's, and not the state before an event
+# of the RMS of the largest calm: less is a dead line's, and not the state before an event
+AT_WORK = {"voltage": 0.5}
 IDLE = 0.005  # the same of a current, which a fault multiplies
 
 
 @dataclass(frozen=True)
 class Quality:
-    """The quality of one channel in one segment. Sizes in kV, kA or the channel's own unit; nan: not available."""
+    """The quality of one channel in one segment. Sizes in kV, kA or the channel's own unit; nan:
+    not available.
+    """
 
     rate: float  # Hz
-    jitter: float  # greatest deviation of a time stamp from a uniform grid, in steps; nan without time stamps
+    # greatest deviation of a time stamp from a uniform grid, in steps; nan without time stamps
+    jitter: float
     gaps: int  # samples that have no value, and time stamps that leave a hole
     clipped: float  # share of the samples that are stuck at the greatest or least value
     offset: float  # mean over whole cycles of the quiet part
@@ -43,7 +48,8 @@ class Quality:
     level: float  # RMS of the fundamental in the quiet part
     noise: float  # standard deviation about fundamental and harmonics
     lag: float  # correlation of that noise with itself one sample later: 0 for white noise
-    colour: str  # white, coloured (neighbours alike), blue (neighbours opposite), or "" where it is undecided
+    # white, coloured (neighbours alike), blue (neighbours opposite), or "" where it is undecided
+    colour: str
     thd: float  # of the harmonics up to the 25th over the fundamental
     fit: str  # what it is fit for, one sentence
 
@@ -55,9 +61,11 @@ def quality(
     stamps: tuple[float, int] | None = None,
     network: float | None = None,
 ) -> Quality:
-    """The quality of channel `number` in one segment of a recording, whose time stamps are as `stamped` says.
+    """The quality of channel `number` in one segment of a recording, whose time stamps are as
+    `stamped` says.
 
-    `network` [Hz] is the frequency that the others show; a channel that is no wave of it is measured by itself.
+    `network` [Hz] is the frequency that the others show; a channel that is no wave of it is
+    measured by itself.
     """
     jitter, holes = stamps or measure_stamp_jitter(recording, segment)
     channel = recording.channels[number]
@@ -67,16 +75,31 @@ def quality(
     step, span = _step(channel, x if valid.all() else x[valid])
     f = _frequency(recording, number, segment, network)
     clipped = _measure_clipped_share(channel, x, segment, f or recording.frequency, step)
-    offset, level, noise, lag, count, thd = _quiet(x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE))
+    offset, level, noise, lag, count, thd = _quiet(
+        x, segment.rate, f, AT_WORK.get(channel.quantity, IDLE)
+    )
     colour = _colour(lag, count, noise, step)
     return Quality(
-        segment.rate, jitter, gaps, clipped, offset, step, float(np.log2(span / step + 1)) if step > 0 else 0.0,
-        level, noise, lag, colour, thd, _fit(segment, f, channel.form, gaps, clipped, level, max(noise, step)),
-    )  # fmt: skip
+        segment.rate,
+        jitter,
+        gaps,
+        clipped,
+        offset,
+        step,
+        float(np.log2(span / step + 1)) if step > 0 else 0.0,
+        level,
+        noise,
+        lag,
+        colour,
+        thd,
+        _fit(segment, f, channel.form, gaps, clipped, level, max(noise, step)),
+    )
 
 
 def measure_stamp_jitter(recording: Recording, segment: Segment) -> tuple[float, int]:
-    """(jitter in steps, holes) of the time stamps of a segment; (nan, 0) where the file has none."""
+    """(jitter in steps, holes) of the time stamps of a segment; (nan, 0) where the
+    file has none.
+    """
     stamps = recording.extra.get("stamps")
     if stamps is None or len(stamps) < segment.stop or segment.stop - segment.first < 3:
         return float("nan"), 0
@@ -106,8 +129,12 @@ def _step(channel: Channel, x: np.ndarray) -> tuple[float, float]:
     return (float(steps.min()) if len(steps) else 0.0), span
 
 
-def _measure_clipped_share(channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float) -> float:
-    """Share of samples in runs at a limit: the converter's where the file says it, else the extreme values."""
+def _measure_clipped_share(
+    channel: Channel, x: np.ndarray, segment: Segment, f: float, step: float
+) -> float:
+    """Share of samples in runs at a limit: the converter's where the file says it, else the extreme
+    values.
+    """
     if len(x) < 10 or not np.isfinite(x).any():
         return 0.0
     low, high = float(np.nanmin(x)), float(np.nanmax(x))
@@ -123,20 +150,30 @@ def _measure_clipped_share(channel: Channel, x: np.ndarray, segment: Segment, f:
 
 
 def _blunt(x: np.ndarray, cycle: float, near: float) -> int:
-    """Samples, of so many in a cycle, that a sine's own crest spends within `near` of its peak, and two more."""
+    """Samples, of so many in a cycle, that a sine's own crest spends within `near` of its peak, and
+    two more.
+    """
     amplitude = max(float(np.nanmax(np.abs(x))), 1e-300)
     return 2 + int(2 * np.sqrt(2 * near / amplitude) * cycle / (2 * np.pi))
 
 
 def network_frequency(recording: Recording) -> float | None:
-    """The network's frequency [Hz] as the largest of a recording's channels shows it; None where none does."""
-    f = frequency(recording, [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"])
+    """The network's frequency [Hz] as the largest of a recording's channels shows it; None where
+    none does.
+    """
+    f = frequency(
+        recording, [i for i, c in enumerate(recording.channels) if c.quantity == "voltage"]
+    )
     f = f or frequency(recording, range(len(recording.channels)))
     return f if f is not None and nearest_nominal(f) is not None else None
 
 
-def _frequency(recording: Recording, number: int, segment: Segment, network: float | None) -> float | None:
-    """The network's frequency [Hz] as this channel shows it, else as the others do; None for magnitudes."""
+def _frequency(
+    recording: Recording, number: int, segment: Segment, network: float | None
+) -> float | None:
+    """The network's frequency [Hz] as this channel shows it, else as the others do; None for
+    magnitudes.
+    """
     if segment.rate < FEWEST_PER_CYCLE * 16:
         return None
     seen = snapshots(recording, [number], network) if network else None
@@ -149,10 +186,12 @@ def _frequency(recording: Recording, number: int, segment: Segment, network: flo
 def _quiet(
     x: np.ndarray, rate: float, f: float | None, at_work: float
 ) -> tuple[float, float, float, float, int, float]:
-    """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a wave's first calm.
+    """(mean, fundamental, noise, lag-1 correlation, samples, THD) in the quietest ten cycles of a
+    wave's first calm.
 
-    Mean, fundamental and harmonics are fitted together by least squares over those cycles, each with a slow change
-    of its amplitude, so that neither a drift nor a frequency a little off passes for noise.
+    Mean, fundamental and harmonics are fitted together by least squares over those cycles, each
+    with a slow change of its amplitude, so that neither a drift nor a frequency a little off passes
+    for noise.
     """
     none = float("nan")
     valid = np.isfinite(x)
@@ -179,15 +218,18 @@ def _quiet(
 
 @functools.lru_cache(maxsize=8)
 def _basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
-    """(number of harmonics, orthonormal basis (n, K), what makes weights of coordinates in it (K, K)).
+    """(number of harmonics, orthonormal basis (n, K), what makes weights of coordinates in it (K,
+    K)).
 
-    The columns before they are made orthonormal: mean, drift, cosine and sine of each harmonic, and the fundamental's
-    two with a slow change. All channels of a record share it.
+    The columns before they are made orthonormal: mean, drift, cosine and sine of each harmonic, and
+    the fundamental's two with a slow change. All channels of a record share it.
     """
     t = (np.arange(n) - (n - 1) / 2) / rate
     orders = [h for h in range(1, HARMONICS + 1) if h * f < 0.45 * rate]
     waves = [wave(2 * np.pi * h * f * t) for h in orders for wave in (np.cos, np.sin)]
-    basis = np.column_stack([np.ones(n), t * rate / n, *waves, *(w * t * rate / n for w in waves[:2])])
+    basis = np.column_stack(
+        [np.ones(n), t * rate / n, *waves, *(w * t * rate / n for w in waves[:2])]
+    )
     Q, R = np.linalg.qr(basis)
     return len(orders), Q, np.linalg.pinv(R)
 
@@ -195,7 +237,8 @@ def _basis(n: int, rate: float, f: float) -> tuple[int, np.ndarray, np.ndarray]:
 def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
     """The first cycles in a row that repeat, of a wave that is at work; all of it where none do.
 
-    What comes after a fault or a trip is another state, however quiet, and a fault is quiet for its size.
+    What comes after a fault or a trip is another state, however quiet, and a fault is quiet for its
+    size.
     """
     blocks = x[: len(x) // cycle * cycle].reshape(-1, cycle)
     energy, changed = _variances(blocks)
@@ -207,21 +250,29 @@ def _calm(x: np.ndarray, cycle: int, at_work: float) -> slice:
     size = [float(np.sqrt(np.median(energy[a : b + 1]))) for a, b in spans]
     for (a, b), rms in zip(spans, size, strict=True):
         if rms >= at_work * max(size):
-            first, last = a + (a > 0), b + (b == len(alike))  # an edge may hold a part of what comes before or after
+            # an edge may hold a part of what comes before or after
+            first, last = a + (a > 0), b + (b == len(alike))
             return slice(first * cycle, len(x) if b == len(alike) else max(last, first + 2) * cycle)
     return whole
 
 
 def _variances(cycles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Variances of cycles (M, n), (M,), and of what each differs by from the one before, (M - 1,); some at a time."""
-    parts = [cycles[max(first - 1, 0) : first + CYCLES_AT_ONCE] for first in range(0, len(cycles), CYCLES_AT_ONCE)]
+    """Variances of cycles (M, n), (M,), and of what each differs by from the one before, (M - 1,);
+    some at a time.
+    """
+    parts = [
+        cycles[max(first - 1, 0) : first + CYCLES_AT_ONCE]
+        for first in range(0, len(cycles), CYCLES_AT_ONCE)
+    ]
     own = [part[min(k, 1) :].var(axis=1) for k, part in enumerate(parts)]
     changed = [np.diff(part, axis=0).var(axis=1) for part in parts]
     return np.concatenate([np.empty(0), *own]), np.concatenate([np.empty(0), *changed])
 
 
 def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
-    """First sample of the span of n in which the wave repeats best from one cycle to the next, for its energy."""
+    """First sample of the span of n in which the wave repeats best from one cycle to the next, for
+    its energy.
+    """
     if len(x) <= n + cycle:
         return 0
     change = np.nan_to_num((x[cycle:] - x[:-cycle]) ** 2, nan=np.inf)
@@ -229,11 +280,17 @@ def _quietest(x: np.ndarray, n: int, cycle: int) -> int:
     filled = np.nan_to_num(x)
     energy = n * _measure_windows(filled, n, starts, np.var)
     changed = _measure_windows(change, n, starts, np.sum)
-    return int(starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))])
+    return int(
+        starts[np.argmin(np.where(energy > 0, changed / np.maximum(energy, 1e-300), np.inf))]
+    )
 
 
-def _measure_windows(x: np.ndarray, n: int, starts: np.ndarray, measure: Callable[..., np.ndarray]) -> np.ndarray:
-    """Return `measure` of the n samples from each start on, (k,); some at a time, for they overlap."""
+def _measure_windows(
+    x: np.ndarray, n: int, starts: np.ndarray, measure: Callable[..., np.ndarray]
+) -> np.ndarray:
+    """Return `measure` of the n samples from each start on, (k,); some at a time, for
+    they overlap.
+    """
     windows = np.lib.stride_tricks.sliding_window_view(x, n)
     parts = [
         measure(windows[starts[first : first + WINDOWS_AT_ONCE]], axis=1)
@@ -243,7 +300,9 @@ def _measure_windows(x: np.ndarray, n: int, starts: np.ndarray, measure: Callabl
 
 
 def _colour(lag: float, count: int, noise: float, step: float) -> str:
-    """The color of the noise by its lag-1 correlation, where there is more noise than the converter's rounding."""
+    """The color of the noise by its lag-1 correlation, where there is more noise than the
+    converter's rounding.
+    """
     if not np.isfinite(lag) or count < 50 or noise <= 0.2 * step:
         return ""
     if abs(lag) * np.sqrt(count) < WHITE:
@@ -251,7 +310,15 @@ def _colour(lag: float, count: int, noise: float, step: float) -> str:
     return "coloured" if lag > 0 else "blue"
 
 
-def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float, level: float, noise: float) -> str:
+def _fit(
+    segment: Segment,
+    f: float | None,
+    form: str,
+    gaps: int,
+    clipped: float,
+    level: float,
+    noise: float,
+) -> str:
     """What the channel is fit for, one sentence."""
     if form != "waveform":
         return f"holds {form} values, no waveform: fit for what they say, not for phasors"
@@ -264,14 +331,21 @@ def _fit(segment: Segment, f: float | None, form: str, gaps: int, clipped: float
     if gaps:
         return f"{gaps} gaps: fit for phasors where there are none"
     if clipped > FEW_CLIPPED:
-        return f"{100 * clipped:.2g} % of the samples are clipped: fit for phasors outside those cycles only"
+        return (
+            f"{100 * clipped:.2g} % of the samples are clipped: fit for phasors outside those"
+            " cycles only"
+        )
     if segment.rate < WAVES:
-        return f"fit for phasors; {segment.rate:g} Hz is too slow for waves, which need {WAVES:g} Hz"
+        return (
+            f"fit for phasors; {segment.rate:g} Hz is too slow for waves, which need {WAVES:g} Hz"
+        )
     return "fit for phasors and for waves"
 
 
 def spectrum(wave: np.ndarray, rate: float) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies (M,) [Hz] and RMS values (M,) of a wave (N,), by a Hann window (a sinusoid is right at its peak)."""
+    """Frequencies (M,) [Hz] and RMS values (M,) of a wave (N,), by a Hann window (a sinusoid is
+    right at its peak).
+    """
     window = np.hanning(len(wave) + 1)[:-1]
     lines = np.fft.rfft((wave - wave.mean()) * window)
     return np.fft.rfftfreq(len(wave), 1 / rate), np.sqrt(2) * np.abs(lines) / window.sum()

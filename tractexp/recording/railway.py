@@ -1,7 +1,9 @@
-"""What railways are fed by: contact line with negative feeder or return conductor, and direct current.
+"""What railways are fed by: contact line with negative feeder or return conductor, and direct
+current.
 
-A contact line and a negative feeder have opposite voltages; both carry a part of one load. A return conductor carries
-back what the contact line brings, and is no load. A direct voltage is no load's that is modelled here.
+A contact line and a negative feeder have opposite voltages; both carry a part of one load. A return
+conductor carries back what the contact line brings, and is no load. A direct voltage is no load's
+that is modelled here.
 """
 
 import re
@@ -19,7 +21,9 @@ TURNED = 40.0  # degrees off 180 that the currents of the two conductors are at 
 BETWEEN = (45.0, 62.0)  # kV: a voltage between contact line and negative feeder, of 2x25 kV
 EACH = (20.0, 31.0)  # kV: a voltage of either of them to the rail
 RETURN = re.compile(r"return|retour|rück|(?<![a-z])(?:rc|ret|rail|rl|bt)(?![a-z])|обратн|回流|回线")
-CONTACT = re.compile(r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс")
+CONTACT = re.compile(
+    r"cat|contact|cont|ocl|ohl|trolley|oberleit|fahrleit|(?<![a-z])[tck](?![a-z])|контакт|接触|кс"
+)
 FEED = re.compile(r"feed|neg|(?<![a-z])(?:nf|af|f|n)(?![a-z])|speise|питающ|负馈|正馈|馈线")
 DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
 RIPPLE_SECONDS = 0.02  # s over which its ripple is averaged out
@@ -28,7 +32,9 @@ LONGEST = 1 << 20  # samples that are looked at
 
 
 def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] | None:
-    """The first two voltages of 25 kV that are opposite to each other while they are alive; None where none are."""
+    """The first two voltages of 25 kV that are opposite to each other while they are alive; None
+    where none are.
+    """
     volts = [i for i in volts if EACH[0] <= phasors.size([i]) <= EACH[1]]
     for k, first in enumerate(volts):
         for second in volts[k + 1 :]:
@@ -48,8 +54,12 @@ def is_opposite(phasors: Snapshots, first: int, second: int, most: float = OPPOS
 def conductor_pairs(
     recording: Recording, phasors: Snapshots, volts: Sequence[int], amps: Sequence[int]
 ) -> list[tuple[int, int]]:
-    """(contact line, negative feeder) currents that belong to `volts`, one voltage each or the one between them."""
-    names = {i: plain(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps}
+    """(contact line, negative feeder) currents that belong to `volts`, one voltage each or the one
+    between them.
+    """
+    names = {
+        i: plain(f"{recording.channels[i].name} {recording.channels[i].circuit}") for i in amps
+    }
     feeds = [i for i in amps if FEED.search(names[i]) and not RETURN.search(names[i])]
     contacts = [i for i in amps if i not in feeds and not RETURN.search(names[i])]
     if len(contacts) == len(feeds):
@@ -60,7 +70,9 @@ def conductor_pairs(
 
 
 def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, int]) -> bool:
-    """Whether two currents are opposite in angle, as those of contact line and feeder are, though not in size."""
+    """Whether two currents are opposite in angle, as those of contact line and feeder are, though
+    not in size.
+    """
     if len(volts) == 1 and not BETWEEN[0] <= phasors.size(volts) <= BETWEEN[1]:
         return False
     return _opposite_angles(phasors, pair)
@@ -68,17 +80,26 @@ def _carry_one_load(phasors: Snapshots, volts: Sequence[int], pair: tuple[int, i
 
 def _opposite_angles(phasors: Snapshots, pair: tuple[int, int]) -> bool:
     x, y = np.nan_to_num(phasors.of(pair))
-    both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (np.abs(y) > 0.3 * np.abs(y).max(initial=0.0))
+    both = (np.abs(x) > 0.3 * np.abs(x).max(initial=0.0)) & (
+        np.abs(y) > 0.3 * np.abs(y).max(initial=0.0)
+    )
     both &= (np.abs(x) > 0) & (np.abs(y) > 0)
     return bool(both.any() and abs(np.degrees(np.angle(-np.median((x * y.conj())[both])))) < TURNED)
 
 
-def other_conductor(recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]) -> int | None:
-    """The current of the other conductor of an autotransformer feeder, by name and angle; None where there is none."""
+def other_conductor(
+    recording: Recording, phasors: Snapshots, current: int, amps: Sequence[int]
+) -> int | None:
+    """The current of the other conductor of an autotransformer feeder, by name and angle; None
+    where there is none.
+    """
     name = plain(recording.channels[current].name)
     for other in amps:
         names = name, plain(recording.channels[other].name)
-        feeds, contacts = [bool(FEED.search(n)) for n in names], [bool(CONTACT.search(n)) for n in names]
+        feeds, contacts = (
+            [bool(FEED.search(n)) for n in names],
+            [bool(CONTACT.search(n)) for n in names],
+        )
         apart = feeds[0] != feeds[1] and contacts[feeds.index(False)]
         if other != current and apart and _opposite_angles(phasors, (current, other)):
             return other
@@ -99,8 +120,14 @@ def contact_first(recording: Recording, pair: tuple[int, int]) -> tuple[int, int
 
 
 def direct_voltage(recording: Recording) -> str:
-    """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else ""."""
-    volts = [c for c in recording.channels if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)]
+    """What is said of a recording whose voltages are direct: mean, ripple and dip, one clause; else
+    "".
+    """
+    volts = [
+        c
+        for c in recording.channels
+        if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)
+    ]
     segment = max(recording.segments, key=lambda s: s.stop - s.first)
     n, said = max(3, round(RIPPLE_SECONDS * segment.rate)) | 1, ""
     for channel in volts:
@@ -127,7 +154,9 @@ def direct_voltage(recording: Recording) -> str:
             else ""
         )
         said = said or (
-            f"the voltage '{channel.name.strip()}' is direct: {1000 * mean:.4g} V in the mean with a ripple of "
-            f"{ripple / abs(mean):.1%} RMS{dip}; the models here are those of loads at alternating voltage"
+            f"the voltage '{channel.name.strip()}' is direct: {1000 * mean:.4g} V in the mean with"
+            " a ripple of "
+            f"{ripple / abs(mean):.1%} RMS{dip}; the models here are those of loads at alternating"
+            " voltage"
         )
     return said

@@ -24,47 +24,66 @@ from tractexp.recording.unit import check_doubt, check_units, in_units
 from tractexp.wording import count_noun
 
 Stream = tuple[Phasors, Sequence[Waves]]  # of segments that follow each other without a gap
-BESIDE = 2  # cycles of waveforms stored beside a record's phasors, for the windows of its first and last
+# cycles of waveforms stored beside a record's phasors, for the windows of its first and last
+BESIDE = 2
 BEFORE = 3  # cycles of one sampling rate before a dip that its waveforms have at least
 COUNT = {1: "one", 2: "two", 3: "three"}
 
 
 @dataclass(frozen=True, kw_only=True)
 class WaveformReader(Reader):
-    """Base of the readers of waveform files. A plugin reads the file; which load, which dips, is common to all."""
+    """Base of the readers of waveform files. A plugin reads the file; which load, which dips, is
+    common to all.
+    """
 
     quantities: ClassVar[Sequence[str]] = ("U", "I")  # that `units` may name
 
     path: str = ""  # the file
-    voltages: list[Any] = field(default_factory=list)  # channels in the order a, b, c: numbers from 0, or names
+    # channels in the order a, b, c: numbers from 0, or names
+    voltages: list[Any] = field(default_factory=list)
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
-    units: dict[str, str] = field(default_factory=dict)  # {U: kV, I: A} where the file does not say, or says wrongly
-    connection: Any = None  # how the channels are connected, a name or name and settings; null: by how many they are
+    # {U: kV, I: A} where the file does not say, or says wrongly
+    units: dict[str, str] = field(default_factory=dict)
+    # how the channels are connected, a name or name and settings; null: by how many they are
+    connection: Any = None
     estimator: Any = None  # of the phasors, a name or name and settings; null: one cycle
-    harmonics: list[int] = field(default_factory=list)  # whose powers P_h, with THD_u and THD_i, the record holds
+    # whose powers P_h, with THD_u and THD_i, the record holds
+    harmonics: list[int] = field(default_factory=list)
     train: list[int] | None = None  # dips to fit; null: the first that can be used
     validate: list[int] | None = None  # dips held out; null: every other one that can be used
     pre: float = 1.0  # s of the record before a dip starts, at most
     post: float = 10.0  # s of the record after a dip starts, at most
-    reverse_current: bool = False  # true where the recorder counts current out of the load as positive
+    # true where the recorder counts current out of the load as positive
+    reverse_current: bool = False
     skew: bool = False  # true: correct the time skew of each channel that the file states
 
     def opened(self) -> Recording:
         """The file, its units and the nominal frequency that its voltages really have."""
         recording = self.recording()
         keys = {"U": "voltages", "I": "currents"}
-        numbers = {x: [recording.number(i, f"data.{key}") for i in getattr(self, key)] for x, key in keys.items()}
+        numbers = {
+            x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
+            for x, key in keys.items()
+        }
         recording, chosen = in_units(recording, self.units, numbers), numbers["U"]
-        every = [i for i, c in enumerate(recording.channels) if c.quantity == "voltage" and c.form == "waveform"]
+        every = [
+            i
+            for i, c in enumerate(recording.channels)
+            if c.quantity == "voltage" and c.form == "waveform"
+        ]
         return tune_frequency(recording, chosen or every)
 
     @abstractmethod
     def recording(self) -> Recording:
-        """The file as it was recorded, all channels; raises `UserError` naming the file, the place and the value."""
+        """The file as it was recorded, all channels; raises `UserError` naming the file, the place
+        and the value.
+        """
 
     def check(self) -> None:
         if not self.path:
-            raise UserError(f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}")
+            raise UserError(
+                f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}"
+            )
         check_units(self.units, self.quantities)
         check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)
@@ -73,16 +92,27 @@ class WaveformReader(Reader):
     def read(self) -> Events:
         recording = self.opened()
         feeder = self.feeder(recording)
-        dips = self.dips(feeder, self._streams(recording, feeder), recording.frequency, recording.trigger)
-        events = chosen(self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips))
+        dips = self.dips(
+            feeder, self._streams(recording, feeder), recording.frequency, recording.trigger
+        )
+        events = chosen(
+            self.path, dips, self.train, self.validate, self._notes(recording, feeder, dips)
+        )
         identity = _identity(recording, feeder)
         groups = (events.train, events.validate)
-        return Events(*([_in_memory(replace(r, identity=identity)) for r in group] for group in groups))
+        return Events(
+            *([_in_memory(replace(r, identity=identity)) for r in group] for group in groups)
+        )
 
     def dips(
-        self, feeder: Feeder, streams: Sequence[Stream], frequency: float, trigger: float | None = None
+        self,
+        feeder: Feeder,
+        streams: Sequence[Stream],
+        frequency: float,
+        trigger: float | None = None,
     ) -> list[FileDip]:
-        """The dips of one load, on one base: voltage and apparent power before the first that can be used.
+        """The dips of one load, on one base: voltage and apparent power before the first that can
+        be used.
 
         Raises `UserError` where there is none, and where the load carries no power.
         """
@@ -91,15 +121,22 @@ class WaveformReader(Reader):
         waves = [each for _, several in streams if len(several) > 1 for each in several]
         file_dips = [replace(dip, result=_with_waves(dip, waves, frequency)) for dip in file_dips]
         if not file_dips:
-            detect(max(wholes, key=lambda whole: whole.samples))  # raises, and says what there is instead
+            # raises, and says what there is instead
+            detect(max(wholes, key=lambda whole: whole.samples))
         first = next((dip.result for dip in file_dips if isinstance(dip.result, Record)), None)
         if first is None:
             return file_dips
         U, S = level(first)
         if S < 1e-6:
-            raise UserError(f"{self.path}: {DATA.currents} carry no power before the first dip ({1e6 * S:.2g} VA)")
+            raise UserError(
+                f"{self.path}: {DATA.currents} carry no power before the first dip ({1e6 * S:.2g}"
+                " VA)"
+            )
         check_load(self.path, U, S)
-        return [replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD))) for dip in file_dips]
+        return [
+            replace(dip, result=_per_unit(dip.result, Base(U, S, frequency, LOAD)))
+            for dip in file_dips
+        ]
 
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
@@ -130,17 +167,24 @@ class WaveformReader(Reader):
             channels, where = getattr(self, key), setting(f"data.{key}")
             if len(channels) != wanted:
                 raise UserError(
-                    f"{where}={[*channels]} must name {COUNT[wanted]} channels ({DATA.connection}={connection.name}); "
+                    f"{where}={[*channels]} must name {COUNT[wanted]} channels"
+                    f" ({DATA.connection}={connection.name}); "
                     f"{recording.source} has "
-                    + ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
+                    + ", ".join(
+                        f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels)
+                    )
                 )
             numbers[key] = tuple(recording.number(each, f"data.{key}") for each in channels)
             if len(set(numbers[key])) < wanted:
-                raise UserError(f"{where}={[*channels]} names a channel twice; {wanted} different ones are needed")
+                raise UserError(
+                    f"{where}={[*channels]} names a channel twice; {wanted} different ones are"
+                    " needed"
+                )
             for i in numbers[key]:
                 if recording.channels[i].quantity not in (key.removesuffix("s"), ""):
                     raise UserError(
-                        f"{where}: channel {i} '{recording.channels[i].name}' of {recording.source} is in "
+                        f"{where}: channel {i} '{recording.channels[i].name}' of {recording.source}"
+                        " is in "
                         f"{recording.channels[i].unit}; choose {key}"
                     )
         feeder = Feeder(**numbers, connection=name, reverse_current=self.reverse_current)
@@ -150,37 +194,62 @@ class WaveformReader(Reader):
     def _usual(self, recording: Recording) -> Any:
         """The connection that the number of channels says; two voltages to ground say none."""
         counts = len(self.voltages), len(self.currents)
-        channels = [recording.channels[recording.number(each, "data.voltages")] for each in self.voltages]
+        channels = [
+            recording.channels[recording.number(each, "data.voltages")] for each in self.voltages
+        ]
         labels = order(channels) if counts[0] == 2 else None
         two = counts[0] == 2 and not (labels and not labels[1])
         return usual(*counts, lines=two) or usual(3, 3)
 
     def _only(self, recording: Recording) -> Feeder:
-        """The only load that the file shows. Raises `UserError` naming all, where there is not one."""
+        """The only load that the file shows. Raises `UserError` naming all, where
+        there is not one.
+        """
         proposed = [feeder for feeder in propose(recording) if feeder.loaded]
         if len(proposed) == 1:
             (only,) = proposed
-            channels = ", ".join(recording.channels[i].name for i in (*only.voltages, *only.currents))
-            why = (f"channels chosen by themselves, for they are the only load in the file: {channels}", *only.why)
+            channels = ", ".join(
+                recording.channels[i].name for i in (*only.voltages, *only.currents)
+            )
+            why = (
+                "channels chosen by themselves, for they are the only load in the file:"
+                f" {channels}",
+                *only.why,
+            )
             check_doubt(recording, only.channels)
             reverse = only.reverse_current != self.reverse_current
             return arrange_feeder(recording, replace(only, reverse_current=reverse, why=why))
         if not proposed:
-            every = ", ".join(f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels))
-            noted = f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
-            remedy = f"{DATA.voltages} and {DATA.currents} name one; " if can_be_named(recording) else ""
+            every = ", ".join(
+                f"{i} '{c.name}' [{c.unit}]" for i, c in enumerate(recording.channels)
+            )
+            noted = (
+                f" (noted while reading: {'; '.join(recording.notes)})" if recording.notes else ""
+            )
+            remedy = (
+                f"{DATA.voltages} and {DATA.currents} name one; " if can_be_named(recording) else ""
+            )
             raise UserError(
-                f"{recording.source} shows no load by itself: {explain_unrecognized(recording)}{noted}; {remedy}its channels: "
+                f"{recording.source} shows no load by itself:"
+                f" {explain_unrecognized(recording)}{noted}; {remedy}its channels: "
                 f"{every}"
             )
         loads = "; ".join(
             f"{f.name}: "
-            + quoting.shell(*(format_assignment(setting(f"data.{key}"), value) for key, value in f.settings.items()))
+            + quoting.shell(
+                *(
+                    format_assignment(setting(f"data.{key}"), value)
+                    for key, value in f.settings.items()
+                )
+            )
             for f in proposed
         )
-        asked = "".join(f"{question}; " for question in sorted({f.question for f in proposed if f.question}))
+        asked = "".join(
+            f"{question}; " for question in sorted({f.question for f in proposed if f.question})
+        )
         raise UserError(
-            f"{DATA.voltages} and {DATA.currents} are missing, and {recording.source} shows {len(proposed)} loads; "
+            f"{DATA.voltages} and {DATA.currents} are missing, and {recording.source} shows"
+            f" {len(proposed)} loads; "
             f"{asked}choose one: {loads}"
         )
 
@@ -207,11 +276,17 @@ class WaveformReader(Reader):
             raise short[0]
         return streams
 
-    def _notes(self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]) -> tuple[str, ...]:
+    def _notes(
+        self, recording: Recording, feeder: Feeder, dips: Sequence[FileDip]
+    ) -> tuple[str, ...]:
         kind = estimator_of(self.estimator).name.replace("_", "-")
         steps = [dip.result.step for dip in dips if isinstance(dip.result, Record)]
         every = f" every {1000 * steps[0]:.3g} ms" if steps else ""
-        notes = [f"{kind} phasors{every}, {count_noun(len(dips), 'dip')}", *recording.notes, *feeder.why]
+        notes = [
+            f"{kind} phasors{every}, {count_noun(len(dips), 'dip')}",
+            *recording.notes,
+            *feeder.why,
+        ]
         fast = recording.waveforms()
         slow = [s for s in recording.segments if s not in fast]
         if slow:
@@ -220,7 +295,10 @@ class WaveformReader(Reader):
         chosen = [recording.channels[i] for i in (*feeder.voltages, *feeder.currents)]
         skew = max(abs(channel.skew) for channel in chosen)
         if skew > 0 and not self.skew:
-            notes.append(f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true does)")
+            notes.append(
+                f"time skew of up to {1e6 * skew:.3g} microseconds not corrected (data.skew=true"
+                " does)"
+            )
         return tuple(notes)
 
 
@@ -235,7 +313,9 @@ def _identity(recording: Recording, feeder: Feeder) -> dict[str, str]:
 
 
 def _with_waves(dip: FileDip, waves: Sequence[Waves], frequency: float) -> Record | UserError:
-    """The record of a dip with the waves that show it from before its start to its end, of several sampling rates."""
+    """The record of a dip with the waves that show it from before its start to its end, of several
+    sampling rates.
+    """
     if isinstance(dip.result, UserError) or dip.result.waves is not None:
         return dip.result
     lead = BEFORE / frequency
@@ -256,6 +336,8 @@ def _per_unit(record: Record | UserError, base: Base) -> Record | UserError:
     if isinstance(record, UserError):
         return record
     try:
-        return replace(record, base=base, more=base.per_unit(record.more), **base.per_unit(record.channels)).check()
+        return replace(
+            record, base=base, more=base.per_unit(record.more), **base.per_unit(record.channels)
+        ).check()
     except UserError as error:
         return error

@@ -1,7 +1,7 @@
 """A file as its instrument recorded it: channels, sampling rates, times; primary values on demand.
 
-Readers of files make a `Recording` and nothing else; which channels make up a load, and its events, follow
-from it (`feeder`, `happening`), whatever the format was.
+Readers of files make a `Recording` and nothing else; which channels make up a load, and its events,
+follow from it (`feeder`, `happening`), whatever the format was.
 """
 
 import re
@@ -19,15 +19,28 @@ from tractexp.errors import UserError, nearest, setting
 UNITS: Mapping[str, tuple[str, float]] = {
     f"{prefix}{name}": (quantity, factor)
     for quantity, units in {
-        "voltage": {"v": "", "volt": "kilo milli", "volts": "kilo milli", "вольт": "кило милли", "伏": "千 毫"},
+        "voltage": {
+            "v": "",
+            "volt": "kilo milli",
+            "volts": "kilo milli",
+            "вольт": "кило милли",
+            "伏": "千 毫",
+        },
         "current": {
-            "a": "", "amp": "kilo milli", "amps": "kilo milli", "ampere": "kilo milli", "amperes": "kilo milli",
-            "ампер": "кило милли", "安": "千 毫",
+            "a": "",
+            "amp": "kilo milli",
+            "amps": "kilo milli",
+            "ampere": "kilo milli",
+            "amperes": "kilo milli",
+            "ампер": "кило милли",
+            "安": "千 毫",
         },
     }.items()
     for name, prefixes in units.items()
-    for prefix, factor in zip(["", *(prefixes.split() or ("k", "m"))], (1e-3, 1.0, 1e-6), strict=True)
-}  # fmt: skip
+    for prefix, factor in zip(
+        ["", *(prefixes.split() or ("k", "m"))], (1e-3, 1.0, 1e-6), strict=True
+    )
+}
 MEGA = {"MV": ("voltage", 1e3), "MA": ("current", 1e3)}  # which small letters would make milli
 CYRILLIC = str.maketrans("вВаАкКмМ", "vVaAkKmM")  # кВ, А
 UNBROKEN = 1.0  # cycle: a shorter hole between two sampling rates leaves one record
@@ -43,14 +56,18 @@ def unit_of(text: str) -> tuple[str, float]:
 
 
 def quantity_of(text: str) -> str:
-    """The quantity of a unit as a file writes it, also of several ("V/kV"), where the size stays open; "" of others."""
+    """The quantity of a unit as a file writes it, also of several ("V/kV"), where the size stays
+    open; "" of others.
+    """
     quantities = {unit_of(part)[0] for part in re.split(r"[/|;]", text)}
     return quantities.pop() if len(quantities) == 1 else ""
 
 
 @dataclass(frozen=True)
 class Segment:
-    """Samples of one rate: numbers from `first` up to but not including `stop`, from `start` [s] on."""
+    """Samples of one rate: numbers from `first` up to but not including `stop`, from `start` [s]
+    on.
+    """
 
     first: int
     stop: int
@@ -65,22 +82,28 @@ class Segment:
     def between(self, start: float, end: float) -> "Segment":
         """The part of it from time `start` up to `end` [s]."""
         first, stop = (
-            min(max(int(np.ceil((t - self.start) * self.rate - 1e-6)), 0), self.stop - self.first) for t in (start, end)
+            min(max(int(np.ceil((t - self.start) * self.rate - 1e-6)), 0), self.stop - self.first)
+            for t in (start, end)
         )
-        return Segment(self.first + first, self.first + stop, self.rate, self.start + first / self.rate)
+        return Segment(
+            self.first + first, self.first + stop, self.rate, self.start + first / self.rate
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One measured quantity: value = (gain raw + offset) in `unit`, times `ratio` on the primary side.
+    """One measured quantity: value = (gain raw + offset) in `unit`, times `ratio` on the primary
+    side.
 
-    `raw` (N,) is as the file stores it, a view where possible: ten minutes of waveforms are held once, as integers.
+    `raw` (N,) is as the file stores it, a view where possible: ten minutes of waveforms are held
+    once, as integers.
     """
 
     name: str
     raw: np.ndarray
     unit: str = ""  # as the file writes it
-    quantity: str = ""  # voltage, current, power, reactive_power, frequency, angle; "" for anything else
+    # voltage, current, power, reactive_power, frequency, angle; "" for anything else
+    quantity: str = ""
     phase: str = ""  # as the file labels it: A, L1, AB, N, ...
     circuit: str = ""  # what it is measured on, as the file says
     gain: float = 1.0
@@ -89,11 +112,14 @@ class Channel:
     skew: float = 0.0  # s that a sample is taken later than its time stamp
     limits: tuple[float, float] | None = None  # least and greatest raw value of the converter
     missing: float | None = None  # the raw value that stands for none; nan always does
-    side: str = ""  # S: secondary values whose ratio the file does not give; ?: the file cannot say which they are
+    # S: secondary values whose ratio the file does not give; ?: the file cannot say which they are
+    side: str = ""
     form: str = "waveform"  # or magnitude (RMS), peak, angle, value: samples that are no waveform
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
-        """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit); nan where missing."""
+        """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit);
+        nan where missing.
+        """
         primary = self.recorded(first, stop)
         primary *= self.ratio * self.factor
         return primary
@@ -119,7 +145,8 @@ class Channel:
 class StatusChannel:
     """One binary channel: contacts, trips, breaker positions.
 
-    `raw` (N,) is 0 or 1, or the words of which bit `bit` is meant: a hundred channels share the file's few words.
+    `raw` (N,) is 0 or 1, or the words of which bit `bit` is meant: a hundred channels share the
+    file's few words.
     """
 
     name: str
@@ -132,12 +159,18 @@ class StatusChannel:
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """States (M,), 0 or 1."""
         raw = np.asarray(self.raw[first:stop])
-        return (raw != 0).astype(np.uint8) if self.bit is None else ((raw >> self.bit) & 1).astype(np.uint8)
+        return (
+            (raw != 0).astype(np.uint8)
+            if self.bit is None
+            else ((raw >> self.bit) & 1).astype(np.uint8)
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """What one file holds. Channels have equal lengths; each segment of them is sampled uniformly."""
+    """What one file holds. Channels have equal lengths; each segment of them is
+    sampled uniformly.
+    """
 
     source: str  # the path, as messages name it
     channels: Sequence[Channel]
@@ -149,19 +182,23 @@ class Recording:
     trigger: float | None = None  # s since the first sample
     status: Sequence[StatusChannel] = ()
     notes: Sequence[str] = ()  # what was mended while reading, with the line
-    extra: Mapping[str, Any] = field(default_factory=dict)  # what the format has besides, for a round trip
+    # what the format has besides, for a round trip
+    extra: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def samples(self) -> int:
         return len(self.channels[0].raw)
 
     def waveforms(self) -> list[Segment]:
-        """The segments sampled fast enough to hold a waveform; raises `UserError` when there is none."""
+        """The segments sampled fast enough to hold a waveform; raises `UserError` when there is
+        none.
+        """
         fast = [s for s in self.segments if s.rate >= FEWEST_PER_CYCLE * self.frequency]
         if not fast:
             rates = ", ".join(f"{s.rate:g} Hz" for s in self.segments)
             raise UserError(
-                f"{self.source}: sampled at {rates}: no waveform, for which {FEWEST_PER_CYCLE} samples per cycle of "
+                f"{self.source}: sampled at {rates}: no waveform, for which {FEWEST_PER_CYCLE}"
+                " samples per cycle of "
                 f"{self.frequency:g} Hz are needed"
             )
         return fast
@@ -179,29 +216,42 @@ class Recording:
         return together
 
     def number(self, each: Any, where: str) -> int:
-        """A channel's number, from 0, from its number or name; `where` is the setting in messages."""
+        """A channel's number, from 0, from its number or name; `where` is the setting
+        in messages.
+        """
         names = [channel.name.strip() for channel in self.channels]
         if isinstance(each, int) and not isinstance(each, bool):
             if not 0 <= each < len(names):
                 extent = f"which has {len(names)}, counted from 0"
-                raise UserError(f"{setting(where)}: there is no channel {each} in {self.source}, {extent}")
+                raise UserError(
+                    f"{setting(where)}: there is no channel {each} in {self.source}, {extent}"
+                )
             return each
         if str(each) not in names:
             other = {"data.voltages": "current", "data.currents": "voltage"}.get(where)
-            fitting = [name for name, c in zip(names, self.channels, strict=True) if c.quantity != other]
+            fitting = [
+                name for name, c in zip(names, self.channels, strict=True) if c.quantity != other
+            ]
             lack = f"{self.source} has no analog channel '{each}'{nearest(str(each), fitting)}"
             raise UserError(f"{setting(where)}: {lack}")
         if names.count(str(each)) > 1:
-            raise UserError(f"{setting(where)}: {self.source} has several channels '{each}'; give the number, from 0")
+            raise UserError(
+                f"{setting(where)}: {self.source} has several channels '{each}'; give the number,"
+                " from 0"
+            )
         return names.index(str(each))
 
     def matrix(self, numbers: Sequence[int], segment: Segment) -> np.ndarray:
-        """Primary values (K, M) of channels within a segment; raises `UserError` where one is missing."""
+        """Primary values (K, M) of channels within a segment; raises `UserError` where one is
+        missing.
+        """
         rows = np.empty((len(numbers), segment.stop - segment.first))
         for row, number in zip(rows, numbers, strict=True):
             row[:] = self.channels[number].values(segment.first, segment.stop)
             if not np.isfinite(row).all():
                 i = segment.first + int(np.argmin(np.isfinite(row)))
                 name = self.channels[number].name
-                raise UserError(f"{self.source}: channel {number} '{name}' has no value at sample {i + 1}")
+                raise UserError(
+                    f"{self.source}: channel {number} '{name}' has no value at sample {i + 1}"
+                )
         return rows

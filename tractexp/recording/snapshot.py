@@ -1,4 +1,6 @@
-"""Phasors of many channels at once, one window of a cycle after another: enough for an overview of a file."""
+"""Phasors of many channels at once, one window of a cycle after another: enough for an overview of
+a file.
+"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -15,41 +17,54 @@ TUNED = 0.06  # of a nominal frequency: a network's frequency strays no farther
 MOST_WINDOWS = 1500  # of a segment: half a minute at 50 Hz without a gap; a longer one is sampled
 PURE = 0.8  # of the energy about the mean lies in the fundamental of a channel that holds a wave
 UNLOADED = 0.005  # of the greatest current in the file: less is an unloaded feeder
-LONG_SNAPSHOT_WINDOWS = 25  # windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short record)
+# windows of a cycle: what a load draws for three quarters of so long (or of a quarter of a short
+# record)
+LONG_SNAPSHOT_WINDOWS = 25
 
 
-# {recording: {(number, segment, f): (phasors, rest)}}: each load, bus and check of a file asks for the same channels
-_measured: WeakKeyDictionary[Recording, dict[tuple[int, Segment, float], tuple[np.ndarray, np.ndarray]]] = (
-    WeakKeyDictionary()
-)
+# {recording: {(number, segment, f): (phasors, rest)}}: each load, bus and check of a file asks for
+# the same channels
+_measured: WeakKeyDictionary[
+    Recording, dict[tuple[int, Segment, float], tuple[np.ndarray, np.ndarray]]
+] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
 class Snapshots:
-    """RMS phasors of channels, one window of about a cycle each, in a frame that turns at `f` since time zero."""
+    """RMS phasors of channels, one window of about a cycle each, in a frame that turns at `f` since
+    time zero.
+    """
 
     numbers: tuple[int, ...]  # of the channels, as the recording counts them
     t: np.ndarray  # (M,) s, centers of the windows
     X: np.ndarray  # (K, M) kV or kA; nan where samples are missing
     f: float  # Hz
     rest: np.ndarray  # (K, M) RMS of what is neither mean nor fundamental
-    remembered: dict[Any, Any] = field(default_factory=dict)  # answers that each load asks for again
+    # answers that each load asks for again
+    remembered: dict[Any, Any] = field(default_factory=dict)
 
     def of(self, numbers: Sequence[int]) -> np.ndarray:
         """The phasors (K, M) of some of the channels."""
         return self.X[[self.numbers.index(n) for n in numbers]]
 
     def pure(self, number: int) -> bool:
-        """Whether the channel is a wave of this frequency in at least some of the windows where it is largest."""
+        """Whether the channel is a wave of this frequency in at least some of the windows where it
+        is largest.
+        """
         k = self.numbers.index(number)
         size = np.abs(self.X[k])
         if not np.isfinite(size).any() or np.nanmax(size) == 0:
             return False
         large = size >= 0.5 * np.nanmax(size)
-        return bool(np.nanmedian(self.rest[k][large] ** 2) <= (1 / PURE - 1) * np.nanmedian(size[large] ** 2))
+        return bool(
+            np.nanmedian(self.rest[k][large] ** 2)
+            <= (1 / PURE - 1) * np.nanmedian(size[large] ** 2)
+        )
 
     def size(self, numbers: Sequence[int]) -> float:
-        """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor that after a trip."""
+        """Magnitude [kV, kA], mean over the channels, where it is large for long: no fault's, nor
+        that after a trip.
+        """
         return self.remember(("size", *numbers), lambda: self._size(numbers))
 
     def remember(self, key: Any, answer: Callable[[], Any]) -> Any:
@@ -62,17 +77,27 @@ class Snapshots:
         size = np.nan_to_num(np.abs(self.of(numbers))).mean(axis=0)
         if not len(size):
             return 0.0
-        spans = np.lib.stride_tricks.sliding_window_view(size, max(1, min(LONG_SNAPSHOT_WINDOWS, len(size) // 4)))
+        spans = np.lib.stride_tricks.sliding_window_view(
+            size, max(1, min(LONG_SNAPSHOT_WINDOWS, len(size) // 4))
+        )
         return float(np.percentile(spans, 25, axis=1).max())
 
 
-def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | None = None) -> Snapshots | None:
-    """Windows of all segments that hold two cycles or more of waveforms, one after another; None where there is none.
+def snapshots(
+    recording: Recording, numbers: Sequence[int], frequency: float | None = None
+) -> Snapshots | None:
+    """Windows of all segments that hold two cycles or more of waveforms, one after another; None
+    where there is none.
 
-    In each the least-squares fit of a mean and a sinusoid of `frequency` [Hz] (by default the nominal one).
+    In each the least-squares fit of a mean and a sinusoid of `frequency` [Hz] (by default the
+    nominal one).
     """
     f = frequency or recording.frequency
-    fast = [s for s in recording.segments if s.rate >= FEWEST_PER_CYCLE * f and s.stop - s.first >= 2 * s.rate / f + 1]
+    fast = [
+        s
+        for s in recording.segments
+        if s.rate >= FEWEST_PER_CYCLE * f and s.stop - s.first >= 2 * s.rate / f + 1
+    ]
     parts = [_windows(recording, numbers, segment, f) for segment in fast]
     if not parts:
         return None
@@ -80,7 +105,9 @@ def snapshots(recording: Recording, numbers: Sequence[int], frequency: float | N
     return Snapshots(tuple(numbers), t, X, f, rest)
 
 
-def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: float) -> tuple[np.ndarray, ...]:
+def _windows(
+    recording: Recording, numbers: Sequence[int], segment: Segment, f: float
+) -> tuple[np.ndarray, ...]:
     n = round(segment.rate / f)
     count = (segment.stop - segment.first) // n
     firsts = np.unique(np.linspace(0, count - 1, min(count, MOST_WINDOWS)).astype(int)) * n
@@ -89,7 +116,9 @@ def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: 
     every = [(number, segment, f) for number in numbers]
     for each in every:
         if each not in known:
-            X, rest = _of_channel(recording.channels[each[0]], segment, f, n, firsts, len(firsts) == count)
+            X, rest = _of_channel(
+                recording.channels[each[0]], segment, f, n, firsts, len(firsts) == count
+            )
             known[each] = (X * np.exp(-2j * np.pi * f * start), rest)
     X, rest = (np.array([known[each][k] for each in every]) for k in (0, 1))
     return start + (n - 1) / 2 / segment.rate, X, rest
@@ -98,7 +127,9 @@ def _windows(recording: Recording, numbers: Sequence[int], segment: Segment, f: 
 def _of_channel(
     channel: Channel, segment: Segment, f: float, n: int, firsts: np.ndarray, whole: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Phasors (M,) and rest (M,) of one channel in windows of n samples, whose first are counted from the segment's."""
+    """Phasors (M,) and rest (M,) of one channel in windows of n samples, whose first are counted
+    from the segment's.
+    """
     phase, begin = 2 * np.pi * f * np.arange(n) / segment.rate, segment.first
     basis = np.column_stack([np.ones(n), np.sqrt(2) * np.cos(phase), -np.sqrt(2) * np.sin(phase)])
     inverse = np.linalg.pinv(basis)  # (3, n)
@@ -107,15 +138,21 @@ def _of_channel(
     else:
         blocks = np.array([channel.values(begin + i, begin + i + n) for i in firsts])
     fitted = blocks @ inverse.T  # (M, 3)
-    return fitted[:, 1] + 1j * fitted[:, 2], np.sqrt(np.mean((blocks - fitted @ basis.T) ** 2, axis=1))
+    return fitted[:, 1] + 1j * fitted[:, 2], np.sqrt(
+        np.mean((blocks - fitted @ basis.T) ** 2, axis=1)
+    )
 
 
 def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
-    """Frequency [Hz] measured on the largest of the channels while it is alive; None where none turns.
+    """Frequency [Hz] measured on the largest of the channels while it is alive; None where none
+    turns.
 
-    The strongest line of its spectrum between 10 and 75 Hz, refined by how its phase turns from window to window.
+    The strongest line of its spectrum between 10 and 75 Hz, refined by how its phase turns from
+    window to window.
     """
-    coarse = [line for s in recording.segments if (line := _line(recording, numbers, s)) is not None]
+    coarse = [
+        line for s in recording.segments if (line := _line(recording, numbers, s)) is not None
+    ]
     if not coarse:
         return None
     at = max(coarse)[1]
@@ -132,8 +169,12 @@ def frequency(recording: Recording, numbers: Sequence[int]) -> float | None:
     return at + float(np.median(turned))
 
 
-def _line(recording: Recording, numbers: Sequence[int], segment: Segment) -> tuple[float, float] | None:
-    """(energy, frequency [Hz]) of the strongest line of a segment's first two seconds; None for a slow or short one."""
+def _line(
+    recording: Recording, numbers: Sequence[int], segment: Segment
+) -> tuple[float, float] | None:
+    """(energy, frequency [Hz]) of the strongest line of a segment's first two seconds; None for a
+    slow or short one.
+    """
     n = min(segment.stop - segment.first, int(2 * segment.rate))
     if segment.rate < 10 * 16 or n < 0.05 * segment.rate or not numbers:
         return None

@@ -1,4 +1,6 @@
-"""A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers, second harmonic."""
+"""A feeder every half cycle: RMS of each phase (IEC 61000-4-30), sequence components, powers,
+second harmonic.
+"""
 
 import functools
 from collections.abc import Iterator, Sequence
@@ -12,7 +14,9 @@ from tractexp.record.record import Record
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """The quantities of a feeder, every half cycle. Voltages in the unit of the record, one row per recorded phase."""
+    """The quantities of a feeder, every half cycle. Voltages in the unit of the record, one row per
+    recorded phase.
+    """
 
     t: np.ndarray  # (M,) s, centers of the windows
     U: np.ndarray  # (M,) positive sequence, phase to ground
@@ -36,7 +40,9 @@ class Trace:
         return replace(self, P=unknown, Q=unknown, I=none, second=none, content=none)
 
     def jump(self, i: int) -> float:
-        """Degrees by which the voltage's angle leaves, at sample i, the course it had before; nan where unknown."""
+        """Degrees by which the voltage's angle leaves, at sample i, the course it had before; nan
+        where unknown.
+        """
         reach = max(2, round(1.5 * self.cycle / self.step))
         first, stop = max(i - reach, 0), min(i + reach, len(self.t) - 1)
         before = self.f[max(first - 50, 0) : max(first - 1, 1)]
@@ -46,8 +52,12 @@ class Trace:
         return float(360 * np.trapezoid(np.nan_to_num(extra), self.t[first : stop + 1]))
 
 
-def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors) -> Trace:
-    """The trace of waveforms (2 K, N), voltages first, read a block at a time; `phasors` are those measured of them."""
+def of_waves(
+    waves: WaveSource, rate: float, start: float, nominal: float, phasors: Phasors
+) -> Trace:
+    """The trace of waveforms (2 K, N), voltages first, read a block at a time; `phasors` are those
+    measured of them.
+    """
     K, n = waves.shape[0] // 2, waves.shape[-1]
     first, last = phasors.t[0], phasors.t[-1]
     t = np.arange(first, last + 1e-9, 0.5 / nominal)
@@ -57,10 +67,16 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
     low, high = np.clip(center - width / 2, 0, n), np.clip(center + width / 2, 0, n)
     pieces: list[tuple[np.ndarray, np.ndarray]] = []
     for windows, (a, b) in _blocks(low, high):
-        x, mean = waves[:, a:b], functools.partial(_means, low=low[windows] - a, high=high[windows] - a)
+        x, mean = (
+            waves[:, a:b],
+            functools.partial(_means, low=low[windows] - a, high=high[windows] - a),
+        )
         turn = np.exp(-1j * frame(np.interp(start + np.arange(a, b) / rate, phasors.t, f), rate))
         pieces.append(
-            (mean(np.concatenate([x**2, x[K:]])), np.abs(mean(np.concatenate([x[K:] * turn, x[K:] * turn**2]))))
+            (
+                mean(np.concatenate([x**2, x[K:]])),
+                np.abs(mean(np.concatenate([x[K:] * turn, x[K:] * turn**2]))),
+            )
         )
     means, turned = (np.concatenate([piece[k] for piece in pieces], axis=1) for k in (0, 1))
     squares, offset = means[: 2 * K], means[2 * K :]
@@ -80,7 +96,9 @@ def of_waves(waves: WaveSource, rate: float, start: float, nominal: float, phaso
 
 
 def join_traces(traces: Sequence[Trace]) -> Trace:
-    """Traces that follow each other without a gap as one; what no window saw at a change of rate is interpolated."""
+    """Traces that follow each other without a gap as one; what no window saw at a change of rate is
+    interpolated.
+    """
     if len(traces) == 1:
         return traces[0]
     at, step = np.concatenate([trace.t for trace in traces]), 0.5 * traces[0].cycle
@@ -95,10 +113,13 @@ def join_traces(traces: Sequence[Trace]) -> Trace:
     return Trace(t, **{name: join(name) for name in names}, cycle=traces[0].cycle)
 
 
-def half_cycle_rms(waves: WaveSource, rate: float, frequency: float) -> tuple[np.ndarray, np.ndarray]:
+def half_cycle_rms(
+    waves: WaveSource, rate: float, frequency: float
+) -> tuple[np.ndarray, np.ndarray]:
     """RMS over one cycle, taken anew each half cycle (IEC 61000-4-30, U_rms(1/2)) of waves (K, N).
 
-    Returns the times of the windows' centers (M,) [s] from the first sample on and the values (K, M).
+    Returns the times of the windows' centers (M,) [s] from the first sample on and the values (K,
+    M).
     """
     cycle = rate / frequency  # samples, not whole
     low = np.arange(0.0, waves.shape[-1] - cycle + 1e-9, cycle / 2)
@@ -110,7 +131,9 @@ def half_cycle_rms(waves: WaveSource, rate: float, frequency: float) -> tuple[np
 
 
 def _blocks(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[slice, tuple[int, int]]]:
-    """Windows from `low` to `high` (M,), about as many at a time as lie in a block, and the samples that they need."""
+    """Windows from `low` to `high` (M,), about as many at a time as lie in a block, and the samples
+    that they need.
+    """
     first = 0
     while first < len(low):
         windows = slice(first, max(int(np.searchsorted(low, low[first] + BLOCK)), first + 1))
@@ -132,7 +155,9 @@ def _between(values: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def of_record(record: Record) -> Trace:
-    """The trace of a record: U, P, Q and, where they are there, f and U2, thinned to half cycles."""
+    """The trace of a record: U, P, Q and, where they are there, f and U2, thinned to
+    half cycles.
+    """
     cycle = 1 / record.base.frequency
     every = max(1, round(0.5 * cycle * record.rate))
     n, unknown = record.samples // every * every, np.full(record.samples, np.nan)
@@ -142,7 +167,9 @@ def of_record(record: Record) -> Trace:
 
     none = np.empty((0, n // every))
     U, P, Q = thin(record.U), thin(record.P), thin(record.Q)
-    return Trace(thin(record.t), U, none, thin(record.U2), P, Q, thin(record.f), none, none, none, cycle)
+    return Trace(
+        thin(record.t), U, none, thin(record.U2), P, Q, thin(record.f), none, none, none, cycle
+    )
 
 
 def _track_frequency(phasors: Phasors, nominal: float) -> np.ndarray:
@@ -156,7 +183,9 @@ def _track_frequency(phasors: Phasors, nominal: float) -> np.ndarray:
 
 
 def _average_frequency(t: np.ndarray, at: np.ndarray, f: np.ndarray) -> np.ndarray:
-    """The mean of f between the middles of the steps of t, so that its integral, the angle, stays the same."""
+    """The mean of f between the middles of the steps of t, so that its integral, the angle, stays
+    the same.
+    """
     angle = np.concatenate([[0.0], np.cumsum((f[1:] + f[:-1]) / 2 * np.diff(at))])
     middles = np.concatenate([[t[0]], (t[1:] + t[:-1]) / 2, [t[-1]]])
     return np.diff(np.interp(middles, at, angle)) / np.diff(middles) if len(t) > 1 else f[:1]

@@ -1,7 +1,8 @@
-"""The units of a recording's voltages and currents: as its user says, as its file says, or as their size leaves it.
+"""The units of a recording's voltages and currents: as its user says, as its file says, or as their
+size leaves it.
 
-What a factor of a thousand hangs on is never assumed: where neither says it, the channel stays in doubt, and whoever
-needs it raises the question.
+What a factor of a thousand hangs on is never assumed: where neither says it, the channel stays in
+doubt, and whoever needs it raises the question.
 """
 
 import re
@@ -16,42 +17,60 @@ from tractexp.recording.label import kind
 from tractexp.recording.recording import Channel, Recording, quantity_of, unit_of
 
 PLAIN = {"U": ("voltage", "V", "kV"), "I": ("current", "A", "kA")}  # by letter of the setting
-GREATEST = {"U": 1500.0, "I": 100.0}  # RMS in kV, kA: no network has more, so that a larger number is in V, A
-SECONDARY = 0.04, 0.16  # kV RMS of a voltage transformer's secondary: 100 to 120 V, of lines or to ground
+# RMS in kV, kA: no network has more, so that a larger number is in V, A
+GREATEST = {"U": 1500.0, "I": 100.0}
+# kV RMS of a voltage transformer's secondary: 100 to 120 V, of lines or to ground
+SECONDARY = 0.04, 0.16
 LEAST_AMPERES = 1.0  # RMS: fewer beside voltages in V may as well be kA
 _AMOUNT = re.compile(r"\s*([+-]?\d+\.?\d*(?:[eE][+-]?\d+)?)\s*(\D.*)", re.ASCII)
 
 
 def amount(text: str) -> tuple[float, str]:
-    """(number, unit) of a setting such as "89.8 kV", what one of the file's units stands for; (1, "kV") of "kV"."""
+    """(number, unit) of a setting such as "89.8 kV", what one of the file's units stands for; (1,
+    "kV") of "kV".
+    """
     match = _AMOUNT.fullmatch(str(text))
     return (float(match[1]), match[2].strip()) if match else (1.0, str(text).strip())
 
 
 def check_units(units: Mapping[str, Any], quantities: Sequence[str] = tuple(PLAIN)) -> None:
-    """Raise `UserError` for a setting that names no quantity of a recording, or a unit that does not fit it."""
+    """Raise `UserError` for a setting that names no quantity of a recording, or a unit that does
+    not fit it.
+    """
     if not isinstance(units, Mapping):
-        raise UserError(f"{DATA.units}={units!s:.60} must be a mapping, such as {DATA.units}={{U: kV, I: A}}")
+        raise UserError(
+            f"{DATA.units}={units!s:.60} must be a mapping, such as {DATA.units}={{U: kV, I: A}}"
+        )
     for letter, text in units.items():
         if letter not in quantities:
-            raise UserError(f"{DATA.units} names '{letter}'{among(letter, quantities, 'Quantities')}")
-        if letter in PLAIN and (unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0):
+            raise UserError(
+                f"{DATA.units} names '{letter}'{among(letter, quantities, 'Quantities')}"
+            )
+        if letter in PLAIN and (
+            unit_of(amount(text)[1])[0] != PLAIN[letter][0] or amount(text)[0] <= 0
+        ):
             _, small, large = PLAIN[letter]
             raise UserError(
-                f"{DATA.units}: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small} or {large}, or, "
+                f"{DATA.units}: {letter}={text} is no unit of a {PLAIN[letter][0]}; one is {small}"
+                f" or {large}, or, "
                 f"where the file has units of its own, so many of them: '89.8 {large}'"
             )
 
 
-def in_units(recording: Recording, units: Mapping[str, Any], chosen: Mapping[str, Sequence[int]]) -> Recording:
-    """The recording with the unit of each voltage and current, as far as it can be known, and a note where size says.
+def in_units(
+    recording: Recording, units: Mapping[str, Any], chosen: Mapping[str, Sequence[int]]
+) -> Recording:
+    """The recording with the unit of each voltage and current, as far as it can be known, and a
+    note where size says.
 
-    `units` {U: kV, I: "0.5 kA"} goes before the file's; `chosen` {U: numbers, I: numbers} are channels that the user
-    calls so.
+    `units` {U: kV, I: "0.5 kA"} goes before the file's; `chosen` {U: numbers, I: numbers} are
+    channels that the user calls so.
     """
     channels, taken, voltage = [*recording.channels], {}, ""
     for letter, (quantity, small, _) in PLAIN.items():
-        ours = [i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen.get(letter, ())]
+        ours = [
+            i for i, c in enumerate(channels) if kind(c) == quantity or i in chosen.get(letter, ())
+        ]
         ours = [i for i in ours if channels[i].quantity in (quantity, "")]
         if letter in units:
             number, unit = amount(units[letter])
@@ -71,29 +90,47 @@ def in_units(recording: Recording, units: Mapping[str, Any], chosen: Mapping[str
 
 
 def _mark_secondary(channels: Sequence[Channel]) -> list[Channel]:
-    """The channels with S where their values are secondary: if a voltage has the size of one, and none is larger."""
+    """The channels with S where their values are secondary: if a voltage has the size of one, and
+    none is larger.
+    """
     if not any(c.side for c in channels):
         return [*channels]
     low, high = SECONDARY
-    sizes = [c.factor * _size(c) for c in channels if c.side and c.quantity == "voltage" and not in_doubt(c)]
+    sizes = [
+        c.factor * _size(c)
+        for c in channels
+        if c.side and c.quantity == "voltage" and not in_doubt(c)
+    ]
     larger, alike = any(size > high for size in sizes), any(low <= size <= high for size in sizes)
     return [
-        replace(c, side="S" if alike or c.side == "S" else "") if not larger else replace(c, side="") for c in channels
+        replace(c, side="S" if alike or c.side == "S" else "")
+        if not larger
+        else replace(c, side="")
+        for c in channels
     ]
 
 
 def _secondary_note(channels: Sequence[Channel]) -> list[str]:
-    """What is said of secondary values, and the setting that gives their ratio; [] where there are none."""
+    """What is said of secondary values, and the setting that gives their ratio; [] where there are
+    none.
+    """
     ours = [c for c in channels if c.side == "S" and c.quantity in ("voltage", "current")]
     if not ours:
         return []
-    letters = {letter: next((c for c in ours if c.quantity == quantity), None)
-               for letter, (quantity, _, _) in PLAIN.items()}  # fmt: skip
+    letters = {
+        letter: next((c for c in ours if c.quantity == quantity), None)
+        for letter, (quantity, _, _) in PLAIN.items()
+    }
     examples = {"U": "1.1 kV", "I": "120 A"}
-    setting = ", ".join(f"{letter}: '{examples[letter]}'" for letter, c in letters.items() if c is not None)
-    sizes = " and ".join(f"{_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None)
+    setting = ", ".join(
+        f"{letter}: '{examples[letter]}'" for letter, c in letters.items() if c is not None
+    )
+    sizes = " and ".join(
+        f"{_size(c):.4g} {c.unit.strip()}" for c in letters.values() if c is not None
+    )
     return [
-        f"these are secondary values ({sizes}), and the file gives no ratio of the transformers: powers are not in MW; "
+        f"these are secondary values ({sizes}), and the file gives no ratio of the transformers:"
+        " powers are not in MW; "
         f"say what one of the file's units is on the primary side, e.g. {DATA.units}={{{setting}}}"
     ]
 
@@ -106,8 +143,15 @@ def secondary_of(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> 
 def _note(channels: Sequence[Channel], taken: Mapping[str, Sequence[int]]) -> list[str]:
     """What was taken for what, in one sentence; [] where nothing was."""
     names = ", ".join(channels[i].name.strip() for numbers in taken.values() for i in numbers)
-    small, large = (" and ".join(PLAIN[x][1] for x in taken), ", ".join(f"{x}: {PLAIN[x][2]}" for x in taken))
-    return [f"no unit of {names}: taken as {small} (data.units={{{large}}} says else)"] if taken else []
+    small, large = (
+        " and ".join(PLAIN[x][1] for x in taken),
+        ", ".join(f"{x}: {PLAIN[x][2]}" for x in taken),
+    )
+    return (
+        [f"no unit of {names}: taken as {small} (data.units={{{large}}} says else)"]
+        if taken
+        else []
+    )
 
 
 def _of_unit(channel: Channel, quantity: str, unit: str, number: float = 1.0) -> Channel:
@@ -136,8 +180,13 @@ def in_doubt(channel: Channel) -> bool:
 
 
 def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> None:
-    """Raise `UserError` where a channel of {U: ..., I: ...} is in doubt: the question, and the setting that answers."""
-    odd = {x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])] for x, ours in numbers.items()}
+    """Raise `UserError` where a channel of {U: ..., I: ...} is in doubt: the question, and the
+    setting that answers.
+    """
+    odd = {
+        x: [recording.channels[i] for i in ours if in_doubt(recording.channels[i])]
+        for x, ours in numbers.items()
+    }
     odd = {letter: channels[0] for letter, channels in odd.items() if channels}
     if not odd:
         return
@@ -148,7 +197,8 @@ def check_doubt(recording: Recording, numbers: Mapping[str, Sequence[int]]) -> N
     plainly = ", ".join(f"{letter}: {PLAIN[letter][2]}" for letter in odd)
     stands = ", ".join(f"{letter}: '1.5 {PLAIN[letter][2]}'" for letter in odd)
     raise UserError(
-        f"{recording.source}: {said}: say the unit, {DATA.units}={{{plainly}}} or V, A, or what one of the file's "
+        f"{recording.source}: {said}: say the unit, {DATA.units}={{{plainly}}} or V, A, or what one"
+        " of the file's "
         f"units, or one per unit, stands for, {DATA.units}={{{stands}}}"
     )
 
@@ -158,5 +208,7 @@ def _unit_said(channel: Channel, letter: str) -> str:
     unit = channel.unit.strip()
     if not unit:
         return "no unit"
-    open_question = f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if quantity_of(unit) else ""
+    open_question = (
+        f", which may be {PLAIN[letter][1]} or {PLAIN[letter][2]}," if quantity_of(unit) else ""
+    )
     return f"the unit '{unit}'{open_question}"

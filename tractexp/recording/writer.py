@@ -14,13 +14,16 @@ class Writer(Plugin):
 
     group: ClassVar[str] = "writer"
     chosen: ClassVar[bool] = False
-    endings: ClassVar[tuple[str, ...]] = ()  # of the files it writes, first the one that a reader opens
+    # of the files it writes, first the one that a reader opens
+    endings: ClassVar[tuple[str, ...]] = ()
     usual: ClassVar[bool] = False  # taken where none is named
     waves: ClassVar[bool] = False  # events of waveforms are written as the waveforms about them
 
     @abstractmethod
     def record(self, record: Record, path: Path) -> list[Path]:
-        """Write a record to `path`, with the first ending, and what belongs beside it; returns the files."""
+        """Write a record to `path`, with the first ending, and what belongs beside it; returns the
+        files.
+        """
 
     @abstractmethod
     def recording(self, recording: Recording, path: Path) -> list[Path]:

@@ -54,30 +54,42 @@ def candidates(page: Report, findings: Findings) -> None:
         for r in rows
     ]
     chosen = findings.last.fit.names
-    single = f"; that of an effect outside of it is what the events say with {join_words(chosen)} in the model"
+    single = (
+        f"; that of an effect outside of it is what the events say with {join_words(chosen)} in the"
+        " model"
+    )
     page.table(
-        ["candidate", "deviance lowered by", "status", "size", "why"], entries,
-        f"Status of a refitted set is that among the sets of its size{single if chosen else ''}. Sizes have their"
-        " standard error where it was reckoned.", words=(0, 2, 3, 4),
-    )  # fmt: skip
+        ["candidate", "deviance lowered by", "status", "size", "why"],
+        entries,
+        f"Status of a refitted set is that among the sets of its size{single if chosen else ''}."
+        " Sizes have their"
+        " standard error where it was reckoned.",
+        words=(0, 2, 3, 4),
+    )
     _sets(page, findings)
     if chosen:
         _further(page, findings)
 
 
 def _labels(rows: Sequence[CandidateRow]) -> dict[CandidateRow, str]:
-    """A candidate's name; sets of several are numbered, because a chart has no room for all their names."""
+    """A candidate's name; sets of several are numbered, because a chart has no room for all their
+    names.
+    """
     sets = [row for row in rows if len(row.names) > 1]
     return {row: f"set {sets.index(row) + 1}" if row in sets else row.names[0] for row in rows}
 
 
-def _bars(findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]) -> Chart:
+def _bars(
+    findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]
+) -> Chart:
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
     entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
     chance = chance_level(findings)
     chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
     chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
-    return chart.edge(chance, dash="dash").limits(None, 0.0, BAR_ROOM * max(chance, *(r.drop for r in rows)))
+    return chart.edge(chance, dash="dash").limits(
+        None, 0.0, BAR_ROOM * max(chance, *(r.drop for r in rows))
+    )
 
 
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
@@ -87,25 +99,34 @@ def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
     colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
     chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
-        f"By how much each alone lowers the deviance of the base model ({', '.join(colors)}). Dashed: {chance}"
+        f"By how much each alone lowers the deviance of the base model ({', '.join(colors)})."
+        f" Dashed: {chance}"
         f" {findings.context.criteria.naming:.0%} of cases."
     )
 
 
 def _sets(page: Report, findings: Findings) -> None:
     rows = [
-        [join_words(r.fit.names) or "the base model", f"{r.fit.deviance:.1f}", f"{r.behind:.1f}",
-         find_status(r, findings.verdict, findings.evidence, findings.context),
-         "" if r.tests is None else by_draws(r.p_left)]
+        [
+            join_words(r.fit.names) or "the base model",
+            f"{r.fit.deviance:.1f}",
+            f"{r.behind:.1f}",
+            find_status(r, findings.verdict, findings.evidence, findings.context),
+            "" if r.tests is None else by_draws(r.p_left),
+        ]
         for r in findings.evidence.rows[:MOST_SETS]
-    ]  # fmt: skip
+    ]
     with page.folded("How the refitted sets compare"):
         page.table(
-            ["set", "deviance", "behind", "verdict", "chance leaves as much"], rows,
-            "Every set of this size that was refitted; behind is that of Akaike's criterion. A set is rejected when its"
-            f" relative likelihood is below {findings.context.criteria.rejected:g}; it is adequate when chance may"
-            " leave as much as it does.", words=(3, 4),
-        )  # fmt: skip
+            ["set", "deviance", "behind", "verdict", "chance leaves as much"],
+            rows,
+            "Every set of this size that was refitted; behind is that of Akaike's criterion. A set"
+            " is rejected when its"
+            f" relative likelihood is below {findings.context.criteria.rejected:g}; it is adequate"
+            " when chance may"
+            " leave as much as it does.",
+            words=(3, 4),
+        )
 
 
 def _further(page: Report, findings: Findings) -> None:
@@ -114,11 +135,17 @@ def _further(page: Report, findings: Findings) -> None:
     for j in judgements(findings):
         size = ""
         if j.score is not None:
-            size = ", ".join(f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items())
-        rows.append([j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why])
+            size = ", ".join(
+                f"{n} {v:.3g} ± {j.score.deviation[n]:.2g}" for n, v in j.score.size.items()
+            )
+        rows.append(
+            [j.name, j.status, "" if j.score is None else f"{j.score.drop:.1f}", size, j.why]
+        )
     names = join_words(findings.last.fit.names)
     with page.folded(f"What each effect would add to a model that has {names}"):
         page.table(
-            ["effect", "status", "deviance lowered by", "one-step size", "why"], rows,
-            "Scores with all nuisances projected out; sizes are departures from the null.", words=(1, 3, 4),
-        )  # fmt: skip
+            ["effect", "status", "deviance lowered by", "one-step size", "why"],
+            rows,
+            "Scores with all nuisances projected out; sizes are departures from the null.",
+            words=(1, 3, 4),
+        )

@@ -10,14 +10,22 @@ def places(page: Report, findings: Findings) -> None:
     """Whether and where the base model disagrees with the records."""
     first = findings.first
     page.heading("Is there a disagreement, and where?")
-    text = f"What the base model leaves would come about by chance with a probability of {by_draws(first.p_left)}"
-    text += "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
+    text = (
+        "What the base model leaves would come about by chance with a probability of"
+        f" {by_draws(first.p_left)}"
+    )
+    text += (
+        "." if first.adequate else f"; the most surprised of the tests looks for {first.loudest}."
+    )
     if first.scores:
         best, alpha = first.scores[0], findings.context.criteria.naming
         text += (
-            f" The effect that promises most in one linear step, {best.name}, would lower the deviance by"
-            f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives less than"
-            f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in {alpha:.0%} of cases."
+            f" The effect that promises most in one linear step, {best.name}, would lower the"
+            " deviance by"
+            f" {best.drop:.1f}, with a probability of {in_words(best.p)} by chance; chance gives"
+            " less than"
+            f" {in_words(first.chance.critical_p(alpha))} to the best of all candidates in"
+            f" {alpha:.0%} of cases."
         )
     page.text(text)
     if not findings.places:
@@ -25,10 +33,14 @@ def places(page: Report, findings: Findings) -> None:
         return
     page.table(
         ["event", "channel", "from [s]", "to [s]", "share of the excess"],
-        [[p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"] for p in findings.places],
+        [
+            [p.event, p.channel, f"{p.start:.3f}", f"{p.end:.3f}", f"{p.share:.0%}"]
+            for p in findings.places
+        ],
         "Intervals in which the base model leaves more than chance does, at a family-wise error of"
-        f" {findings.context.criteria.false_alarms:.0%}; shaded in the charts.", words=(1,),
-    )  # fmt: skip
+        f" {findings.context.criteria.false_alarms:.0%}; shaded in the charts.",
+        words=(1,),
+    )
 
 
 def noise(page: Report, findings: Findings) -> None:
@@ -38,13 +50,16 @@ def noise(page: Report, findings: Findings) -> None:
     page.heading("Noise").text(f"{context.describe(fit.noise)}. {about}")
     if fit.robust is not None:
         page.text(
-            "What is left is louder, so all is told by least squares, without faults of the measurement and at the"
+            "What is left is louder, so all is told by least squares, without faults of the"
+            " measurement and at the"
             " powers measured before the events."
         )
     if (window := context.records.window) is not None:
         model = " The extended configuration does not do so." if findings.names else ""
         page.text(
-            f"{window.describe().capitalize()}, of voltage and current alike: any other window would"
-            " make the voltage bend where the power does not. The voltage that the load saw is reckoned back from the"
+            f"{window.describe().capitalize()}, of voltage and current alike: any other window"
+            " would"
+            " make the voltage bend where the power does not. The voltage that the load saw is"
+            " reckoned back from the"
             f" record, and the current of the model is averaged as the recorder does.{model}"
         )

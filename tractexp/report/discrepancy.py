@@ -1,4 +1,6 @@
-"""The page of an investigation: the verdict, what one sees, what explains it, how large it is, and how it was found."""
+"""The page of an investigation: the verdict, what one sees, what explains it, how large it is, and
+how it was found.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -26,35 +28,52 @@ from tractexp.wording import alternatives, as_sentence, count_noun, epsilon, joi
 if TYPE_CHECKING:
     from tractexp.api.discrepancy import Investigation as Outcome
 
-KIND = {"none": "good", "candidate": "plain", "named": "good", "tied": "plain", "unexplained": "bad"}
+KIND = {
+    "none": "good",
+    "candidate": "plain",
+    "named": "good",
+    "tied": "plain",
+    "unexplained": "bad",
+}
 ROLES = {"train": "fitted", "validate": "held out"}
 CURRENTS = (
-    ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the currents of all"
+    ", as the record's estimator sees them in calculated and recorded currents. epsilon_i: what the"
+    " currents of all"
     " phases miss in the 0.15 s after the dip begins, rms, over their rms before it"
 )
 
 
 def summary(findings: "Outcome") -> Report:
-    """The verdict first, then how large the gap is and how much of it is closed, where, and what to do next."""
+    """The verdict first, then how large the gap is and how much of it is closed, where, and what to
+    do next.
+    """
     content, left = findings.content, findings.remainder.caption
     names = alternatives(content["name_sets"])
     report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if findings.names else "base"
     report.items([findings.reason, *findings.sizes, *[left] * bool(left), *findings.proposed])
-    report.items([f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"])
+    report.items(
+        [f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"]
+    )
     report.add(gap(content))
     if places := content["where"]:
         loudest, others = places[0], len(places) - 1
         span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
         more = f", and {others} more stretch{'es' * (others > 1)}" if others else ""
         report.text(
-            f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of the excess{more}"
+            f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of"
+            f" the excess{more}"
         )
     if near := content["nearest"]:
         closed = {role: (near["gap"][role] or {}).get("closed") for role in ROLES}
-        shares = join_words([f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None])
+        shares = join_words(
+            [f"{closed[role]:.0%} {on}" for role, on in ROLES.items() if closed[role] is not None]
+        )
         sizes = ", ".join(findings.sizes_of_nearest)
-        report.text(f"nearest, not accepted: {join_words(near['effects'])}; gap closed {shares or 'unknown'}; {sizes}")
+        report.text(
+            f"nearest, not accepted: {join_words(near['effects'])}; gap closed"
+            f" {shares or 'unknown'}; {sizes}"
+        )
     return report.text(f"noise: {content['noise']}", f"next: {findings.recommendation}")
 
 
@@ -66,31 +85,74 @@ def gap(content: Mapping[str, Any]) -> Table:
             if (one := gaps[role]) is not None:
                 closed = one["closed"] if stage == "after" else None
                 error = _error(one[stage]["model_error"])
-                rows.append([label, model, error, *_off(one[stage]), "" if closed is None else f"{closed:.0%}"])
+                rows.append(
+                    [
+                        label,
+                        model,
+                        error,
+                        *_off(one[stage]),
+                        "" if closed is None else f"{closed:.0%}",
+                    ]
+                )
     waves = "epsilon_i" in gaps["train"]["before"]
-    columns = ["events", "model", "model error", "epsilon_p", "epsilon_q", *["epsilon_i"] * waves, "chi2 per sample"]
-    caption = "Model error: what is left of the load's response, in S, beyond the noise, with its 95 % interval."
+    columns = [
+        "events",
+        "model",
+        "model error",
+        "epsilon_p",
+        "epsilon_q",
+        *["epsilon_i"] * waves,
+        "chi2 per sample",
+    ]
+    caption = (
+        "Model error: what is left of the load's response, in S, beyond the noise, with its 95 %"
+        " interval."
+    )
     caption += f" epsilon: relative error of P and Q, Eq. (20){CURRENTS * waves}."
-    caption += " chi2 per sample: of the fits by which effects are ranked, 1 where only noise is left."
+    caption += (
+        " chi2 per sample: of the fits by which effects are ranked, 1 where only noise is left."
+    )
     if named:
         columns.append("gap closed")
         caption += " Gap closed: the share of the squared model error that is gone."
     return Table(columns, [row[: len(columns)] for row in rows], "", caption, words=(1,))
 
 
-def report(findings: Findings, content: Mapping[str, Any], identities: Sequence[Identity]) -> Report:
-    """The investigation, for a reader who was not there; `content` is that of `discrepancy.json`."""
-    fitted = f"{count_noun(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held out"
-    lead = "; ".join([*describe_identities(identities), f"{findings.context.model.title}, {fitted}"])
-    page = Report(f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}", lead)
-    spoken = [[findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets]
+def report(
+    findings: Findings, content: Mapping[str, Any], identities: Sequence[Identity]
+) -> Report:
+    """The investigation, for a reader who was not there; `content` is that of
+    `discrepancy.json`.
+    """
+    fitted = (
+        f"{count_noun(len(findings.context.events), 'event')} fitted, {len(findings.withheld)} held"
+        " out"
+    )
+    lead = "; ".join(
+        [*describe_identities(identities), f"{findings.context.model.title}, {fitted}"]
+    )
+    page = Report(
+        f"Missing effect: {title(identities, (e.record.name for e in findings.context.events))}",
+        lead,
+    )
+    spoken = [
+        [findings.catalogue.spoken(name) for name in names] for names in findings.verdict.sets
+    ]
     head = f"{findings.verdict.word.upper()} {alternatives(spoken)}".strip()
     left = [as_sentence(findings.headline)] if findings.headline else []
-    sentences = [as_sentence(findings.reason), *left, *headlines(findings), _describe_grade(findings)]
-    kind = "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
+    sentences = [
+        as_sentence(findings.reason),
+        *left,
+        *headlines(findings),
+        _describe_grade(findings),
+    ]
+    kind = (
+        "plain" if findings.names and not findings.verdict.complete else KIND[findings.verdict.word]
+    )
     page.verdict(head, *sentences, f"Next: {recommendation(findings)}.", kind=kind)
     overlaid(
-        page.heading("Measured, before, after" if findings.names else "Measured and calculated"), findings.overlays
+        page.heading("Measured, before, after" if findings.names else "Measured and calculated"),
+        findings.overlays,
     )
     _smaller(page, findings, content)
     if findings.verdict.word == UNEXPLAINED:
@@ -123,11 +185,20 @@ def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> No
     table, near = gap(content), findings.nearest
     page.add(replace(table, rows=_with_nearest(near)) if near else table)
     if len(steps := content["contributions"]) > 2:
-        rows = [[join_words(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps]
+        rows = [
+            [join_words(s["effects"]) or "the base model", _size(s["model_error"])] for s in steps
+        ]
         page.text("What each name contributes:")
-        page.table(["with", "model error, held out"], rows, "One more at a time, the one that helps most first.")
+        page.table(
+            ["with", "model error, held out"],
+            rows,
+            "One more at a time, the one that helps most first.",
+        )
     if findings.fitted_to_both:
-        page.text("The extended model was fitted to the held-out events, too: what they say of it is no test of it.")
+        page.text(
+            "The extended model was fitted to the held-out events, too: what they say of it is no"
+            " test of it."
+        )
 
 
 def _with_nearest(near: Nearest) -> list[list[str]]:
@@ -145,7 +216,9 @@ def _with_nearest(near: Nearest) -> list[list[str]]:
 def _error(entry: Mapping[str, Any]) -> str:
     """A model's error with its interval, as a table has it."""
     ends = [in_percent(end) for end in entry["interval"] if end is not None and np.isfinite(end)]
-    return _size(entry["value"]) + (f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else "")
+    return _size(entry["value"]) + (
+        f" ({ends[0].removesuffix(' %')} to {ends[1]})" if len(ends) == 2 else ""
+    )
 
 
 def _size(error: float | None) -> str:
@@ -164,7 +237,9 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
     """What is left beside the names, or what nothing explains, in words."""
     page.heading("What is left")
     shapes, near = findings.remainder, findings.nearest
-    whose = "the base model" if near is None else f"{join_words(near.names)}, the nearest candidates,"
+    whose = (
+        "the base model" if near is None else f"{join_words(near.names)}, the nearest candidates,"
+    )
     if findings.names:
         whose = f"the model with {join_words(findings.names)}"
     _shapes(page, findings, shapes, whose)
@@ -175,29 +250,61 @@ def _add_remainder_section(page: Report, findings: Findings) -> None:
 
 def _shapes(page: Report, findings: Findings, shapes: Sequence[Remainder], whose: str) -> None:
     if not shapes:
-        page.text(f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse.")
+        page.text(
+            f"Missed by {whose}: nothing of a simple shape, no ringing, decay, step or pulse."
+        )
         return
     beyond = {event.record.name for event in findings.withheld}
     where = "held-out" if shapes[0].event in beyond else "fitted"
     page.text(f"Missed by {whose} on the {where} events, the loudest first: {shapes[0]}.")
     rows = [
-        [s.event, s.channel, s.kind, f"{s.start:.3f}", s.when, _number(s.frequency), _number(s.time_constant),
-         _number(s.damping), f"{s.size:.2g}", s.times, f"{s.share:.0%}"]
+        [
+            s.event,
+            s.channel,
+            s.kind,
+            f"{s.start:.3f}",
+            s.when,
+            _number(s.frequency),
+            _number(s.time_constant),
+            _number(s.damping),
+            f"{s.size:.2g}",
+            s.times,
+            f"{s.share:.0%}",
+        ]
         for s in shapes
-    ]  # fmt: skip
+    ]
     page.table(
-        ["event", "channel", "kind", "from t [s]", "when", "frequency [Hz]", "time constant [s]", "damping ratio",
-         "size [pu]", "of the noise", "of the excess"], rows,
-        "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before the dip.",
+        [
+            "event",
+            "channel",
+            "kind",
+            "from t [s]",
+            "when",
+            "frequency [Hz]",
+            "time constant [s]",
+            "damping ratio",
+            "size [pu]",
+            "of the noise",
+            "of the excess",
+        ],
+        rows,
+        "Shapes c exp(-t/tau) cos(2 pi f t + phi) fitted to what is left; the noise is that before"
+        " the dip.",
         words=(4,),
-    )  # fmt: skip
+    )
 
 
 def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
     """The candidates that come nearest, with their shares and sizes."""
     assert near.row.tests is not None
-    by_name = {e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)}
-    own = [(by_name[p.name], p) for name in near.names for p in findings.catalogue[name].effect.parameters]
+    by_name = {
+        e.parameter.name: e for e in estimates(near.row.tests, near.row.fit.unit, near.names)
+    }
+    own = [
+        (by_name[p.name], p)
+        for name in near.names
+        for p in findings.catalogue[name].effect.parameters
+    ]
     rows = [[join_words(near.names), *map(_share, near.closed)]]
     rows += [[join_words(names), _share(share), ""] for names, share in near.others]
     page.text("The candidates that come nearest, none of which is accepted:")
@@ -206,9 +313,10 @@ def _nearest(page: Report, findings: Findings, near: Nearest) -> None:
         page.table(
             ["parameter", "meaning", "unit", "value", "95 % interval", "verdict"],
             [[p.name, p.about, p.unit, value(e), interval(*e.interval), e.verdict] for e, p in own],
-            "As if they were right; something else is missing, so that the intervals may miss the truth.",
+            "As if they were right; something else is missing, so that the intervals may miss the"
+            " truth.",
             words=(1, 2, 5),
-        )  # fmt: skip
+        )
 
 
 def _share(closed: float) -> str:

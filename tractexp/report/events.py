@@ -1,4 +1,6 @@
-"""One event as it was recorded and as models calculate it: voltage, P, Q and what is left, to be looked into."""
+"""One event as it was recorded and as models calculate it: voltage, P, Q and what is left, to be
+looked into.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -15,7 +17,8 @@ PANELS = ("U [pu]", "P [pu]", "ΔP [pu]", "Q [pu]", "ΔQ [pu]")
 HEIGHTS = (0.9, 1.5, 1.0, 1.5, 1.0)
 PIXELS = 580
 CAPTION = (
-    "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom, double-click to go back."
+    "ΔP and ΔQ are measured less calculated. Dotted: the dip begins and ends. Drag to zoom,"
+    " double-click to go back."
 )
 
 
@@ -39,9 +42,9 @@ def event_chart(
 ) -> Chart:
     """U, then P and Q with what the models leave of them.
 
-    `deviation` (2, N) of the noise [pu] draws a band around the power `around` (2, N) and about zero. `places` have
-    `channel`, `start`, `end` [s]: where more than chance is left. `driving` (N,) is the voltage that the load saw,
-    where that is not the recorded one.
+    `deviation` (2, N) of the noise [pu] draws a band around the power `around` (2, N) and about
+    zero. `places` have `channel`, `start`, `end` [s]: where more than chance is left. `driving`
+    (N,) is the voltage that the load saw, where that is not the recorded one.
     """
     record, t = event.record, event.record.t
     chart = Chart("t [s]", PANELS, heights=HEIGHTS, pixels=PIXELS)
@@ -56,7 +59,14 @@ def event_chart(
         for place in places:
             if place.channel == channel:
                 for panel in (above, above + 1):
-                    chart.shade(place.start, place.end, EXCESS, panel, "more than chance leaves", opacity=0.25)
+                    chart.shade(
+                        place.start,
+                        place.end,
+                        EXCESS,
+                        panel,
+                        "more than chance leaves",
+                        opacity=0.25,
+                    )
         chart.line("measured", t, measured, style.MEASURED, above, width=3)
         for name, power, color, dash in curves:
             chart.line(name, t, power[c], color, above, dash=dash)
@@ -64,7 +74,9 @@ def event_chart(
     return chart.edge(event.t_start).edge(event.t_end).limits(None, float(t[0]), float(t[-1]))
 
 
-def _noise_band(chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int) -> None:
+def _noise_band(
+    chart: Chart, t: np.ndarray, middle: np.ndarray, half: np.ndarray, panel: int
+) -> None:
     """Where noise alone would let a sample lie; every so many samples of a long record."""
     some = slice(None, None, -(-len(t) // MOST_LINE_POINTS))
     name = f"± {BAND_DEVIATIONS:g} σ of the noise"

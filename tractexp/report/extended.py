@@ -1,4 +1,6 @@
-"""The extended model of an investigation: where each effect acts and by which law, parameters and equations."""
+"""The extended model of an investigation: where each effect acts and by which law, parameters and
+equations.
+"""
 
 import numpy as np
 
@@ -23,21 +25,29 @@ def laws(page: Report, findings: Findings) -> None:
     entries = forms(findings)
     page.heading("Where it acts, and by which law")
     rows = [
-        [f.name, join_words(f.effect.places), KINDS[f.effect.kind] if f.effect.kind else "",
-         f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs, f.effect.name]
+        [
+            f.name,
+            join_words(f.effect.places),
+            KINDS[f.effect.kind] if f.effect.kind else "",
+            f"the {f.law}'s" if f.law == CATALOGUE else f.effect.differs,
+            f.effect.name,
+        ]
         for f in entries
-    ]  # fmt: skip
+    ]
     page.table(
-        ["effect", "where", "what it does there", "law", "effect in the model"], rows,
-        "The catalogue's laws are tried first, then other laws and places of every family: a wrong formula may leave"
+        ["effect", "where", "what it does there", "law", "effect in the model"],
+        rows,
+        "The catalogue's laws are tried first, then other laws and places of every family: a wrong"
+        " formula may leave"
         " nothing where the right one is of another law.",
         words=(1, 2, 3, 4),
-    )  # fmt: skip
+    )
     for form in entries:
         if form.law_fit is not None:
             page.chart(
                 _curve(form.law_fit),
-                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits these events best.",
+                f"{form.name}: the law found, with its 95 % band, beside the catalogue's as it fits"
+                " these events best.",
             )
 
 
@@ -54,23 +64,36 @@ def _curve(fitted: FittedLaw) -> Chart:
 
 def parameters(page: Report, findings: Findings) -> None:
     """The base model's parameters before and after, and those that came in."""
-    page.heading("Parameters before and after" if findings.names else "Parameters of the base model")
+    page.heading(
+        "Parameters before and after" if findings.names else "Parameters of the base model"
+    )
     before = {e.parameter.name: e for e in findings.before}
     rows, parameter_estimates = [], findings.after if findings.names else findings.before
     for e in parameter_estimates:
         p, was = e.parameter, before.get(e.parameter.name)
         entries = [value(was) if was else "not in it"] if findings.names else []
-        rows.append([p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)])
+        rows.append(
+            [p.name, p.about, p.unit, *entries, value(e), interval(*e.interval), brief(e.verdict)]
+        )
     stages = ["before", "after"] if findings.names else ["value"]
     how = "the curvature" if findings.tests.robust is None else "blocks of 0.1 s left out in turn"
     columns = ["parameter", "meaning", "unit", *stages, "95 % interval", "verdict"]
     page.table(
-        columns, rows, f"± one standard error, from {how} in the fit to the fitted events.",
+        columns,
+        rows,
+        f"± one standard error, from {how} in the fit to the fitted events.",
         words=(1, 2, len(columns) - 1),
-    )  # fmt: skip
+    )
     if retained := findings.held:
-        page.text(f"These events cannot tell {join_words(list(retained))}: the extended model holds what was found.")
-    if why := [f"{e.parameter.name} is {e.verdict}." for e in parameter_estimates if brief(e.verdict) != e.verdict]:
+        page.text(
+            f"These events cannot tell {join_words(list(retained))}: the extended model holds what"
+            " was found."
+        )
+    if why := [
+        f"{e.parameter.name} is {e.verdict}."
+        for e in parameter_estimates
+        if brief(e.verdict) != e.verdict
+    ]:
         with page.folded("Why some are known badly, and what of them is known"):
             page.items(why)
 
@@ -81,12 +104,19 @@ def equations(page: Report, findings: Findings) -> None:
 
     page.heading("The extended model")
     if others := alternatives(findings.verdict.sets[1:]):
-        page.text(f"It has {join_words(findings.names)}; {others} instead would fit these events as well.")
+        page.text(
+            f"It has {join_words(findings.names)}; {others} instead would fit these events as well."
+        )
     command = use_of(findings.context.load.domain, "conf/model/extended.yaml")
-    page.text(f"conf/model/extended.yaml beside this page: {command}. Its equations that changed or came in:")
+    page.text(
+        f"conf/model/extended.yaml beside this page: {command}. Its equations that changed or came"
+        " in:"
+    )
     base = findings.context.load
     effects = [findings.catalogue[n].effect for n in findings.names]
-    extended = compose(base.motor, base.static, [*base.effects, *effects], domain=base.domain, window=base.window)
+    extended = compose(
+        base.motor, base.static, [*base.effects, *effects], domain=base.domain, window=base.window
+    )
     for was, line in list_changed_lines(base.latex(), extended.latex()):
         if was is not None:
             page.text("before").equation(was).text("after")

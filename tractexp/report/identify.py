@@ -1,4 +1,6 @@
-"""The page of an identification, to be read in a minute: what it is good for, what was found, how sure, what next."""
+"""The page of an identification, to be read in a minute: what it is good for, what was found, how
+sure, what next.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -33,15 +35,18 @@ KIND = {"adequate": "good", "effect_missing": "plain", "wrong_model": "bad"}
 MOST_OPEN_EVENTS = 4  # events whose curves are not folded away
 CHANNELS = (style.ACTIVE, style.REACTIVE, style.PALETTE[2])  # of what is compared
 EXACT = (
-    "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power before each dip free."
+    "Nothing but noise is left: the estimate is the most likely set, noise whitened, the power"
+    " before each dip free."
     " pu: per unit of the record's base."
 )
 SCATTERED = (
-    "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much it scatters where"
+    "More than noise is left: the estimate is the minimum of Eq. (8), and intervals say by how much"
+    " it scatters where"
     " stretches of 0.1 s are left out. pu: per unit of the record's base."
 )
 MODEL_ERROR = (
-    "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's response, both in"
+    "Model error: rms of what is left beyond the noise, from the dip on, over the rms of the load's"
+    " response, both in"
     " apparent power S. epsilon: Eq. (20)."
 )
 FIXED = "fixed"
@@ -53,20 +58,32 @@ def digits(value: float) -> str:
 
 
 def summary(fit: "Identification") -> Report:
-    """What it is good for, the estimates, how well they fit, why some are not identified, and what to do next."""
+    """What it is good for, the estimates, how well they fit, why some are not identified, and what
+    to do next.
+    """
     result = fit.result
     verdicts = own_verdicts(result).items()
-    poor = [f"{name}: {verdict}" for name, verdict in verdicts if not verdict.startswith(IDENTIFIED)]
+    poor = [
+        f"{name}: {verdict}" for name, verdict in verdicts if not verdict.startswith(IDENTIFIED)
+    ]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
     report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
-    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(errors(fit))
+    report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
+        errors(fit)
+    )
     return report.text(
-        *yardstick(fit), *samples(fit), *correlations(fit), *start, result.acceptance,
+        *yardstick(fit),
+        *samples(fit),
+        *correlations(fit),
+        *start,
+        result.acceptance,
         *[headline(result)] * bool(verdicts),
-        *(f"  {sentence}" for sentence in poor), *notes, *filter(None, [fit.end_of_search]),
+        *(f"  {sentence}" for sentence in poor),
+        *notes,
+        *filter(None, [fit.end_of_search]),
         *(f"next: {sentence}" for sentence in fit.advice),
-    )  # fmt: skip
+    )
 
 
 def machine(fit: "Identification") -> list[str]:
@@ -75,30 +92,44 @@ def machine(fit: "Identification") -> list[str]:
 
 
 def network(fit: "Identification") -> list[str]:
-    """What the records show beside the load that is fitted, and its nuisances, in a sentence each; [] where nothing."""
+    """What the records show beside the load that is fitted, and its nuisances, in a sentence each;
+    [] where nothing.
+    """
     result = fit.result
     if not result.shown_effects:
         return []
-    values = ", ".join(f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1") for n, v in result.nuisances.items())
+    values = ", ".join(
+        f"{n} {digits(v)} {result.units.get(n, '')}".rstrip(" 1")
+        for n, v in result.nuisances.items()
+    )
     return [shown_in_words(result.shown_effects), f"nuisances of the fit: {values}"]
 
 
 def own_verdicts(result: Any) -> dict[str, str]:
-    return {name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances}
+    return {
+        name: verdict for name, verdict in result.verdicts.items() if name not in result.nuisances
+    }
 
 
 def yardstick(fit: "Identification") -> list[str]:
-    """The best linear network beside it, in a sentence, with its poles where there are some; [] where not judged."""
+    """The best linear network beside it, in a sentence, with its poles where there are some; []
+    where not judged.
+    """
     poles = fit.result.linear_network.get("poles")
     beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
     return [as_sentence(fit.yardstick) + beside] * bool(fit.yardstick)
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:
-    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so exactly."""
+    """How well a simulation in waveforms begins at rest, in a sentence; "" in phasors, which do so
+    exactly.
+    """
     if event.get("unsettled") is None:
         return ""
-    change = f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle to cycle"
+    change = (
+        f"the calculated currents still change by {event['unsettled']:.2g} of their size from cycle"
+        " to cycle"
+    )
     return f"periodic steady state before {event['name']}: {change}"
 
 
@@ -124,8 +155,13 @@ def report(fit: "Identification") -> Report:
     page.heading("What to do next").items(fit.advice)
     if together is not None:
         _events(page, uncertainty, together)
-    page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(as_sentence(fit.end_of_search))
-    page.chart(_fitness(fit.search_result.history, result), "Best objective of the search; dashed: the estimate's.")
+    page.heading("The search and the estimate").add(tabulate_search_end(fit)).text(
+        as_sentence(fit.end_of_search)
+    )
+    page.chart(
+        _fitness(fit.search_result.history, result),
+        "Best objective of the search; dashed: the estimate's.",
+    )
     _starts(page, details.estimation, uncertainty)
     page.heading("What the fit leaves")
     _add_residual_section(page, uncertainty)
@@ -137,37 +173,60 @@ def report(fit: "Identification") -> Report:
 
 def _of_currents(result: Any) -> str:
     """epsilon_i of each event, in a sentence; "" in phasors."""
-    values = [f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})" for e in result.events if "epsilon_i" in e]
+    values = [
+        f"{e['epsilon_i']:.2%} ({e['name']}, {ROLES[e['role']]})"
+        for e in result.events
+        if "epsilon_i" in e
+    ]
     return f" Of the currents themselves epsilon_i is {', '.join(values)}." if values else ""
 
 
 def headline(result: Any) -> str:
     """How many of the parameters are identified, and which are not, in one sentence."""
     verdicts = own_verdicts(result)
-    poor = [f"{n} {v.partition(':')[0].partition(' (')[0]}" for n, v in verdicts.items()
-            if not v.startswith(IDENTIFIED)]  # fmt: skip
+    poor = [
+        f"{n} {v.partition(':')[0].partition(' (')[0]}"
+        for n, v in verdicts.items()
+        if not v.startswith(IDENTIFIED)
+    ]
     good = len(verdicts) - len(poor)
-    return f"{good} of {len(verdicts)} parameters are identified" + (f"; {', '.join(poor)}" if poor else "") + "."
+    return (
+        f"{good} of {len(verdicts)} parameters are identified"
+        + (f"; {', '.join(poor)}" if poor else "")
+        + "."
+    )
 
 
 def _curves(page: Report, fits: Sequence[Any], uncertainty: Uncertainty) -> None:
     problem = uncertainty.likelihood.problem
     waves, deviation = problem.model.waves, uncertainty.of_noise.noise.deviation(problem.drive)
     page.text(*[IN_WAVES] * waves).text(CAPTION)
-    all_curves(page, fits, [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)])
+    all_curves(
+        page, fits, [deviation[:, problem.drive.part(e)] for e in range(problem.drive.events)]
+    )
     if waves:
-        page.heading("What was done to the records", level=3).items(describe_preparation(problem, fits))
+        page.heading("What was done to the records", level=3).items(
+            describe_preparation(problem, fits)
+        )
 
 
 def all_curves(page: Report, fits: Sequence[Any], noises: Sequence[np.ndarray] = ()) -> None:
-    """The charts of each event, with the noise of those fitted, the first; of many the later ones are folded away."""
+    """The charts of each event, with the noise of those fitted, the first; of many the later ones
+    are folded away.
+    """
     for fit, noise, k in itertools.zip_longest(fits, noises, range(len(fits))):
-        with page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}") if k >= MOST_OPEN_EVENTS else nullcontext():
+        with (
+            page.folded(f"{fit.event.record.name}, {ROLES[fit.role]}")
+            if k >= MOST_OPEN_EVENTS
+            else nullcontext()
+        ):
             event_curves(page, fit, noise)
 
 
 def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
-    """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that of phasors."""
+    """The currents of an event in waveforms and their spectra, then P and Q; `noise` (2, N) is that
+    of phasors.
+    """
     record, power = fit.event.record, np.stack((fit.P, fit.Q))
     about, notes = f"{record.name}, {ROLES[fit.role]}", [f"{note}." for note in record.notes]
     if fit.waves is not None:
@@ -176,9 +235,15 @@ def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
             " ".join([f"{about}: epsilon_i {epsilon(fit.epsilon_i)}.", WAVE_CAPTION, *notes]),
         )
         page.chart(*spectrum_chart(fit.waves, fit.currents))
-        noise, notes = None, ["Measured and calculated are phasors of the currents above, by the same estimator."]
+        noise, notes = (
+            None,
+            ["Measured and calculated are phasors of the currents above, by the same estimator."],
+        )
     chart = event_chart(
-        fit.event, [CalculatedCurve("estimate", power, style.PALETTE[0])], deviation=noise, around=power
+        fit.event,
+        [CalculatedCurve("estimate", power, style.PALETTE[0])],
+        deviation=noise,
+        around=power,
     )
     errors = f"epsilon_p {epsilon(fit.epsilon_p)}, epsilon_q {epsilon(fit.epsilon_q)}"
     page.chart(chart, " ".join([f"{about}: {errors}.", *notes]))
@@ -187,14 +252,37 @@ def event_curves(page: Report, fit: Any, noise: np.ndarray | None) -> None:
 def parameters(fit: "Identification") -> Table:
     """The estimates. Where the search ended is a detail, unless that lies outside an interval."""
     rows = [
-        [e.name, e.about, e.value, e.unit, "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
-         "{:g} .. {:g}".format(*e.bounds), e.search, brief(e.verdict)]
-        for e in fit.parameters.values() if e.name not in fit.result.nuisances
-    ]  # fmt: skip
-    columns = ["parameter", "meaning", "value", "unit", "95 % interval", "bounds", "search ended at", "verdict"]
+        [
+            e.name,
+            e.about,
+            e.value,
+            e.unit,
+            "{:.4g} .. {:.4g}".format(*e.interval) if e.interval else "",
+            "{:g} .. {:g}".format(*e.bounds),
+            e.search,
+            brief(e.verdict),
+        ]
+        for e in fit.parameters.values()
+        if e.name not in fit.result.nuisances
+    ]
+    columns = [
+        "parameter",
+        "meaning",
+        "value",
+        "unit",
+        "95 % interval",
+        "bounds",
+        "search ended at",
+        "verdict",
+    ]
     caption = EXACT if fit.adequate else SCATTERED
     return Table(
-        columns, rows, fit.model.model.title, caption, words=(1, 3, 7), detail=(1, 5) if fit.astray else (1, 5, 6)
+        columns,
+        rows,
+        fit.model.model.title,
+        caption,
+        words=(1, 3, 7),
+        detail=(1, 5) if fit.astray else (1, 5, 6),
     )
 
 
@@ -212,19 +300,24 @@ def tabulate_search_end(fit: "Identification") -> Table:
 
 
 def _parameters(page: Report, fit: "Identification", uncertainty: Uncertainty) -> None:
-    """The base of the values, a picture against the bounds, and what rivals make of the parameters."""
+    """The base of the values, a picture against the bounds, and what rivals make of
+    the parameters.
+    """
     result = fit.result
     if on_given_base := result.on_given_base():
         base = f"Values and bounds in the table are on the record's own base of {result.base}."
         page.text(f"{as_sentence(on_given_base)} {base}")
     page.chart(
         _forest(uncertainty, by_event(result.search["parameters"], result.search["per_event"])),
-        "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the upper bound); cross:"
+        "Estimates and 95 % intervals within the bounds of each parameter (0 is the lower, 1 the"
+        " upper bound); cross:"
         " where the search ended.",
     )
     nuisances = result.nuisances
     verdicts = uncertainty.verdicts.items()
-    poor = [f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances]
+    poor = [
+        f"{name}: {v}." for name, v in verdicts if v.word != IDENTIFIED and name not in nuisances
+    ]
     page.items([*map(as_sentence, fit.structures), *poor])
 
 
@@ -239,10 +332,16 @@ def error_table(events: Sequence[Any], of_events: Sequence[Any], epsilons: Seque
     """Entries of `events` and of `model_error` as `result.json` has them, a row each."""
     columns = ["event", "role", "model error", "95 % interval", "of S", *epsilons]
     rows = [
-        [e["name"], ROLES[e["role"]], in_percent(m["value"]), " .. ".join(map(in_percent, m["interval"])),
-         in_percent(m["of_S"]), *(epsilon(e[key]) for key in epsilons)]
+        [
+            e["name"],
+            ROLES[e["role"]],
+            in_percent(m["value"]),
+            " .. ".join(map(in_percent, m["interval"])),
+            in_percent(m["of_S"]),
+            *(epsilon(e[key]) for key in epsilons),
+        ]
         for e, m in zip(events, of_events, strict=True)
-    ]  # fmt: skip
+    ]
     return Table(columns, rows, "", MODEL_ERROR, words=(1,), detail=(4,))
 
 
@@ -251,33 +350,59 @@ def samples(fit: "Identification") -> list[str]:
     statistics = fit.result.uncertainty
     if "samples" not in statistics:
         return []
-    said = f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
+    said = (
+        f"{statistics['samples']} samples compared, {statistics['parameters']} parameters searched"
+    )
     return [f"fitted: {said}, {statistics['freedom']} degrees of freedom"]
 
 
 def correlations(fit: "Identification") -> list[str]:
-    """The correlations that a terminal has room for, the strongest first; [] where none is strong."""
+    """The correlations that a terminal has room for, the strongest first; [] where
+    none is strong.
+    """
     statistics = fit.result.uncertainty
     names, matrix = statistics.get("names", []), statistics.get("correlation", [])
     pairs = [(matrix[i][j], names[j], names[i]) for i in range(len(names)) for j in range(i)]
-    strong = [f"{a} and {b} {r:+.3f}" for r, a, b in sorted(pairs, key=lambda p: -abs(p[0])) if abs(r) >= TRADES]
+    strong = [
+        f"{a} and {b} {r:+.3f}"
+        for r, a, b in sorted(pairs, key=lambda p: -abs(p[0]))
+        if abs(r) >= TRADES
+    ]
     return [f"correlations of {TRADES} and more: {', '.join(strong)}"] if strong else []
 
 
 def _forest(uncertainty: Uncertainty, search: dict[str, float]) -> Chart:
     lower, width = uncertainty.lower, uncertainty.upper - uncertainty.lower
-    at, spans = (uncertainty.values - lower) / width, (uncertainty.intervals - lower[:, None]) / width[:, None]
+    at, spans = (
+        (uncertainty.values - lower) / width,
+        (uncertainty.intervals - lower[:, None]) / width[:, None],
+    )
     sentences = [
         f"{n}: {digits(v)}, {digits(a)} .. {digits(b)}"
-        for n, v, (a, b) in zip(uncertainty.names, uncertainty.values, uncertainty.intervals, strict=True)
+        for n, v, (a, b) in zip(
+            uncertainty.names, uncertainty.values, uncertainty.intervals, strict=True
+        )
     ]
     ended = (np.array([search[n] for n in uncertainty.names]) - lower) / width
     chart = Chart("between the bounds", [""], pixels=110 + 34 * len(uncertainty.names))
     chart.points(
-        "estimate and 95 % interval", at, uncertainty.names, style.PALETTE[0], size=9, hover=sentences, spans=spans
+        "estimate and 95 % interval",
+        at,
+        uncertainty.names,
+        style.PALETTE[0],
+        size=9,
+        hover=sentences,
+        spans=spans,
     )
-    chart.points("search", ended, uncertainty.names, style.PALETTE[1], symbol="x", size=8,
-                 hover=[f"{n}: search ended at {digits(search[n])}" for n in uncertainty.names])  # fmt: skip
+    chart.points(
+        "search",
+        ended,
+        uncertainty.names,
+        style.PALETTE[1],
+        symbol="x",
+        size=8,
+        hover=[f"{n}: search ended at {digits(search[n])}" for n in uncertainty.names],
+    )
     return chart.limits(None, -0.02, 1.02).limits(0, len(uncertainty.names) - 0.5, -0.5)
 
 
@@ -285,7 +410,9 @@ def _fitness(history: History, result: Any) -> Chart:
     valid = history.objective < REFUSED
     chart = Chart("simulations", ["best objective [pu²]"], log_y=True, pixels=300)
     best = np.maximum(history.objective[valid], 1e-30)
-    chart.line(result.optimizer or "search", history.simulations[valid], best, style.PALETTE[0], step=True)
+    chart.line(
+        result.optimizer or "search", history.simulations[valid], best, style.PALETTE[0], step=True
+    )
     return chart.level(max(result.objective, 1e-30), "estimate")
 
 
@@ -294,26 +421,36 @@ def _starts(page: Report, estimated: EstimationResult, uncertainty: Uncertainty)
     starts = estimated.starts
     above = np.maximum([s.above for s in starts], SAME_END_SHARE)
     chart = Chart("rank of the start", ["deviance above the best"], log_y=True, pixels=280)
-    looks = {"search": ("x", style.PALETTE[1]), "box": ("circle", style.PALETTE[0]),
-             "beside the best": ("diamond", style.PALETTE[2])}  # fmt: skip
+    looks = {
+        "search": ("x", style.PALETTE[1]),
+        "box": ("circle", style.PALETTE[0]),
+        "beside the best": ("diamond", style.PALETTE[2]),
+    }
     for origin, (symbol, color) in looks.items():
         at = [k for k, s in enumerate(starts) if s.origin == origin]
         sentences = [
             f"{origin}: "
-            + ", ".join(f"{n} {digits(v)}" for n, v in zip(uncertainty.names, starts[k].values, strict=True))
+            + ", ".join(
+                f"{n} {digits(v)}" for n, v in zip(uncertainty.names, starts[k].values, strict=True)
+            )
             for k in at
         ]
         if at:
-            chart.points(origin, [k + 1 for k in at], above[at], color, symbol=symbol, hover=sentences)
+            chart.points(
+                origin, [k + 1 for k in at], above[at], color, symbol=symbol, hover=sentences
+            )
     valleys = sum(1 for k, s in enumerate(starts) if k == 0 or s.above - starts[k - 1].above > 1.0)
     page.chart(
         chart,
-        f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at the lowest are the"
+        f"Descents of the likelihood from {len(starts)} starts ended at {valleys} heights; those at"
+        " the lowest are the"
         " estimate's valley. A difference of 3.8 is what a 95 % interval spans.",
     )
     with page.folded("where each start ended"):
-        page.table(["from", "above the best", *uncertainty.names],
-                   [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts])  # fmt: skip
+        page.table(
+            ["from", "above the best", *uncertainty.names],
+            [[s.origin, f"{s.above:.3g}", *map(digits, s.values)] for s in starts],
+        )
 
 
 def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
@@ -336,33 +473,71 @@ def _add_residual_section(page: Report, uncertainty: Uncertainty) -> None:
             lags.points(name, x + 0.2 * c, autocorrelation(rows, len(x)), color, size=5)
             limit = 1.96 / np.sqrt(max(len(rows), 1))
             lags.level(limit).level(-limit)
-        caption = f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+        caption = (
+            f"{event.record.name}: the whitened residual, in standard deviations of the noise."
+        )
         page.chart(chart.edge(event.t_start).edge(event.t_end), caption)
-        page.chart(lags, "Autocorrelation of the whitened residual; between the dashed lines is chance.")
+        page.chart(
+            lags, "Autocorrelation of the whitened residual; between the dashed lines is chance."
+        )
     with page.folded("tests of the residuals, and the noise"):
         page.table(
             ["event", "channel", "test", "statistic", "p", "says"],
-            [[t["event"], t["channel"], t["name"], digits(t["statistic"]), in_words(t["p"]), t["says"]]
-             for t in tests],
-            caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.", words=(1, 2, 4, 5),
-        )  # fmt: skip
+            [
+                [
+                    t["event"],
+                    t["channel"],
+                    t["name"],
+                    digits(t["statistic"]),
+                    in_words(t["p"]),
+                    t["says"],
+                ]
+                for t in tests
+            ],
+            caption=f"Of the residuals after whitening; below p = {REJECTED} a test speaks.",
+            words=(1, 2, 4, 5),
+        )
         page.table(
-            ["event", "channel", "noise [pu]", "before the dip [pu]", "order", "neighbors' correlation",
-             f"correlation of {drive.names[0]} and {drive.names[1]}"],
-            [[n["event"], n["channel"], digits(n["deviation"]), digits(n["before"]), str(n["order"]),
-              f"{n['correlation']:.2f}", f"{n['between_P_and_Q']:.2f}"] for n in uncertainty.noise],
-            caption="Noise of each channel, told from what the fit leaves before the dips and at the end of the"
-                    " records: an autoregression of the channels mixed until they are independent.", words=(1,),
-        )  # fmt: skip
+            [
+                "event",
+                "channel",
+                "noise [pu]",
+                "before the dip [pu]",
+                "order",
+                "neighbors' correlation",
+                f"correlation of {drive.names[0]} and {drive.names[1]}",
+            ],
+            [
+                [
+                    n["event"],
+                    n["channel"],
+                    digits(n["deviation"]),
+                    digits(n["before"]),
+                    str(n["order"]),
+                    f"{n['correlation']:.2f}",
+                    f"{n['between_P_and_Q']:.2f}",
+                ]
+                for n in uncertainty.noise
+            ],
+            caption="Noise of each channel, told from what the fit leaves before the dips and at"
+            " the end of the"
+            " records: an autoregression of the channels mixed until they are independent.",
+            words=(1,),
+        )
 
 
 def _conclusion(speaking: Sequence[dict[str, Any]], tests: int) -> str:
     if not tests:
         return "There are too few samples to test what is left."
     if not speaking:
-        return f"None of {tests} tests finds anything but noise in what is left: it is white and normal."
+        return (
+            f"None of {tests} tests finds anything but noise in what is left: it is white and"
+            " normal."
+        )
     said = sorted({f"{t['channel']} of {t['event']} is {t['says']}" for t in speaking})
-    return f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
+    return (
+        f"{len(speaking)} of {tests} tests find more than noise in what is left: {'; '.join(said)}."
+    )
 
 
 def _correlation(page: Report, uncertainty: Uncertainty) -> None:
@@ -370,24 +545,38 @@ def _correlation(page: Report, uncertainty: Uncertainty) -> None:
     names, matrix = uncertainty.names, uncertainty.information.correlation
     pairs = [(abs(matrix[i, j]), i, j) for i in range(len(names)) for j in range(i)]
     strong = [
-        f"{names[j]} and {names[i]} ({matrix[i, j]:+.3f})" for r, i, j in sorted(pairs, reverse=True) if r >= TRADES
+        f"{names[j]} and {names[i]} ({matrix[i, j]:+.3f})"
+        for r, i, j in sorted(pairs, reverse=True)
+        if r >= TRADES
     ]
     page.text(
-        f"These trade against each other, so that the record knows a combination of them: {', '.join(strong)}."
-        if strong else "No two parameters trade against each other."
-    )  # fmt: skip
+        "These trade against each other, so that the record knows a combination of them:"
+        f" {', '.join(strong)}."
+        if strong
+        else "No two parameters trade against each other."
+    )
     page.table(
         ["correlation", *names],
-        [[n, *(f"{r:+.3f}" for r in row[:k]), *[""] * (len(names) - k)]
-         for k, (n, row) in enumerate(zip(names, matrix, strict=True), start=1)],
-    )  # fmt: skip
+        [
+            [n, *(f"{r:+.3f}" for r in row[:k]), *[""] * (len(names) - k)]
+            for k, (n, row) in enumerate(zip(names, matrix, strict=True), start=1)
+        ],
+    )
 
 
 def _origin(result: Any, command: str) -> list[list[str]]:
     rows = [["command", command]] if command else []
-    rows.append(["tractexp", f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}"])
+    rows.append(
+        [
+            "tractexp",
+            f"{result.tractexp_version}{f', commit {result.commit}' if result.commit else ''}",
+        ]
+    )
     rows += [
-        [f"record {r['name']} ({r['role']})", "; ".join(filter(None, [str(Identity.of(r)), f"SHA-256 {r['sha256']}"]))]
+        [
+            f"record {r['name']} ({r['role']})",
+            "; ".join(filter(None, [str(Identity.of(r)), f"SHA-256 {r['sha256']}"])),
+        ]
         for r in result.records
     ]
     return rows
@@ -400,7 +589,10 @@ def _events(page: Report, uncertainty: Uncertainty, together: EventAgreement) ->
         page.verdict(*(f"{note}." for note in together.notes), kind="bad")
     page.table(
         ["without", *uncertainty.names],
-        [[event, *(_wider(gain[n]) for n in uncertainty.names)] for event, gain in together.gains.items()],
+        [
+            [event, *(_wider(gain[n]) for n in uncertainty.names)]
+            for event, gain in together.gains.items()
+        ],
         caption="How many times as wide each 95 % interval would be without the event.",
     )
 

@@ -14,23 +14,35 @@ if TYPE_CHECKING:
 
 WAVES = "frequency: in the phases, negative where the vector turns backwards"
 PHASORS = "frequency: of P and Q"
-POLES = "admittance: what the pole adds at first and what dies out, per unit of the record's base. {}."
+POLES = (
+    "admittance: what the pole adds at first and what dies out, per unit of the record's base. {}."
+)
 
 
 def poles(fit: "NetworkFit") -> Table:
     """Each pole, the slowest first."""
     rows = [
-        [k, f"{p['decay']:.4g}", f"{1000 / p['decay']:.4g}", f"{p['frequency']:.4g}", f"{p['admittance']:.4g}"]
+        [
+            k,
+            f"{p['decay']:.4g}",
+            f"{1000 / p['decay']:.4g}",
+            f"{p['frequency']:.4g}",
+            f"{p['admittance']:.4g}",
+        ]
         for k, p in enumerate(fit.poles, start=1)
     ]
     columns = ["pole", "decay [1/s]", "forgotten in [ms]", "frequency [Hz]", "admittance [pu]"]
-    return Table(columns, rows, "linear network", POLES.format(WAVES if fit.domain == "waves" else PHASORS))
+    return Table(
+        columns, rows, "linear network", POLES.format(WAVES if fit.domain == "waves" else PHASORS)
+    )
 
 
 def numbers(fit: "NetworkFit") -> Table:
     """What networks of fewer and of more poles leave."""
     keys = ["model_error", *["held_out"] * bool(fit.validate)]
-    rows = [[row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]]
+    rows = [
+        [row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]
+    ]
     chosen = f"The number of poles is chosen by {fit.content['chosen_by']}."
     return Table(["poles", "model error, fitted", "held out"][: 1 + len(keys)], rows, "", chosen)
 
@@ -42,7 +54,9 @@ def errors(fit: "NetworkFit") -> Table:
 
 def summary(fit: "NetworkFit") -> Report:
     """How much it leaves, its poles, and what other numbers of poles leave."""
-    return Report().text(as_sentence(fit.headline)).add(poles(fit)).add(errors(fit)).add(numbers(fit))
+    return (
+        Report().text(as_sentence(fit.headline)).add(poles(fit)).add(errors(fit)).add(numbers(fit))
+    )
 
 
 def report(fit: "NetworkFit") -> Report:
@@ -57,5 +71,8 @@ def report(fit: "NetworkFit") -> Report:
     page.heading("How well it fits").add(errors(fit)).add(numbers(fit))
     page.heading("Poles").add(poles(fit))
     page.heading("How this page was made")
-    origin = [["tractexp", fit.content["tractexp_version"]], *[["command", command()]] * bool(command())]
+    origin = [
+        ["tractexp", fit.content["tractexp_version"]],
+        *[["command", command()]] * bool(command()),
+    ]
     return page.table(["", ""], origin, words=(1,))

@@ -1,4 +1,6 @@
-"""The page of a look: the file, each load with what happened to it, zoomable, its command, the channels."""
+"""The page of a look: the file, each load with what happened to it, zoomable, its command, the
+channels.
+"""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -16,7 +18,9 @@ OPEN = 2  # loads whose charts are drawn at once; those of the others when they 
 LATE = 60.0  # s: nobody counts more in a file; events after it have the clock's time beside
 NOTHING = "nothing happened: the voltage stays within the thresholds of IEC 61000-4-30"
 BEFORE = "U, P and Q before the dip that is worth fitting, else at the beginning; P and Q consumed."
-UNNAMED = "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+UNNAMED = (
+    "no voltages and currents of one load were recognised; name them: voltages=[...] currents=[...]"
+)
 NOT_EXAMINED = "not examined"
 SECONDARY = "its values are secondary, of an unknown ratio: no kV, no MW"
 NO_CURRENT = "no current is recorded"
@@ -36,8 +40,10 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
         if len(entry["feeders"]) > 1:
             page.table(
                 ["load", "connected as", "channels", "U", "P", "Q", "events", "worth fitting"],
-                [_summary(f) for f in entry["feeders"]], words=(1, 2), caption=BEFORE,
-            )  # fmt: skip
+                [_summary(f) for f in entry["feeders"]],
+                words=(1, 2),
+                caption=BEFORE,
+            )
         for k, (shown, feeder) in enumerate(zip(view.sights, entry["feeders"], strict=True)):
             _load(page, view, shown, feeder, folded=k >= OPEN)
         if entry["channels"]:
@@ -49,10 +55,22 @@ def report(views: Sequence[View], content: Mapping[str, Any]) -> Report:
 def channels(entry: Mapping[str, Any]) -> Table:
     """The channels of a file, with their quality in detail."""
     caption = (
-        "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise about fundamental"
+        "Numbers count from 0, as data.voltages and data.currents do. RMS of the fundamental; noise"
+        " about fundamental"
         " and harmonics in the quietest ten cycles of the first calm, as a share of it."
     )
-    columns = ["number", "name", "phase", "unit", "primary RMS", "noise", "colour", "THD", "bits", "fit for what"]
+    columns = [
+        "number",
+        "name",
+        "phase",
+        "unit",
+        "primary RMS",
+        "noise",
+        "colour",
+        "THD",
+        "bits",
+        "fit for what",
+    ]
     rows = [_channel(c) for c in entry["channels"]]
     return Table(columns, rows, "", caption, words=(1, 2, 3, 6, 9), detail=(5, 6, 7, 8))
 
@@ -60,9 +78,21 @@ def channels(entry: Mapping[str, Any]) -> Table:
 def events(entry: Mapping[str, Any]) -> Table:
     """What happened to a load."""
     _, P, Q = entry["units"]
-    columns = ["dip", "kind", "starts [s]", "lasts [ms]", "depth", "jump [°]", "U2", f"P [{P}]", f"Q [{Q}]", "fit it?"]
+    columns = [
+        "dip",
+        "kind",
+        "starts [s]",
+        "lasts [ms]",
+        "depth",
+        "jump [°]",
+        "U2",
+        f"P [{P}]",
+        f"Q [{Q}]",
+        "fit it?",
+    ]
     caption = (
-        "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered as data.train and"
+        "Depth, U2 and jump against the voltage before. P and Q before and after. Dips are numbered"
+        " as data.train and"
         " data.validate take them."
     )
     return Table(columns, [event_row(e) for e in entry["events"]], "", caption, words=(1, 9))
@@ -72,7 +102,9 @@ def _lead(files: Sequence[Mapping[str, Any]]) -> str:
     loads = sum(len(f["feeders"]) for f in files)
     events = [e for f in files for feeder in f["feeders"] for e in feeder["events"]]
     worth = sum(e["worth"] for e in events)
-    return f"{count_noun(loads, 'load')}, {count_noun(len(events), 'event')}, {worth} worth fitting."
+    return (
+        f"{count_noun(loads, 'load')}, {count_noun(len(events), 'event')}, {worth} worth fitting."
+    )
 
 
 def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
@@ -83,7 +115,9 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
         page.verdict("Nothing here is worth fitting: the events below say why.", kind="bad")
         page.items([as_sentence(said) for said in unfitted.sentences([entry])])
     else:
-        page.verdict(f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good")
+        page.verdict(
+            f"To fit {'what is worth it' if len(commands) > 1 else commands[0][0]}:", kind="good"
+        )
         for name, command in commands:
             if len(commands) > 1:
                 page.text(f"{name}:")
@@ -91,16 +125,28 @@ def _conclusion(page: Report, entry: Mapping[str, Any]) -> None:
 
 
 def _facts(entry: Mapping[str, Any]) -> list[list[str]]:
-    segments = [f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s" for s in entry["segments"]]
-    rows = [["path", entry["file"]], ["read by", entry["reader"]], ["station", entry["station"]],
-            ["recorder", entry["device"]], ["starts", str(entry["start"] or "")], ["sampled", "; ".join(segments)],
-            ["lasts", f"{entry['seconds']:.3f} s"], ["frequency", frequency(entry)]]  # fmt: skip
+    segments = [
+        f"{s['samples']} samples at {s['rate']:g} Hz from {s['start']:.3f} s"
+        for s in entry["segments"]
+    ]
+    rows = [
+        ["path", entry["file"]],
+        ["read by", entry["reader"]],
+        ["station", entry["station"]],
+        ["recorder", entry["device"]],
+        ["starts", str(entry["start"] or "")],
+        ["sampled", "; ".join(segments)],
+        ["lasts", f"{entry['seconds']:.3f} s"],
+        ["frequency", frequency(entry)],
+    ]
     return [row for row in rows if row[1]]
 
 
 def frequency(entry: Mapping[str, Any]) -> str:
     measured = entry["measured_frequency"]
-    return f"{entry['frequency']:g} Hz nominal" + ("" if measured is None else f", {measured:.3f} Hz measured")
+    return f"{entry['frequency']:g} Hz nominal" + (
+        "" if measured is None else f", {measured:.3f} Hz measured"
+    )
 
 
 def size(entry: Mapping[str, Any]) -> str:
@@ -114,16 +160,31 @@ def size(entry: Mapping[str, Any]) -> str:
 def _channel(c: Mapping[str, Any]) -> list[str]:
     noise, thd = (None if c[key] is None else 100 * c[key] for key in ("noise_share", "thd"))
     return [
-        str(c["number"]), c["name"], c["phase"], c["unit"], figure(c["magnitude"], 4, c["primary_unit"]),
-        figure(noise, 2, "%"), c["colour"], figure(thd, 2, "%"), figure(c["bits"], 3), c["fit"],
-    ]  # fmt: skip
+        str(c["number"]),
+        c["name"],
+        c["phase"],
+        c["unit"],
+        figure(c["magnitude"], 4, c["primary_unit"]),
+        figure(noise, 2, "%"),
+        c["colour"],
+        figure(thd, 2, "%"),
+        figure(c["bits"], 3),
+        c["fit"],
+    ]
 
 
 def _summary(entry: Mapping[str, Any]) -> list[str]:
     sizes = [figure(entry[key], 4, unit) for key, unit in zip("UPQ", entry["units"], strict=True)]
     channels = ", ".join(map(str, (*entry["voltages"], *entry["currents"])))
     worth = [e for e in entry["events"] if e["worth"]]
-    return [entry["name"], entry["connection"], channels, *sizes, str(len(entry["events"])), str(len(worth))]
+    return [
+        entry["name"],
+        entry["connection"],
+        channels,
+        *sizes,
+        str(len(entry["events"])),
+        str(len(worth)),
+    ]
 
 
 def _load(page: Report, view: View, shown: Sight, entry: Mapping[str, Any], folded: bool) -> None:
@@ -150,7 +211,9 @@ def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
         sentences.append(f"{when} {text}.")
     if entry["sum_V"] is not None:
         current = "" if entry["sum_I"] is None else f", the currents to {entry['sum_I']:.2%}"
-        sentences.append(f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}.")
+        sentences.append(
+            f"The voltages of the three phases sum to {entry['sum_V']:.2%} of one{current}."
+        )
     return sentences
 
 
@@ -171,7 +234,9 @@ def explain_unnamed(entry: Mapping[str, Any]) -> str:
 
 
 def starts(event: Mapping[str, Any], unit: str = "") -> str:
-    """When an event starts: seconds of the file, and late in a long one the clock's time too, where it is known."""
+    """When an event starts: seconds of the file, and late in a long one the clock's time too, where
+    it is known.
+    """
     seconds = f"{event['start']:.3f}{unit}"
     if not event.get("when") or event["start"] < LATE:
         return seconds
@@ -182,7 +247,13 @@ def starts(event: Mapping[str, Any], unit: str = "") -> str:
 def event_row(e: Mapping[str, Any]) -> list[str]:
     powers = [change(e[f"{x}_before"], e[f"{x}_after"]) for x in "PQ"]
     return [
-        "" if e["dip"] is None else str(e["dip"]), e["kind"], starts(e), f"{1000 * e['duration']:.0f}",
-        f"{e['depth']:.1%}", degrees(e["jump"]), share(e["U2"]), *powers,
+        "" if e["dip"] is None else str(e["dip"]),
+        e["kind"],
+        starts(e),
+        f"{1000 * e['duration']:.0f}",
+        f"{e['depth']:.1%}",
+        degrees(e["jump"]),
+        share(e["U2"]),
+        *powers,
         f"{'yes' if e['worth'] else 'no'}: {e['why']}",
-    ]  # fmt: skip
+    ]

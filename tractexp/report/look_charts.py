@@ -1,4 +1,6 @@
-"""The charts of a look: each load with what happened to it, zoomable, and the channels of no load."""
+"""The charts of a look: each load with what happened to it, zoomable, and the
+channels of no load.
+"""
 
 import functools
 from collections.abc import Callable
@@ -30,15 +32,19 @@ LONGEST_SHOWN_EVENT = 3.0  # s of an event there
 SPECTRUM_CYCLES = 10  # of a spectrum
 HEIGHTS = (1.3, 1.3, 1, 1, 1, 1.2, 0.7)  # of the panels of a load
 TRACE, TRACES = 0.19, 24  # height of a status channel beside these; so many have room
-FIRST_CURSOR_CYCLES = 1.5  # cycles after which phasors show what an event is: at first the cursor stands there
+# cycles after which phasors show what an event is: at first the cursor stands there
+FIRST_CURSOR_CYCLES = 1.5
 PHASES = {3: ("a", "b", "c"), 1: ("u, i",)}
 LABEL = 0.12  # of the axis of time: room that an event's label takes on a phone
 BOUND = 0.1  # of the nominal frequency: what lies further off is that of a dead line
 SHADES = {"dip": PALETTE[5], "swell": PALETTE[4], "interruption": PALETTE[3]}
 CAPTION = (
-    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical components and powers"
-    " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click for the whole."
-    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the first"
+    "Waveforms, primary values; RMS of one cycle every half cycle (IEC 61000-4-30); symmetrical"
+    " components and powers"
+    " of one-cycle phasors, P [MW] and Q [Mvar] positive when consumed. Drag to zoom, double-click"
+    " for the whole."
+    " Above the chart are the values at the cursor, and the one-cycle phasors, turned so that the"
+    " first"
     " voltage lies at 0°: voltages thin, currents thick."
 )
 
@@ -50,7 +56,10 @@ def charts(page: Report, view: View, shown: Sight) -> None:
         every, coarse = _every(view)
         page.chart(_of_waves(view, shown, every, coarse), CAPTION + _further(view))
         with page.folded("Spectrum before anything happened"):
-            page.chart(_spectrum(view.recording, shown), f"{SPECTRUM_CYCLES} cycles, Hann window, of phase a.")
+            page.chart(
+                _spectrum(view.recording, shown),
+                f"{SPECTRUM_CYCLES} cycles, Hann window, of phase a.",
+            )
         if max(every, coarse) > 1:
             _details(page, view, shown)
 
@@ -74,10 +83,21 @@ def add_unassigned_channels(page: Report, view: View) -> None:
     for panel, group in enumerate(panels.values()):
         for k, channel in enumerate(group):
             for segment in (s for s in recording.segments if s.stop > s.first + 1):
-                y = _thin_wave(functools.partial(_read, channel, segment), segment.stop - segment.first, every)
-                chart.samples(channel.name, segment.start, every / segment.rate, y, PALETTE[k % len(PALETTE)], panel)
+                y = _thin_wave(
+                    functools.partial(_read, channel, segment), segment.stop - segment.first, every
+                )
+                chart.samples(
+                    channel.name,
+                    segment.start,
+                    every / segment.rate,
+                    y,
+                    PALETTE[k % len(PALETTE)],
+                    panel,
+                )
     with page.folded(f"The {count_noun(count, 'channel')} of no load"):
-        page.chart(chart.cursor(recording.segments[0].start), "Primary values, where the unit is known.")
+        page.chart(
+            chart.cursor(recording.segments[0].start), "Primary values, where the unit is known."
+        )
 
 
 def _mark_events(chart: Chart, shown: Sight) -> Chart:
@@ -87,7 +107,13 @@ def _mark_events(chart: Chart, shown: Sight) -> Chart:
     last = -np.inf
     for event in shown.events:
         what = event.what
-        text = "" if what.start < last + room else what.kind if event.dip is None else f"{what.kind} {event.dip}"
+        text = (
+            ""
+            if what.start < last + room
+            else what.kind
+            if event.dip is None
+            else f"{what.kind} {event.dip}"
+        )
         last = what.start if text else last
         chart.shade(what.start, what.end, SHADES.get(what.kind, "#BBBBBB"), opacity=0.25, text=text)
     return chart
@@ -98,10 +124,19 @@ def _of_record(shown: Sight) -> Chart:
     assert record is not None
     panels = {"U": ("U", "U2"), "P, Q": ("P", "Q"), "f [Hz]": ("f",)}
     colors = {"U": VOLTAGE, "U2": PALETTE[3], "P": ACTIVE, "Q": REACTIVE, "f": FAINT}
-    sizes = {"U": record.base.voltage, "U2": record.base.voltage, "P": record.base.power, "Q": record.base.power}
-    panels_of = {label: [n for n in names if n in record.channels] for label, names in panels.items()}
-    units = {"U": "[pu]" if record.base.voltage == 1 else "[kV]", "P, Q": "[pu]" if record.base.power == 1 else
-            "[MW, Mvar]"}  # fmt: skip
+    sizes = {
+        "U": record.base.voltage,
+        "U2": record.base.voltage,
+        "P": record.base.power,
+        "Q": record.base.power,
+    }
+    panels_of = {
+        label: [n for n in names if n in record.channels] for label, names in panels.items()
+    }
+    units = {
+        "U": "[pu]" if record.base.voltage == 1 else "[kV]",
+        "P, Q": "[pu]" if record.base.power == 1 else "[MW, Mvar]",
+    }
     used = [label for label, names in panels_of.items() if names]
     chart = Chart("t [s]", [f"{label} {units.get(label, '')}".strip() for label in used])
     for panel, label in enumerate(used):
@@ -109,22 +144,36 @@ def _of_record(shown: Sight) -> Chart:
             values = record.channels[name] * sizes.get(name, 1.0)
             chart.samples(name, float(record.t[0]), record.step, values, colors[name], panel)
     first = float(record.t[0])
-    return _mark_events(chart, shown).cursor(next((event.what.start for event in shown.events), first))
+    return _mark_events(chart, shown).cursor(
+        next((event.what.start for event in shown.events), first)
+    )
 
 
 def _every(view: View) -> tuple[int, int]:
-    """How many samples and how many phasors become one on a page, so that all loads of a file have room."""
+    """How many samples and how many phasors become one on a page, so that all loads of a file have
+    room.
+    """
     recording = view.recording
     assert recording is not None
-    lines = sum(len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None)
+    lines = sum(
+        len(s.feeder.voltages) + len(s.feeder.currents) for s in view.sights if s.feeder is not None
+    )
     phasors = LINES * sum(len(p.t) for s in view.sights for p in s.phasors)
-    return max(1, -(-lines * recording.samples // MOST_PAGE_SAMPLES)), max(1, -(-phasors // MOST_PHASORS))
+    return max(1, -(-lines * recording.samples // MOST_PAGE_SAMPLES)), max(
+        1, -(-phasors // MOST_PHASORS)
+    )
 
 
 def _of_waves(
-    view: View, shown: Sight, every: int = 1, coarse: int = 1, span: tuple[float, float] | None = None
+    view: View,
+    shown: Sight,
+    every: int = 1,
+    coarse: int = 1,
+    span: tuple[float, float] | None = None,
 ) -> Chart:
-    """All panels of a load; so many samples and phasors become one. Within the times `span` [s] none do."""
+    """All panels of a load; so many samples and phasors become one. Within the times `span` [s]
+    none do.
+    """
     recording, states = view.recording, view.operations[:TRACES]
     assert recording is not None
     assert shown.feeder is not None
@@ -148,7 +197,9 @@ def _of_waves(
     if recording.trigger is not None and first <= recording.trigger <= last:
         chart.edge(recording.trigger, VOLTAGE, "dash", text="trigger")
     happened = (event.what.start for event in shown.events if first <= event.what.start <= last)
-    return _mark_events(chart, shown).cursor(next(happened, first) + FIRST_CURSOR_CYCLES / recording.frequency)
+    return _mark_events(chart, shown).cursor(
+        next(happened, first) + FIRST_CURSOR_CYCLES / recording.frequency
+    )
 
 
 def _further(view: View) -> str:
@@ -159,10 +210,17 @@ def _further(view: View) -> str:
 
 
 def _waves(
-    chart: Chart, recording: Recording, shown: Sight, segment: Segment, every: int, span: tuple[float, float] | None
+    chart: Chart,
+    recording: Recording,
+    shown: Sight,
+    segment: Segment,
+    every: int,
+    span: tuple[float, float] | None,
 ) -> None:
     assert shown.feeder is not None
-    waves = FeederWaves.of(recording, shown.feeder, segment if span is None else segment.between(*span))
+    waves = FeederWaves.of(
+        recording, shown.feeder, segment if span is None else segment.between(*span)
+    )
     rate, start = segment.rate, waves.segment.start
     if waves.shape[1] < 2:
         return
@@ -170,7 +228,16 @@ def _waves(
     colors, names = _colors(K), _name_waves(recording, shown.feeder, K)
     for k in range(2 * K):
         y = _thin_wave(functools.partial(_row, waves, k), waves.shape[1], every)
-        chart.samples(PHASES[K][k % K], start, every / rate, y, colors[k % K], panel=k // K, width=1.0, label=names[k])
+        chart.samples(
+            PHASES[K][k % K],
+            start,
+            every / rate,
+            y,
+            colors[k % K],
+            panel=k // K,
+            width=1.0,
+            label=names[k],
+        )
     t, rms = half_cycle_rms(waves, rate, recording.frequency)
     if len(t) > 1:
         for k, values in enumerate(rms):
@@ -183,11 +250,17 @@ def _colors(phases: int) -> tuple[str, ...]:
 
 
 def _name_waves(recording: Recording, feeder: Feeder, phases: int) -> list[str]:
-    """What the waves of a load are called at the cursor: by phase, and by channel where they are its channels."""
+    """What the waves of a load are called at the cursor: by phase, and by channel where they are
+    its channels.
+    """
     numbers = (*feeder.voltages, *feeder.currents)
-    if len(numbers) != 2 * phases:  # line voltages, or two current transformers, of which phases are made
+    # line voltages, or two current transformers, of which phases are made
+    if len(numbers) != 2 * phases:
         return [*PHASES[phases]] * 2
-    return [f"{PHASES[phases][k % phases]} ({recording.channels[i].name})" for k, i in enumerate(numbers)]
+    return [
+        f"{PHASES[phases][k % phases]} ({recording.channels[i].name})"
+        for k, i in enumerate(numbers)
+    ]
 
 
 def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> None:
@@ -196,13 +269,18 @@ def _phasors(chart: Chart, p: Any, part: slice, nominal: float, every: int) -> N
     step = float(t[-1] - t[0]) / (len(t) - 1)
     sparse = max(1, -(-4 * p.V.shape[0] * len(t) // MOST_ARROWS))
     for panel, phases in enumerate((p.V, p.I)):
-        for name, color, turning in zip(PHASES[len(phases)], _colors(len(phases)), phases, strict=True):
+        for name, color, turning in zip(
+            PHASES[len(phases)], _colors(len(phases)), phases, strict=True
+        ):
             chart.phasors(name, float(t[0]), step * sparse, turning[part][::sparse], color, panel)
     lines = [("P", p.S.real, ACTIVE, 5), ("Q", p.S.imag, REACTIVE, 5)]
     if len(p.V) == 3:
         zero = np.abs(p.V.mean(axis=0))
-        lines += [("positive sequence", np.abs(p.V1), VOLTAGE, 4), ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
-                  ("zero sequence", zero, MEASURED, 4)]  # fmt: skip
+        lines += [
+            ("positive sequence", np.abs(p.V1), VOLTAGE, 4),
+            ("negative sequence", np.abs(p.V2), PALETTE[3], 4),
+            ("zero sequence", zero, MEASURED, 4),
+        ]
     else:
         lines.append(("phasor of U", np.abs(p.V[0]), VOLTAGE, 4))
     alive = np.abs(p.f / nominal - 1) < BOUND
@@ -221,14 +299,18 @@ def _row(waves: FeederWaves, k: int, a: int, b: int) -> np.ndarray:
 
 
 def _thin_wave(read: Callable[[int, int], np.ndarray], n: int, every: int) -> np.ndarray:
-    """A wave of n samples, or its `envelope`, of what `read(first, stop)` gives a block at a time."""
+    """A wave of n samples, or its `envelope`, of what `read(first, stop)` gives a
+    block at a time.
+    """
     block = max(BLOCK // (2 * every), 1) * 2 * every
     parts = (read(a, min(a + block, n)) for a in range(0, n, block))
     return np.concatenate([part if every == 1 else envelope(part, every) for part in parts])
 
 
 def envelope(wave: np.ndarray, every: int) -> np.ndarray:
-    """The lowest and highest (2 M,) of each 2 `every` samples of a wave (N,), in the order in which they came."""
+    """The lowest and highest (2 M,) of each 2 `every` samples of a wave (N,), in the order in which
+    they came.
+    """
     rows = np.full(-(-len(wave) // (2 * every)) * 2 * every, wave[-1])
     rows[: len(wave)] = wave
     parts = rows.reshape(-1, 2 * every)
@@ -256,11 +338,16 @@ def _spectrum(recording: Recording, shown: Sight) -> Chart:
 
 
 def _details(page: Report, view: View, shown: Sight) -> None:
-    """A chart with every sample for each event, where the chart of the whole has not all of them."""
+    """A chart with every sample for each event, where the chart of the whole has not
+    all of them.
+    """
     for event in shown.events[:DETAILED]:
         what = event.what
         span = (what.start - AROUND[0], min(what.end, what.start + LONGEST_SHOWN_EVENT) + AROUND[1])
         with page.folded(f"Every sample of the {what.kind} at {what.start:.3f} s"):
             page.chart(_of_waves(view, shown, span=span), "As above, not thinned.")
     if len(shown.events) > DETAILED:
-        page.text(f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such chart.")
+        page.text(
+            f"The {len(shown.events) - DETAILED} events after the first {DETAILED} have no such"
+            " chart."
+        )

@@ -1,4 +1,6 @@
-"""What a terminal shows of a look: the answer, each bus, each load in one line; everything where it is asked for."""
+"""What a terminal shows of a look: the answer, each bus, each load in one line; everything where it
+is asked for.
+"""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -8,7 +10,17 @@ from tractexp.blocks import Report, Table
 from tractexp.recording.excursion import HYSTERESIS
 from tractexp.recording.happening import OF_LOADS
 from tractexp.report import unfitted
-from tractexp.report.look import NO_LOAD, SECONDARY, channels, events, explain_unnamed, frequency, quiet, size, starts
+from tractexp.report.look import (
+    NO_LOAD,
+    SECONDARY,
+    channels,
+    events,
+    explain_unnamed,
+    frequency,
+    quiet,
+    size,
+    starts,
+)
 from tractexp.wording import count_noun, figure, join_words
 
 NOTES = 3  # of a file that have room
@@ -17,11 +29,16 @@ Entry = Mapping[str, Any]  # a file, a load or an event of `look.json`
 
 
 def summary(content: Entry) -> Report:
-    """One screen: which load and which dip to fit by which command, then a line for each file, bus and load."""
+    """One screen: which load and which dip to fit by which command, then a line for each file, bus
+    and load.
+    """
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         held = [count_noun(len(entry["channels"]), "channel")] * bool(entry["channels"])
-        page.text("; ".join([_about(entry), *held]), *(f"  note: {note}" for note in entry["notes"][:NOTES]))
+        page.text(
+            "; ".join([_about(entry), *held]),
+            *(f"  note: {note}" for note in entry["notes"][:NOTES]),
+        )
         page.text(*[f"  note: {len(entry['notes']) - NOTES} more"] * (len(entry["notes"]) > NOTES))
         buses = _buses(entry["feeders"])
         page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
@@ -30,7 +47,9 @@ def summary(content: Entry) -> Report:
         unloaded = [feeder["name"] for feeder in entry["feeders"] if not feeder["loaded"]]
         if unloaded and len(unloaded) < len(entry["feeders"]):
             page.text(f"  {NO_LOAD}: {', '.join(unloaded)}")
-        page.items(list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"])))
+        page.items(
+            list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"]))
+        )
         page.text(*[f"  {explain_unnamed(entry)}"] * (not buses and len(content["files"]) > 1))
     return page
 
@@ -46,7 +65,9 @@ def build_full_report(content: Entry) -> Report:
             wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
             page.text(f"load {feeder['name']}{wired}: {size(feeder) or 'nothing measured'}")
             page.items([*feeder["why"], *feeder["said"]])
-            page.add(*[events(feeder)] * bool(feeder["events"])).items([quiet(feeder)] * (not feeder["events"]))
+            page.add(*[events(feeder)] * bool(feeder["events"])).items(
+                [quiet(feeder)] * (not feeder["events"])
+            )
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
         page.text(*([f"  {explain_unnamed(entry)}"] * (not entry["feeders"])))
@@ -59,7 +80,8 @@ def _answer(files: Sequence[Entry]) -> str:
     promising = [feeder for feeder in feeders if _worth(feeder)]
     if promising:
         best = max(promising, key=lambda feeder: _measure_answer(_worth(feeder)[0]))
-        best = next(feeder for feeder in promising if feeder["command"] == best["command"])  # the one fitted by it
+        # the one fitted by it
+        best = next(feeder for feeder in promising if feeder["command"] == best["command"])
         first = _worth(best)[0]
         command = f"; to fit it: {best['command']}" if best["command"] else ""
         secondary = f"; {SECONDARY}" if best.get("secondary") else ""
@@ -70,7 +92,10 @@ def _answer(files: Sequence[Entry]) -> str:
     if not happened and unexamined:
         return unexamined[0]
     if not happened:
-        return f"nothing is worth fitting: {next(iter((*map(quiet, feeders), *map(explain_unnamed, files))), '')}"
+        return (
+            "nothing is worth fitting:"
+            f" {next(iter((*map(quiet, feeders), *map(explain_unnamed, files))), '')}"
+        )
     feeder, event = max(happened, key=lambda each: _measure_answer(each[1]))
     return f"nothing is worth fitting; {_event(event)} of {feeder['name']}: {event['why']}"
 
@@ -93,22 +118,34 @@ def _label(event: Entry) -> str:
 
 
 def _event(event: Entry) -> str:
-    return f"{_label(event)} at {starts(event, ' s')} ({event['depth']:.1%}, {1000 * event['duration']:.0f} ms)"
+    return (
+        f"{_label(event)} at {starts(event, ' s')} ({event['depth']:.1%},"
+        f" {1000 * event['duration']:.0f} ms)"
+    )
 
 
 def _reservation(why: str) -> str:
-    """What is to be known of an event that is worth fitting nevertheless: the first clause after its size."""
+    """What is to be known of an event that is worth fitting nevertheless: the first clause after
+    its size.
+    """
     return f", but {_clause(why, '; ')}" if "; " in why else ""
 
 
 def _clause(why: str, after: str) -> str:
-    """What decides, of a sentence such as 'the voltage falls by 30 %, but P is negative before it: ...'."""
+    """What decides, of a sentence such as 'the voltage falls by 30 %, but P is negative before it:
+    ...'.
+    """
     return re.split(r"[:(]", why.split(after, 1)[-1])[0].strip()
 
 
 def _about(entry: Entry) -> str:
     rates = ", ".join(f"{rate:g} Hz" for rate in dict.fromkeys(entry["rates"]))
-    about = [entry["station"], entry["device"], str(entry["start"] or ""), f"{entry['seconds']:.3f} s at {rates}"]
+    about = [
+        entry["station"],
+        entry["device"],
+        str(entry["start"] or ""),
+        f"{entry['seconds']:.3f} s at {rates}",
+    ]
     return f"{entry['file']}: {'; '.join(filter(None, [*about, frequency(entry)]))}"
 
 
@@ -126,15 +163,19 @@ def _same(event: Entry) -> tuple[Any, ...]:
 
 def _common(bus: Sequence[Entry]) -> list[Entry]:
     """What happened to the voltage: the events that all loads of a bus have."""
-    each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [feeder["events"] for feeder in bus]
+    each = [feeder["events"] for feeder in bus if feeder["loaded"]] or [
+        feeder["events"] for feeder in bus
+    ]
     shared = set.intersection(*({_same(event) for event in events} for events in each))
     return [event for event in each[0] if _same(event) in shared]
 
 
 def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
-    """What happened to the voltage of a bus: what its loads share, and the worst of what each of them shows.
+    """What happened to the voltage of a bus: what its loads share, and the worst of what each of
+    them shows.
 
-    Circuits that open at different instants divide one fault at different times: it is told from first to last.
+    Circuits that open at different instants divide one fault at different times: it is told from
+    first to last.
     """
     shared = _common(bus)
     loads = [feeder for feeder in bus if feeder["loaded"]] or bus
@@ -145,7 +186,10 @@ def _of_voltage(bus: Sequence[Entry]) -> list[Entry]:
             continue
         if told and _overlap(event, told[-1]):
             last = told.pop()
-            worst, end = max(last, event, key=lambda each: abs(each["depth"])), max(last["end"], event["end"])
+            worst, end = (
+                max(last, event, key=lambda each: abs(each["depth"])),
+                max(last["end"], event["end"]),
+            )
             span = {"start": last["start"], "end": end, "duration": end - last["start"]}
             event = {**last, "depth": worst["depth"], **span}
         told.append(event)
@@ -177,10 +221,18 @@ def _loads(entry: Entry, buses: Sequence[Sequence[Entry]]) -> Table:
     """A load in each row: those without load are left out where there are others."""
     loaded = any(feeder["loaded"] for feeder in entry["feeders"])
     rows = [
-        [feeder["name"], number, ", ".join(map(str, feeder["currents"])), *(figure(feeder[key]) for key in "PQ"),
-         _own(feeder, _common(bus)), _fit(feeder)]
-        for number, bus in enumerate(buses, 1) for feeder in bus if feeder["loaded"] or not loaded
-    ]  # fmt: skip
+        [
+            feeder["name"],
+            number,
+            ", ".join(map(str, feeder["currents"])),
+            *(figure(feeder[key]) for key in "PQ"),
+            _own(feeder, _common(bus)),
+            _fit(feeder),
+        ]
+        for number, bus in enumerate(buses, 1)
+        for feeder in bus
+        if feeder["loaded"] or not loaded
+    ]
     P, Q = entry["feeders"][0]["units"][1:]
     columns = ["load", "bus", "currents", f"P [{P}]", f"Q [{Q}]", "beside", "fit it?"]
     empty = {k for k in range(len(columns)) if not any(row[k] for row in rows)}
@@ -195,7 +247,9 @@ def _own(feeder: Entry, common: Sequence[Entry]) -> str:
 
 
 def _fit(feeder: Entry) -> str:
-    """Which of a load's dips are worth fitting, with what is to be known of the first; else what decides against it."""
+    """Which of a load's dips are worth fitting, with what is to be known of the first; else what
+    decides against it.
+    """
     if worth := _worth(feeder):
         return f"yes: {', '.join(map(_label, worth))}{_reservation(worth[0]['why'])}"
     if feeder["events"]:

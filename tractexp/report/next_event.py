@@ -9,27 +9,38 @@ from tractexp.discrepancy.next_event.choose import DECIDED, EventTrial, NextEven
 from tractexp.wording import as_sentence
 
 MOST_EVENTS_A_KIND = 2  # events of each kind that a table has
-KINDS = ("dip", "tap or capacitor bank", "dip with a phase jump and f", "unbalanced dip with U2", "dip sampled faster")
+KINDS = (
+    "dip",
+    "tap or capacitor bank",
+    "dip with a phase jump and f",
+    "unbalanced dip with U2",
+    "dip sampled faster",
+)
 
 
 def report(choice: NextEvent, title: str) -> Report:
     """The page of a plan for rivals."""
     page = Report("What to record next", f"For {title}, to tell {' from '.join(choice.rivals)}.")
     sure = choice.probability >= DECIDED
-    page.verdict(as_sentence(choice.sentence()), kind="good" if sure else "bad" if choice.same else "plain")
+    page.verdict(
+        as_sentence(choice.sentence()), kind="good" if sure else "bad" if choice.same else "plain"
+    )
     section(page, choice)
     return page
 
 
 def section(page: Report, choice: NextEvent) -> None:
-    """The chances by dip as charts, the best events of each kind, and which pair each tells apart."""
+    """The chances by dip as charts, the best events of each kind, and which pair each
+    tells apart.
+    """
     if not choice.same or len(choice.rivals) > 2:
         page.chart(_chart(choice), _caption(choice))
     page.heading("What each kind of event would do", 3)
     page.table(
         ["event", "probability [%]"],
         [_row(t) for kind in KINDS for t in _best(choice, kind)],
-        "Probability that all rivals but the true one are rejected, the least over all of them as the truth. The best"
+        "Probability that all rivals but the true one are rejected, the least over all of them as"
+        " the truth. The best"
         " events of each kind.",
         words=(0,),
     )
@@ -38,23 +49,35 @@ def section(page: Report, choice: NextEvent) -> None:
     page.table(
         ["if the truth is", *(f"{k} is rejected [%]" for k in range(1, 1 + len(choice.rivals)))],
         [
-            [f"{a + 1}: {name}", *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(best.chances.pairs[a]))]
+            [
+                f"{a + 1}: {name}",
+                *("" if a == b else f"{100 * p:.0f}" for b, p in enumerate(best.chances.pairs[a])),
+            ]
             for a, name in enumerate(choice.rivals)
         ],
         f"By {best.event.words}.",
         words=(0,),
     )
     page.text(
-        "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the records leave them;"
-        " all others are fitted to the records and the new event together, under the noise of their fits"
-        + (", by a refit of every parameter." if best.refitted else ", linearised about their fits.")
+        "Each rival in turn is taken as the truth with its fitted parameters, as uncertain as the"
+        " records leave them;"
+        " all others are fitted to the records and the new event together, under the noise of their"
+        " fits"
+        + (
+            ", by a refit of every parameter."
+            if best.refitted
+            else ", linearised about their fits."
+        )
         + " Noise of the voltage, and laws that no rival has, are not in it."
     )
 
 
 def _caption(choice: NextEvent) -> str:
     decided = f"Dashed: the {DECIDED:.0%} from which an event is recommended as sure."
-    return f"Probability that one dip more tells all rivals apart, by its depth and duration. {decided}"
+    return (
+        "Probability that one dip more tells all rivals apart, by its depth and duration."
+        f" {decided}"
+    )
 
 
 def _chart(choice: NextEvent) -> Chart:
@@ -62,7 +85,9 @@ def _chart(choice: NextEvent) -> Chart:
     chart = Chart("depth of the dip [%]", ["probability [%]"], pixels=360)
     plain = [t for t in choice.tried if _kind(t) == KINDS[0]]
     for color, duration in zip(PALETTE, sorted({t.event.duration for t in plain}), strict=False):
-        line = sorted((t.event.depth, t.chances.least) for t in plain if t.event.duration == duration)
+        line = sorted(
+            (t.event.depth, t.chances.least) for t in plain if t.event.duration == duration
+        )
         x, y = 100 * np.array(line).T
         chart.line(f"{1000 * duration:.0f} ms", x, y, color, width=2.0)
     return chart.level(100 * DECIDED).limits(0, -3, 103)
@@ -80,7 +105,10 @@ def _kind(tried: EventTrial) -> str:
 
 
 def _best(choice: NextEvent, kind: str) -> list[EventTrial]:
-    ranked = sorted((t for t in choice.tried if _kind(t) == kind), key=lambda t: (-t.chances.least, t.event.burden))
+    ranked = sorted(
+        (t for t in choice.tried if _kind(t) == kind),
+        key=lambda t: (-t.chances.least, t.event.burden),
+    )
     return ranked[:MOST_EVENTS_A_KIND]
 
 

@@ -15,7 +15,8 @@ from tractexp.report.waves import Drawn, wave_chart
 
 BASE, EXTENDED, NEAREST = "#D55E00", "#0072B2", "#CC79A7"
 IN_PHASORS = (
-    "The record's estimator run over the recorded and over the calculated currents, so that its window cancels; a dip"
+    "The record's estimator run over the recorded and over the calculated currents, so that its"
+    " window cancels; a dip"
     " of few cycles is smeared alike in both."
 )
 MOST_OPEN_OVERLAYS = 4  # events of each role that are not folded
@@ -50,22 +51,31 @@ def chart(overlay: Overlay) -> Chart:
     """One event with the curves of the models; the noise band is that of the best of them."""
     curves = [CalculatedCurve(*model) for model in _models(overlay)]
     return event_chart(
-        overlay.event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places,
+        overlay.event,
+        curves,
+        deviation=overlay.deviation,
+        around=_best(overlay),
+        places=overlay.places,
         driving=overlay.driving,
-    )  # fmt: skip
+    )
 
 
 def currents(event: WaveEvent, overlay: Overlay) -> Chart:
     """The currents of the phases, in which the noise band is that of the best of the models."""
     curves = [Drawn(*model) for model in _models(overlay)]
-    return wave_chart(event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places)
+    return wave_chart(
+        event, curves, deviation=overlay.deviation, around=_best(overlay), places=overlay.places
+    )
 
 
 def in_phasors(event: WaveEvent, overlay: Overlay) -> Chart:
     """What the record's estimator sees in the currents, calculated and recorded."""
-    curves = [(name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)]
+    curves = [
+        (name, as_phasors(event, calculated), *look) for name, calculated, *look in _models(overlay)
+    ]
     return event_chart(
-        curves[0][1][0], [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in curves]
+        curves[0][1][0],
+        [CalculatedCurve(name, np.stack(power), *look) for name, (_, *power), *look in curves],
     )
 
 
@@ -76,7 +86,11 @@ def _models(overlay: Overlay) -> list[tuple[str, np.ndarray, str, str]]:
         ("nearest candidates", overlay.nearest, NEAREST, "dot"),
         ("extended model", overlay.after, EXTENDED, "solid"),
     )
-    return [(name, calculated, color, dash) for name, calculated, color, dash in models if calculated is not None]
+    return [
+        (name, calculated, color, dash)
+        for name, calculated, color, dash in models
+        if calculated is not None
+    ]
 
 
 def _best(overlay: Overlay) -> np.ndarray:

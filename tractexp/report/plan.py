@@ -1,4 +1,6 @@
-"""The page of a plan: what was asked, the answer, what each kind of dip would tell, and which events to fit."""
+"""The page of a plan: what was asked, the answer, what each kind of dip would tell, and which
+events to fit.
+"""
 
 import itertools
 import math
@@ -67,26 +69,37 @@ def summary(content: Mapping[str, Any]) -> Report:
 
 
 def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
-    """The forecasts over one property of the dip, about so many of them, in percent of the value."""
+    """The forecasts over one property of the dip, about so many of them, in percent
+    of the value.
+    """
     forecasts, names = content["half_intervals"][label], [*content["parameters"]]
     picked = forecasts[:: max(1, round(len(forecasts) / rows))]
-    cells = [[f"{f['at']:.4g}", *(percent(math.nan if f[n] is None else f[n]) for n in names)] for f in picked]
-    title = f"half of the 95 % interval, % of the value, by {label}; a dash from ten times the value on"
+    cells = [
+        [f"{f['at']:.4g}", *(percent(math.nan if f[n] is None else f[n]) for n in names)]
+        for f in picked
+    ]
+    title = (
+        f"half of the 95 % interval, % of the value, by {label}; a dash from ten times the value on"
+    )
     return Table([label.partition(",")[0].partition(" ")[0], *names], cells, title)
 
 
 def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     needed = planned.needed
     title = f"How deep a dip tells {needed.parameter}"
-    page = Report(title, f"A plan for {planned.problem.model.title}, before anything more is recorded.")
+    page = Report(
+        title, f"A plan for {planned.problem.model.title}, before anything more is recorded."
+    )
     page.verdict(as_sentence(str(needed)), kind="bad" if needed.depth is None else "good")
     by_depth, *others = [_chart(planned, label, legend=label == DEPTH) for label in planned.scans]
     page.chart(by_depth, _caption(needed))
     _add_question_section(page, planned)
     page.heading("What another kind of dip would tell")
     page.text(
-        "One property of the dip is varied at a time, the others stay as planned. Each curve is half of the 95 %"
-        " interval in percent of the value, in the colors above; it ends where that is ten times the value,"
+        "One property of the dip is varied at a time, the others stay as planned. Each curve is"
+        " half of the 95 %"
+        " interval in percent of the value, in the colors above; it ends where that is ten times"
+        " the value,"
         " or the record cannot tell it."
     )
     page.charts(others)
@@ -95,8 +108,10 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
     _events(page, planned)
     page.heading("What it rests on").items(
         [
-            f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each parameter at"
-            " the values above. Where the interval is wide, or the values are far off, so is the forecast.",
+            f"Intervals follow from the sensitivity of {planned.problem.domain.compared} to each"
+            " parameter at"
+            " the values above. Where the interval is wide, or the values are far off, so is the"
+            " forecast.",
             f"The planned dip falls from 1 pu and comes back along {planned.problem.domain.edges}.",
             "Noise of the recorded voltage, and effects that the model lacks, are not in it.",
         ]
@@ -107,22 +122,34 @@ def report(planned: Planned, content: Mapping[str, Any]) -> Report:
 def _caption(needed: Needed) -> str:
     met = "" if needed.depth is None else ", met at the dotted line"
     return (
-        "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the dip. Dashed: the"
+        "Half of the 95 % interval of each parameter, in percent of its value, by the depth of the"
+        " dip. Dashed: the"
         f" ± {100 * needed.within:g} % asked for {needed.parameter}{met}."
     )
 
 
 def _chart(planned: Planned, label: str, legend: bool) -> Chart:
-    """Half intervals in percent against one property of the dip; the parameter asked for is drawn bold."""
+    """Half intervals in percent against one property of the dip; the parameter asked for is drawn
+    bold.
+    """
     needed, (x, forecasts) = planned.needed, planned.scans[label]
     text, factor = AXES[label]
     at = factor * np.asarray(x, dtype=float)
     relative = np.array([f.relative for f in forecasts])
     relative = 100 * np.where(relative < CEILING, relative, np.nan)
     few = max(at) > 19.5 * min(at) > 0  # tried values far apart: they are the marks
-    chart = Chart(text, ["± % of the value"], log_x=few, log_y=True, pixels=440 if legend else 320, legend=legend)
+    chart = Chart(
+        text,
+        ["± % of the value"],
+        log_x=few,
+        log_y=True,
+        pixels=440 if legend else 320,
+        legend=legend,
+    )
     bold = column(forecasts[0].names, needed.parameter)
-    for j, (name, (color, dash)) in enumerate(zip(forecasts[0].names, itertools.cycle(LINES), strict=False)):
+    for j, (name, (color, dash)) in enumerate(
+        zip(forecasts[0].names, itertools.cycle(LINES), strict=False)
+    ):
         name = f"{name} ({INERTIA})" if j == bold and needed.parameter == INERTIA else name
         chart.line(name, at, relative[:, j], color, dash=dash, width=3.2 if j == bold else 1.5)
     chart.level(100 * needed.within)
@@ -130,12 +157,17 @@ def _chart(planned: Planned, label: str, legend: bool) -> Chart:
         chart.edge(factor * needed.depth)
     if few:
         chart.ticks(None, at.tolist()).limits(None, min(at) / 1.1, 1.2 * max(at))
-    low, high = np.nanmin(relative, initial=100 * needed.within), np.nanmax(relative, initial=100 * needed.within)
+    low, high = (
+        np.nanmin(relative, initial=100 * needed.within),
+        np.nanmax(relative, initial=100 * needed.within),
+    )
     return chart.limits(0, 0.8 * low, 1.25 * high).ticks(0, marks(low, high))
 
 
 def marks(low: float, high: float) -> list[float]:
-    """Where a logarithmic axis from low to high is marked: powers of ten, and 2 and 5 times these where it is short."""
+    """Where a logarithmic axis from low to high is marked: powers of ten, and 2 and 5 times these
+    where it is short.
+    """
     digits = (1.0, 2.0, 5.0) if high < 100 * low else (1.0,)
     powers = range(int(np.floor(np.log10(low))), int(np.ceil(np.log10(high))) + 1)
     return [float(f"{digit}e{power}") for power in powers for digit in digits]
@@ -147,7 +179,8 @@ def _add_question_section(page: Report, planned: Planned) -> None:
     stands = ", which is known as well as M," * (needed.parameter == INERTIA)
     page.heading("What was asked").items(
         [
-            f"How deep must a dip be for {needed.parameter}{stands} to be known within ± {100 * needed.within:g} %?",
+            f"How deep must a dip be for {needed.parameter}{stands} to be known within ±"
+            f" {100 * needed.within:g} %?",
             as_sentence(planned.dip),
             f"Recorded already: {', '.join(e.record.name for e in problem.events)}.",
         ]
@@ -155,7 +188,8 @@ def _add_question_section(page: Report, planned: Planned) -> None:
     page.table(
         ["symbol", "meaning", "value", "unit", "bounds"],
         [*_symbols(planned)],
-        caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per unit of the"
+        caption=f"Planned at {planned.origin}. P and Q are the active and reactive power; pu is per"
+        " unit of the"
         " record's own base.",
         words=(1,),
     )
@@ -173,27 +207,39 @@ def _symbols(planned: Planned) -> Iterator[list[str]]:
         frequency = problem.events[0].record.base.frequency
         yield [
             INERTIA,
-            f"inertia constant M omega_s / 2, omega_s = 2 pi {frequency:g} rad/s: kinetic energy at synchronous"
+            f"inertia constant M omega_s / 2, omega_s = 2 pi {frequency:g} rad/s: kinetic energy at"
+            " synchronous"
             " speed, over the base power",
-            f"{values['M'] * np.pi * frequency:.4g}", "s", "those of M",
-        ]  # fmt: skip
+            f"{values['M'] * np.pi * frequency:.4g}",
+            "s",
+            "those of M",
+        ]
 
 
 def _events(page: Report, planned: Planned) -> None:
     """The best events of the archive, in the order in which they are worth fitting."""
     page.heading("Which events of the archive to fit")
     if not planned.chosen:
-        page.text("There is one event. With several in data.train, the page names those that tell most together.")
+        page.text(
+            "There is one event. With several in data.train, the page names those that tell most"
+            " together."
+        )
         return
     names, values = planned.problem.space.names, np.maximum(np.abs(planned.values), 1e-12)
     rows = [
-        [str(k), c.name, "" if k == 1 else f"{c.gain:.0%}", *map(percent, np.asarray(c.half) / values)]
+        [
+            str(k),
+            c.name,
+            "" if k == 1 else f"{c.gain:.0%}",
+            *map(percent, np.asarray(c.half) / values),
+        ]
         for k, c in enumerate(planned.chosen, start=1)
     ]
     page.table(
         ["", "event", "narrower by", *names],
         rows,
-        caption="Half of the 95 % interval of a joint fit of this event and those above it, in percent of the value.",
+        caption="Half of the 95 % interval of a joint fit of this event and those above it, in"
+        " percent of the value.",
         words=(1,),
     )
     if left_out := rest(planned):

@@ -1,4 +1,6 @@
-"""The page of a sample of the posterior: how likely each value is, beside what the fit says of it."""
+"""The page of a sample of the posterior: how likely each value is, beside what the
+fit says of it.
+"""
 
 import numpy as np
 
@@ -8,13 +10,20 @@ from tractexp.blocks.style import ACTIVE, FAINT, PALETTE
 from tractexp.identification.posterior import ENOUGH, PosteriorSample
 from tractexp.identification.uncertainty import Uncertainty
 from tractexp.record.identity import title_of
-from tractexp.report.profile import LARGEST_END_DIFFERENCE, SCATTER, axis, find_declared_parameter, span
+from tractexp.report.profile import (
+    LARGEST_END_DIFFERENCE,
+    SCATTER,
+    axis,
+    find_declared_parameter,
+    span,
+)
 from tractexp.wording import as_sentence
 
 HISTOGRAM_BINS = 60  # of a histogram
 DOTS = 1500  # draws shown of a pair
 CAPTION = (
-    "Blue: how often the draws fall on each value. Dashed: the normal distribution that the curvature at the estimate"
+    "Blue: how often the draws fall on each value. Dashed: the normal distribution that the"
+    " curvature at the estimate"
     " stands for. Shaded: the 95 % interval of the posterior. Dotted: the estimate."
 )
 
@@ -24,12 +33,19 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     names = title_of(e.record for e in uncertainty.likelihood.problem.events)
     page = Report(
         f"Posterior: {names}",
-        f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of emcee's ensemble.",
+        f"A flat prior within the bounds; {len(drawn.draws)} draws of {drawn.steps} steps of"
+        " emcee's ensemble.",
     )
     sentences = (
-        [as_sentence(grade)] * bool(grade) + [_agreement(uncertainty, drawn)] + [SCATTER] * (not uncertainty.exact)
+        [as_sentence(grade)] * bool(grade)
+        + [_agreement(uncertainty, drawn)]
+        + [SCATTER] * (not uncertainty.exact)
     )
-    page.verdict(*sentences, _describe_chain_length(drawn), kind="good" if uncertainty.exact and drawn.converged else "plain")
+    page.verdict(
+        *sentences,
+        _describe_chain_length(drawn),
+        kind="good" if uncertainty.exact and drawn.converged else "plain",
+    )
     page.charts([_chart(uncertainty, drawn, j) for j in range(len(drawn.names))])
     page.text(CAPTION)
     page.heading("Intervals")
@@ -48,7 +64,8 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
     page.heading(f"{drawn.names[a]} and {drawn.names[b]} depend on each other most")
     r = np.corrcoef(drawn.draws[:, [a, b]].T)[0, 1]
     page.chart(
-        _pair(uncertainty, drawn, a, b), f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}."
+        _pair(uncertainty, drawn, a, b),
+        f"{min(DOTS, len(drawn.draws))} of the draws; their correlation is {r:+.2f}.",
     )
     return page
 
@@ -58,10 +75,17 @@ def _agreement(uncertainty: Uncertainty, drawn: PosteriorSample) -> str:
     off = np.abs(drawn.intervals - uncertainty.intervals).max(axis=1) / np.maximum(
         np.ptp(uncertainty.intervals, axis=1) / 2, 1e-300
     )
-    moved = [name for name, far in zip(drawn.names, off, strict=True) if not far <= LARGEST_END_DIFFERENCE]
+    moved = [
+        name
+        for name, far in zip(drawn.names, off, strict=True)
+        if not far <= LARGEST_END_DIFFERENCE
+    ]
     if not moved:
         return "The posterior confirms the intervals of the fit."
-    return f"The posterior confirms the intervals of the fit but those of {', '.join(moved)}: take the posterior's."
+    return (
+        f"The posterior confirms the intervals of the fit but those of {', '.join(moved)}: take the"
+        " posterior's."
+    )
 
 
 def _describe_chain_length(drawn: PosteriorSample) -> str:
@@ -77,7 +101,10 @@ def _chart(uncertainty: Uncertainty, drawn: PosteriorSample, j: int) -> Chart:
     chart = Chart(axis(uncertainty, drawn.names[j]), ["density"], pixels=250, legend=False)
     chart.shade(float(low), float(high), PALETTE[5], opacity=0.25)
     if np.isfinite(half):
-        at, error = np.linspace(edges[0], edges[-1], 151), uncertainty.information.standard_errors[j]
+        at, error = (
+            np.linspace(edges[0], edges[-1], 151),
+            uncertainty.information.standard_errors[j],
+        )
         normal = np.exp(-(((at - value) / error) ** 2) / 2) / (error * np.sqrt(2 * np.pi))
         chart.line("curvature", at, normal, FAINT, dash="dash")
     chart.line("posterior", edges, np.append(density, density[-1]), PALETTE[0], step=True)
@@ -93,6 +120,10 @@ def _closest(drawn: PosteriorSample) -> tuple[int, int]:
 
 def _pair(uncertainty: Uncertainty, drawn: PosteriorSample, a: int, b: int) -> Chart:
     some = drawn.draws[:: max(1, len(drawn.draws) // DOTS)][:DOTS]
-    chart = Chart(axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420)
+    chart = Chart(
+        axis(uncertainty, drawn.names[a]), [axis(uncertainty, drawn.names[b])], pixels=420
+    )
     chart.points("draws", some[:, a], some[:, b], PALETTE[5], size=3)
-    return chart.points("estimate", [uncertainty.values[a]], [uncertainty.values[b]], ACTIVE, size=10)
+    return chart.points(
+        "estimate", [uncertainty.values[a]], [uncertainty.values[b]], ACTIVE, size=10
+    )

@@ -21,7 +21,9 @@ BAR, ROOM = 24, 1.15  # pixels; of the longest bar, for what stands beside the b
 
 
 def add_prediction_section(page: Report, findings: Findings) -> None:
-    """The model's error on the held-out events with each set, and by what it divides that of the base model."""
+    """The model's error on the held-out events with each set, and by what it divides that of the
+    base model.
+    """
     criteria, evidence = findings.context.criteria, findings.evidence
     best = [evidence.term] if evidence.term else []
     every = sorted((*evidence.every, *best), key=lambda row: row.predicted.left)
@@ -34,24 +36,32 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         return
     page.chart(
         _bars(findings, rows),
-        "The model's error on the held-out events, in percent of the response, with the sets that predict them best"
-        " (green: added, orange: tied with it, gray: the base model). All were fitted to the other events by least"
+        "The model's error on the held-out events, in percent of the response, with the sets that"
+        " predict them best"
+        " (green: added, orange: tied with it, gray: the base model). All were fitted to the other"
+        " events by least"
         " squares. Dashed: what a name, or each of the best sets that have it, undercuts.",
     )
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
         [
-            [_label(findings, row), in_percent(row.predicted.error),
-             f"{np.sqrt(evidence.base.predicted.left / row.predicted.left):.2f}",
-             _status(findings, row), "; ".join(map(str, _sizes(findings, row)))]
+            [
+                _label(findings, row),
+                in_percent(row.predicted.error),
+                f"{np.sqrt(evidence.base.predicted.left / row.predicted.left):.2f}",
+                _status(findings, row),
+                "; ".join(map(str, _sizes(findings, row))),
+            ]
             for row in rows
         ],
-        f"A name, or each of the best sets that have it, divides the error of the base model by {criteria.divides:g}."
-        f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of the library is"
-        " ahead of it by that, all by more than chance (blocks that share the response, left out in turn)."
-        + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
+        "A name, or each of the best sets that have it, divides the error of the base model by"
+        f" {criteria.divides:g}."
+        f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of"
+        " the library is"
+        " ahead of it by that, all by more than chance (blocks that share the response, left out in"
+        " turn)." + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
         words=(0, 3, 4),
-    )  # fmt: skip
+    )
 
 
 def _label(findings: Findings, row: SetEvidence) -> str:
@@ -63,7 +73,10 @@ def _label(findings: Findings, row: SetEvidence) -> str:
 def _bars(findings: Findings, rows: Sequence[SetEvidence]) -> Chart:
     errors = [100 * row.predicted.error for row in rows]
     chart = Chart("model error, held out [%]", [""], pixels=130 + BAR * len(rows))
-    labels, colors = [_label(findings, row) for row in rows], [_color(findings, row) for row in rows]
+    labels, colors = (
+        [_label(findings, row) for row in rows],
+        [_color(findings, row) for row in rows],
+    )
     chart.bars("", labels, errors, colors, hover=[f"{error:.3g}" for error in errors])
     for row, error in zip(rows, errors, strict=True):
         if row is findings.evidence.base:

@@ -1,4 +1,6 @@
-"""The page of the profiles: how the fit worsens when one parameter is held, and what that says about its interval."""
+"""The page of the profiles: how the fit worsens when one parameter is held, and what that says
+about its interval.
+"""
 
 from collections.abc import Mapping
 from typing import Any
@@ -19,13 +21,16 @@ ABOVE = 2.2  # thresholds that a chart shows
 BELOW = 0.12  # thresholds of room below the best fit
 ENOUGH = "is enough"
 SCATTER = (
-    "More than noise is left, so these are intervals of least squares: they hold by how much the estimate scatters, not"
+    "More than noise is left, so these are intervals of least squares: they hold by how much the"
+    " estimate scatters, not"
     " by how much what the model lacks moves it."
 )
 CURVE, PARABOLA, SHADE = PALETTE[0], FAINT, PALETTE[5]
 CAPTION = (
-    "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of the parameter, above"
-    " the best of all, over what this parameter's may rise by in units of {threshold:.2f}. Dashed: the"
+    "Blue: the deviance (twice the fall of the log-likelihood) of the best fit for each value of"
+    " the parameter, above"
+    " the best of all, over what this parameter's may rise by in units of {threshold:.2f}. Dashed:"
+    " the"
     " parabola of the curvature at the estimate. Where the blue curve crosses the line at"
     " {threshold:.2f}, the 95 % interval ends; it is shaded. The mark is the estimate."
 )
@@ -46,20 +51,32 @@ def report(scan: Profiles, grade: str = "") -> Report:
     sentences = [*[SCATTER] * (not uncertainty.exact), *_where(says), *_poor(verdicts)]
     graded = [as_sentence(grade)] * bool(grade)
     page.verdict(
-        *graded, *sentences, *(as_sentence(note) for note in scan.notes), kind=_kind(verdicts, uncertainty.exact)
+        *graded,
+        *sentences,
+        *(as_sentence(note) for note in scan.notes),
+        kind=_kind(verdicts, uncertainty.exact),
     )
     titles = {name: f"{name}: {verdict.word}" for name, verdict in verdicts.items()}
     page.charts([_chart(scan, profile, titles[profile.name]) for profile in scan.profiles])
     page.text(CAPTION.format(threshold=scan.threshold))
     page.heading("Intervals")
     page.table(
-        ["parameter", "meaning", "estimate", "unit", "95 % by curvature", "95 % by profile", "what the profile says"],
+        [
+            "parameter",
+            "meaning",
+            "estimate",
+            "unit",
+            "95 % by curvature",
+            "95 % by profile",
+            "what the profile says",
+        ],
         [_row(scan, profile, says[profile.name]) for profile in scan.profiles],
         words=(1, 6),
     )
     page.heading("What it rests on").items(
         [
-            "The interval by curvature is right where the deviance is a parabola; the profile is right wherever the"
+            "The interval by curvature is right where the deviance is a parabola; the profile is"
+            " right wherever the"
             " model and the noise are, and needs no parabola.",
             f"{scan.simulations} simulations beyond the identification.",
             "An effect that the model lacks moves the estimates and is in neither interval.",
@@ -72,7 +89,15 @@ def _row(scan: Profiles, profile: LikelihoodProfile, says: str) -> list[str]:
     value, half = _curvature(scan, profile.name)
     about = find_declared_parameter(scan.uncertainty, profile.name)
     by_curvature = span(value - half, value + half) if np.isfinite(half) else "none"
-    return [profile.name, about.about, f"{value:.4g}", about.unit, by_curvature, span(*profile.interval), says]
+    return [
+        profile.name,
+        about.about,
+        f"{value:.4g}",
+        about.unit,
+        by_curvature,
+        span(*profile.interval),
+        says,
+    ]
 
 
 def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
@@ -90,7 +115,9 @@ def meaning(scan: Profiles, profile: LikelihoodProfile) -> str:
     if short:
         said.append(f"not followed to its end {' and '.join(short)}: raise points")
     if profile.minima:
-        said.append(f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate")
+        said.append(
+            f"{' and '.join(f'{m:.4g}' for m in profile.minima)} fits about as well as the estimate"
+        )
     if not said:
         said.append(_compare_half_widths(scan, profile))
     return as_sentence("; ".join(said))
@@ -103,7 +130,8 @@ def _compare_half_widths(scan: Profiles, profile: LikelihoodProfile) -> str:
         return "the curvature gives no interval, the profile does"
     off = np.array([low - (value - half), high - (value + half)]) / half
     if np.abs(off).max() <= LARGEST_END_DIFFERENCE:
-        return f"{format_half_width(value, half, *find_declared_parameter(scan.uncertainty, profile.name).bounds)} {ENOUGH}"
+        declared = find_declared_parameter(scan.uncertainty, profile.name)
+        return f"{format_half_width(value, half, *declared.bounds)} {ENOUGH}"
     if off[0] > LARGEST_END_DIFFERENCE and off[1] < -LARGEST_END_DIFFERENCE:
         return "narrower than by curvature"
     if off[0] < -LARGEST_END_DIFFERENCE and off[1] > LARGEST_END_DIFFERENCE:
@@ -120,18 +148,30 @@ def _where(says: Mapping[str, str]) -> list[str]:
     sentences = []
     if enough:
         every = "every parameter" if not rest else ", ".join(enough)
-        sentences.append(f"For {every} the curvature's interval is enough: the likelihood is a parabola there.")
+        sentences.append(
+            f"For {every} the curvature's interval is enough: the likelihood is a parabola there."
+        )
     if rest:
-        sentences.append(f"For {', '.join(rest)} it misleads: there the profile's interval is the right one.")
+        sentences.append(
+            f"For {', '.join(rest)} it misleads: there the profile's interval is the right one."
+        )
     return sentences
 
 
 def _kind(verdicts: Mapping[str, ParameterVerdict], exact: bool) -> str:
-    return "good" if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values()) else "plain"
+    return (
+        "good"
+        if exact and all(verdict.word == IDENTIFIED for verdict in verdicts.values())
+        else "plain"
+    )
 
 
 def _poor(verdicts: Mapping[str, ParameterVerdict]) -> list[str]:
-    poor = [f"{name} is {verdict.word}" for name, verdict in verdicts.items() if verdict.word != IDENTIFIED]
+    poor = [
+        f"{name} is {verdict.word}"
+        for name, verdict in verdicts.items()
+        if verdict.word != IDENTIFIED
+    ]
     return [as_sentence("; ".join(poor)) if poor else "Every parameter is identified."]
 
 
@@ -146,14 +186,20 @@ def _chart(scan: Profiles, profile: LikelihoodProfile, title: str) -> Chart:
     value, half = _curvature(scan, profile.name)
     top = ABOVE * scan.threshold
     x, y = _smooth(profile)
-    chart = Chart(axis(scan.uncertainty, profile.name), ["deviance"], pixels=290, title=title, legend=False)
+    chart = Chart(
+        axis(scan.uncertainty, profile.name), ["deviance"], pixels=290, title=title, legend=False
+    )
     chart.shade(*profile.interval, SHADE, opacity=0.25)
     if np.isfinite(half):
         parabola = scan.threshold * ((x - value) / half) ** 2
-        chart.line("curvature", x, np.where(parabola < 2 * top, parabola, np.nan), PARABOLA, dash="dash")
+        chart.line(
+            "curvature", x, np.where(parabola < 2 * top, parabola, np.nan), PARABOLA, dash="dash"
+        )
     chart.line("profile", x, y, CURVE).points("", profile.values, profile.deviance, CURVE, size=4)
     chart.points("", [value], [0.0], ACTIVE, size=9, hover=[f"estimate {value:.5g}"])
-    chart.level(scan.threshold).ticks(0, [0.0, scan.threshold, 2 * scan.threshold], _marks(scan.threshold))
+    chart.level(scan.threshold).ticks(
+        0, [0.0, scan.threshold, 2 * scan.threshold], _marks(scan.threshold)
+    )
     return chart.limits(0, -BELOW * scan.threshold, top).limits(None, x.min(), x.max())
 
 
@@ -162,7 +208,9 @@ def _marks(threshold: float) -> list[str]:
 
 
 def _smooth(profile: LikelihoodProfile) -> tuple[np.ndarray, np.ndarray]:
-    """The curve between the points fitted: straight on the signed root, as the interval is found."""
+    """The curve between the points fitted: straight on the signed root, as the
+    interval is found.
+    """
     x = np.linspace(profile.values.min(), profile.values.max(), 201)
     best = profile.values[profile.deviance.argmin()]
     root = np.sign(profile.values - best) * np.sqrt(np.maximum(profile.deviance, 0.0))
@@ -172,7 +220,9 @@ def _smooth(profile: LikelihoodProfile) -> tuple[np.ndarray, np.ndarray]:
 
 def find_declared_parameter(uncertainty: Uncertainty, name: str) -> Any:
     """The parameter (a `Parameter`) of a name, which may say its event."""
-    return next(p for p in uncertainty.likelihood.problem.parameters if p.name == name.partition("[")[0])
+    return next(
+        p for p in uncertainty.likelihood.problem.parameters if p.name == name.partition("[")[0]
+    )
 
 
 def axis(uncertainty: Uncertainty, name: str) -> str:

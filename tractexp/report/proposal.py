@@ -34,16 +34,24 @@ def add_proposal_section(page: Report, findings: Findings) -> None:
         page.text(f"No term is proposed: {findings.proposed.why}.")
         _add_tried_terms(page, findings.proposed.tried)
         return
-    page.text(f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found by a screen.")
+    page.text(
+        f"{as_sentence(proposal.term.words)} No effect of the catalogue has this term; it was found"
+        " by a screen."
+    )
     page.equation(proposal.term.latex)
     if proposal.term.exogenous:
-        page.text("It is not a function of the voltage: something happened by itself, and need not happen again.")
+        page.text(
+            "It is not a function of the voltage: something happened by itself, and need not happen"
+            " again."
+        )
     _numbers(page, proposal)
     _add_explanation(page, proposal)
     _plot_term(page, proposal)
     _rivals(page, proposal)
     page.text(f"The file {PLUGIN} beside this page is the term as an effect:")
-    command = f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
+    command = (
+        f"python -m tractexp {findings.context.domain.setting}'model.effects=[proposed_effect]' ..."
+    )
     page.code(f"cp {PLUGIN} <your package>/effects/ && {command}")
     with page.folded("The plugin file"):
         page.code(proposal.source)
@@ -64,15 +72,23 @@ def _numbers(page: Report, proposal: Proposal) -> None:
         for p in (k.parameter,)
     ]
     page.table(
-        ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"], rows,
-        "Intervals by the curvature of the fit to the fitted events, the base model and the faults of the measurement"
-        " left free beside it.", words=(1, 2, 3),
-    )  # fmt: skip
+        ["parameter", "in the equation", "meaning", "unit", "value", "95 % interval"],
+        rows,
+        "Intervals by the curvature of the fit to the fitted events, the base model and the faults"
+        " of the measurement"
+        " left free beside it.",
+        words=(1, 2, 3),
+    )
     page.table(
         ["event", "from t [s]", "to t [s]", "channel", "largest change [pu]"],
-        [[a.event, f"{a.start:.3f}", f"{a.end:.3f}", a.channel, f"{a.most:+.3g}"] for a in proposal.acting],
-        "When it acts: where it changes what is calculated by more than a tenth of the most it does.", words=(3,),
-    )  # fmt: skip
+        [
+            [a.event, f"{a.start:.3f}", f"{a.end:.3f}", a.channel, f"{a.most:+.3g}"]
+            for a in proposal.acting
+        ],
+        "When it acts: where it changes what is calculated by more than a tenth of the most it"
+        " does.",
+        words=(3,),
+    )
 
 
 def _add_explanation(page: Report, proposal: Proposal) -> None:
@@ -81,18 +97,26 @@ def _add_explanation(page: Report, proposal: Proposal) -> None:
         for role, g in (("fitted", proposal.train), ("held out", proposal.validate))
     ]
     page.table(
-        ["events", "model's error without it", "with it", "explained"], rows,
-        "Errors are of the response, faults of the measurement free in both; explained is the term's part of what it"
-        " gains and what pushes into the balances or the other terms tried would gain beside it, beyond chance;"
+        ["events", "model's error without it", "with it", "explained"],
+        rows,
+        "Errors are of the response, faults of the measurement free in both; explained is the"
+        " term's part of what it"
+        " gains and what pushes into the balances or the other terms tried would gain beside it,"
+        " beyond chance;"
         f" {chance(proposal.p)}.",
-    )  # fmt: skip
+    )
 
 
 def _plot_term(page: Report, proposal: Proposal) -> None:
     """What the base model misses in each event, and what the term makes of it."""
     for role, judged in (("fitted", proposal.train), ("held out", proposal.validate)):
-        page.text(f"What the base model misses, and what the model with the term draws beyond it ({role}):")
-        page.charts([_plot_missed_part(judged, e) for e in range(min(len(judged.by_event), EVENTS))])
+        page.text(
+            "What the base model misses, and what the model with the term draws beyond it"
+            f" ({role}):"
+        )
+        page.charts(
+            [_plot_missed_part(judged, e) for e in range(min(len(judged.by_event), EVENTS))]
+        )
 
 
 def _plot_missed_part(judged: GapTest, e: int) -> Chart:
@@ -104,7 +128,8 @@ def _plot_missed_part(judged: GapTest, e: int) -> Chart:
     missed = np.where(bench.valid[:, part], bench.drive.measured[:, part] - base, np.nan)
     more = judged.after.calculated[:, part] - base
     t = event.record.t[event.record.samples - base.shape[1] :]
-    measured = [c for c in range(len(base)) if bench.valid[c, part].any()]  # a delta winding has no zero sequence
+    # a delta winding has no zero sequence
+    measured = [c for c in range(len(base)) if bench.valid[c, part].any()]
     chart = Chart(f"t [s], {event.record.name}", [f"{bench.drive.names[c]} [pu]" for c in measured])
     for row, c in enumerate(measured):
         chart.line("measured less base model", t, missed[c], MISSED, row, width=1.0)
@@ -118,11 +143,12 @@ def _rivals(page: Report, proposal: Proposal) -> None:
             ["also possible", "explained of the fitted events", "of the held-out events"],
             [[t.words, percent(a), percent(b)] for t, a, b in proposal.ties],
             "These events cannot tell them from the term proposed.",
-        )  # fmt: skip
+        )
     if proposal.alike:
         names = join_words([f"{name} ({share:.0%})" for name, share in proposal.alike])
         page.text(
-            f"Textbook effects that look like it, with the share of its change each could have made: {names}. None of"
+            "Textbook effects that look like it, with the share of its change each could have"
+            f" made: {names}. None of"
             " them is adequate by itself."
         )
     else:
@@ -135,8 +161,23 @@ def _add_tried_terms(page: Report, tried: Sequence[tuple[Term, TermAssessment]])
         return
     with page.folded("The best terms of the library, judged"):
         page.table(
-            ["term", "explained, fitted", "explained, held out", "left, fitted", "left, held out", "chance"],
-            [[t.words, *(percent(g.explained) for g in gaps), *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
-              in_words(w.p)] for t, w in tried for gaps in ((w.train, w.validate),)],
+            [
+                "term",
+                "explained, fitted",
+                "explained, held out",
+                "left, fitted",
+                "left, held out",
+                "chance",
+            ],
+            [
+                [
+                    t.words,
+                    *(percent(g.explained) for g in gaps),
+                    *(f"{g.after.chi2_per_sample:.2f}" for g in gaps),
+                    in_words(w.p),
+                ]
+                for t, w in tried
+                for gaps in ((w.train, w.validate),)
+            ],
             "Shares explained, and what is left over the variance of the noise.",
-        )  # fmt: skip
+        )

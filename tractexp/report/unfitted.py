@@ -1,8 +1,9 @@
-"""What a recording still tells of its loads where no event of it is worth fitting, and how to have more.
+"""What a recording still tells of its loads where no event of it is worth fitting, and how to have
+more.
 
-A voltage that stays at a new level moves the static part of a load: its exponents follow from P and Q before and after,
-P_after/P_before = (U_after/U_before)^p_v. They are those of the whole load once a motor has settled, and a load that
-changes by itself meanwhile is in them.
+A voltage that stays at a new level moves the static part of a load: its exponents follow from P and
+Q before and after, P_after/P_before = (U_after/U_before)^p_v. They are those of the whole load once
+a motor has settled, and a load that changes by itself meanwhile is in them.
 
 Source: IEEE Task Force on Load Representation, 1993 (exponents from staged steps of the voltage).
 """
@@ -14,14 +15,17 @@ from typing import Any
 from tractexp.record.fall import SHALLOWEST
 
 LASTING = ("step", "ramp")  # kinds of events after which the voltage stays
-SMALLEST_VOLTAGE_STEP = 0.005  # of the voltage: a smaller step is less than what loads change by themselves
+# of the voltage: a smaller step is less than what loads change by themselves
+SMALLEST_VOLTAGE_STEP = 0.005
 ITSELF = 0.01  # of the power, by which an error of the exponents is told
 DIPS = (
-    f"a motor answers dips: have the recorder triggered by 3 to 10 % of the voltage ({SHALLOWEST:.0%} is the least that"
+    "a motor answers dips: have the recorder triggered by 3 to 10 % of the voltage"
+    f" ({SHALLOWEST:.0%} is the least that"
     " is fitted), with 0.2 s and more before it and 1 s after"
 )
 AMBIENT = (
-    "static exponents follow from a change of taps before and after, and from ten minutes of RMS values each second as"
+    "static exponents follow from a change of taps before and after, and from ten minutes of RMS"
+    " values each second as"
     " slopes of ln P and ln Q over ln U"
 )
 
@@ -39,7 +43,11 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
     """The static exponents that each lasting change of the voltage tells of a load."""
     for event in feeder["events"]:
         ratio = 1 - event["depth"]
-        if event["kind"] not in LASTING or ratio <= 0 or abs(event["depth"]) < SMALLEST_VOLTAGE_STEP:
+        if (
+            event["kind"] not in LASTING
+            or ratio <= 0
+            or abs(event["depth"]) < SMALLEST_VOLTAGE_STEP
+        ):
             continue
         exponents = {
             name: log(event[f"{power}_after"] / event[f"{power}_before"]) / log(ratio)
@@ -51,8 +59,10 @@ def _exponents(feeder: Mapping[str, Any]) -> Iterator[str]:
         values = " and ".join(f"{name} {value:.2g}" for name, value in exponents.items())
         fixed = " ".join(f"model.fixed.{name}={value:.2g}" for name, value in exponents.items())
         yield (
-            f"the {event['kind']} of {abs(event['depth']):.1%} at {event['start']:.3f} s tells the static exponents of"
-            f" {feeder['name']}: {values}, each wrong by {ITSELF / abs(log(ratio)):.1g} for every percent that the load"
+            f"the {event['kind']} of {abs(event['depth']):.1%} at {event['start']:.3f} s tells the"
+            " static exponents of"
+            f" {feeder['name']}: {values}, each wrong by {ITSELF / abs(log(ratio)):.1g} for every"
+            " percent that the load"
             f" changed by itself; for another record of it: {fixed}"
         )
 

@@ -1,4 +1,6 @@
-"""One event in waveforms: voltages, currents as recorded and as calculated, and the spectrum of what is left."""
+"""One event in waveforms: voltages, currents as recorded and as calculated, and the spectrum of
+what is left.
+"""
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -20,20 +22,29 @@ HIGHEST_SHOWN_FREQUENCY = 1300.0  # Hz: what a spectrum shows
 KILO = 1.0  # kA of a peak from which an axis is in kA
 MOST_PREPARED_EVENTS = 4  # events of which it is told how they were prepared
 SPECTRUM = (
-    "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip, over whole cycles"
-    " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on ({after:.0f} ms), below before"
-    " it ({before:.0f} ms); a longer stretch tells frequencies better apart. Marked are the fundamental and its odd"
-    " harmonics. A load of harmonics stands in both, a wrong decay beside the fundamental, an offset at 0 Hz."
+    "Amplitudes of measured less calculated currents, in percent of the fundamental before the dip,"
+    " over whole cycles"
+    " of the stationary phases: what is 50 Hz there is 50 Hz here. Above from the dip on"
+    " ({after:.0f} ms), below before"
+    " it ({before:.0f} ms); a longer stretch tells frequencies better apart. Marked are the"
+    " fundamental and its odd"
+    " harmonics. A load of harmonics stands in both, a wrong decay beside the fundamental, an"
+    " offset at 0 Hz."
 )
 IN_WAVES = (
-    "In waveforms the sampled currents are compared, driven by the sampled voltage, both as space vectors of the"
-    " stationary frame (alpha along phase a); nothing is averaged over a cycle. One per unit is the peak of the"
-    " phase voltage before the dip, and of the current of the same apparent power. P, Q, epsilon_p and epsilon_q"
-    " are of the recorded and of the calculated currents through the record's own phasor estimator, so they"
+    "In waveforms the sampled currents are compared, driven by the sampled voltage, both as space"
+    " vectors of the"
+    " stationary frame (alpha along phase a); nothing is averaged over a cycle. One per unit is the"
+    " peak of the"
+    " phase voltage before the dip, and of the current of the same apparent power. P, Q, epsilon_p"
+    " and epsilon_q"
+    " are of the recorded and of the calculated currents through the record's own phasor estimator,"
+    " so they"
     " compare with those of a run in phasors."
 )
 CAPTION = (
-    "The currents are instantaneous values, phase by phase, offsets of the recorder taken off. Dotted: the dip begins"
+    "The currents are instantaneous values, phase by phase, offsets of the recorder taken off."
+    " Dotted: the dip begins"
     " and ends. Drag to zoom, double-click to go back; zoomed in, every sample is drawn."
 )
 
@@ -55,11 +66,12 @@ def wave_chart(
     around: np.ndarray | None = None,
     places: Sequence[Any] = (),
 ) -> Chart:
-    """Voltages, then each phase's current as recorded and as calculated, and what the curves leave of it.
+    """Voltages, then each phase's current as recorded and as calculated, and what the curves leave
+    of it.
 
-    The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the noise [pu] draws a
-    band around the currents `around` (3, N) and about zero; `places` have `start` and `end` [s]: where more than chance
-    is left of some current.
+    The dip is in view at first. Voltages are in kV, currents in A or kA. `deviation` (3, N) of the
+    noise [pu] draws a band around the currents `around` (3, N) and about zero; `places` have
+    `start` and `end` [s]: where more than chance is left of some current.
     """
     (kV, kA), part = event.peaks, slice(event.lead, None)
     names = PHASES[: event.phases] if event.phases > 1 else ("",)
@@ -67,9 +79,13 @@ def wave_chart(
     unit, one = ("kA", kA) if kA * np.abs(measured).max() >= KILO else ("A", 1000 * kA)
     start, step = float(event.record.t[event.lead]), event.record.step
     panels = ["u [kV]", *(f"i{f'_{n}' if n else ''} [{unit}]" for n in names), f"Δi [{unit}]"]
-    chart = Chart("t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels))
+    chart = Chart(
+        "t [s]", panels, heights=[1.0, *[1.3] * len(names), 1.0], pixels=170 + 130 * len(panels)
+    )
     colors = style.PHASES if event.phases > 1 else (style.VOLTAGE,)
-    for name, u, color in zip(names, event.of_phases(_voltage(event))[:, part], colors, strict=False):
+    for name, u, color in zip(
+        names, event.of_phases(_voltage(event))[:, part], colors, strict=False
+    ):
         chart.samples(f"phase {name}" if name else "voltage", start, step, kV * u, color)
     if deviation is not None and around is not None:
         _noise_bands(chart, event, one * deviation, one * around)
@@ -80,18 +96,33 @@ def wave_chart(
     for name, currents, color, dash in curves:
         calculated = event.of_phases(currents)[:, part]
         for k, phase in enumerate(names):
-            chart.samples(name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash)
+            chart.samples(
+                name, start, step, one * calculated[k], color, 1 + k, width=1.3, dash=dash
+            )
             rest = one * (measured[k] - calculated[k])
             own = colors[k] if len(curves) == 1 and phase else color
-            chart.samples(f"phase {phase}" if own != color else name, start, step, rest, own, len(names) + 1, dash=dash)
+            chart.samples(
+                f"phase {phase}" if own != color else name,
+                start,
+                step,
+                rest,
+                own,
+                len(names) + 1,
+                dash=dash,
+            )
     return chart.edge(event.t_start).edge(event.t_end).limits(None, *_view(event))
 
 
 def _noise_bands(chart: Chart, event: WaveEvent, deviation: np.ndarray, around: np.ndarray) -> None:
-    """Where noise alone would let a sample lie: about each phase's current and, the widest of them, about zero."""
+    """Where noise alone would let a sample lie: about each phase's current and, the widest of them,
+    about zero.
+    """
     t = event.record.t[event.lead :]
     compared = np.array(event.compared)[:, None]
-    half = BAND_DEVIATIONS * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
+    half = (
+        BAND_DEVIATIONS
+        * np.sqrt(event.of_phases(np.eye(3)) ** 2 @ (deviation * compared) ** 2)[:, event.lead :]
+    )
     middle, name = event.of_phases(around)[:, event.lead :], f"± {BAND_DEVIATIONS:g} σ of the noise"
     for k in range(event.phases):
         chart.band(name, t, middle[k] - half[k], middle[k] + half[k], style.FAINT, 1 + k)
@@ -123,7 +154,9 @@ def _view(event: WaveEvent) -> tuple[float, float]:
 
 
 class Spectrum(NamedTuple):
-    """Amplitudes (K, n) of the phases' residual at frequencies (n,) [Hz], over the fundamental before the dip."""
+    """Amplitudes (K, n) of the phases' residual at frequencies (n,) [Hz], over the fundamental
+    before the dip.
+    """
 
     frequencies: np.ndarray
     amplitudes: np.ndarray
@@ -131,9 +164,11 @@ class Spectrum(NamedTuple):
 
 
 def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]:
-    """Of what calculated currents (3, N) leave, from the dip on and before it; over whole cycles, unweighted.
+    """Of what calculated currents (3, N) leave, from the dip on and before it; over whole cycles,
+    unweighted.
 
-    Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning included.
+    Unweighted, the squares of all of it add up to the residual's energy, a decay at its beginning
+    included.
     """
     compared = np.array(event.compared)[:, None]
     residual = event.of_phases((np.nan_to_num(event.currents) - currents) * compared)
@@ -148,7 +183,11 @@ def spectra(event: WaveEvent, currents: np.ndarray) -> tuple[Spectrum, Spectrum]
         amplitudes = np.abs(np.fft.rfft(part)) / part.shape[1] * 2 / size
         amplitudes[:, 0] /= 2
         parts.append(
-            Spectrum(np.fft.rfftfreq(part.shape[1], event.record.step), amplitudes, part.shape[1] / event.rate)
+            Spectrum(
+                np.fft.rfftfreq(part.shape[1], event.record.step),
+                amplitudes,
+                part.shape[1] / event.rate,
+            )
         )
     return parts[0], parts[1]
 
@@ -167,7 +206,11 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
     for order in HARMONICS:
         if order * event.f0 < highest:
             chart.edge(order * event.f0)
-    marks = [order * round(event.f0, 1) for order in HARMONICS if order * event.f0 < highest and order != 9]
+    marks = [
+        order * round(event.f0, 1)
+        for order in HARMONICS
+        if order * event.f0 < highest and order != 9
+    ]
     notes = SPECTRUM.format(after=1000 * after.seconds, before=1000 * before.seconds)
     return chart.ticks(None, marks).limits(None, 0.0, highest), notes
 
@@ -175,19 +218,39 @@ def spectrum_chart(event: WaveEvent, currents: np.ndarray) -> tuple[Chart, str]:
 def describe_preparation(problem: Problem, fits: Sequence[Fit]) -> list[str]:
     """What was done to each record before it was fitted, and how it is simulated, in sentences."""
     steps = f"Runge-Kutta steps of the fit: {problem.step.describe(problem.events)}."
-    return [*(_describe_event_preparation(fit) for fit in fits[:MOST_PREPARED_EVENTS] if fit.waves is not None), steps]
+    return [
+        *(
+            _describe_event_preparation(fit)
+            for fit in fits[:MOST_PREPARED_EVENTS]
+            if fit.waves is not None
+        ),
+        steps,
+    ]
 
 
 def _describe_event_preparation(fit: Fit) -> str:
-    """Frequency, cycles before the dip, offsets taken off and the periodic steady state of one event."""
+    """Frequency, cycles before the dip, offsets taken off and the periodic steady state of one
+    event.
+    """
     event: Any = fit.waves
     cycles = (event.start - event.lead) * event.f0 / event.rate
-    volts, amperes = np.abs(event.offsets[: event.phases]).max(), np.abs(event.offsets[event.phases :]).max()
-    zero = "" if event.phases == 1 else " Zero sequence is " + ("" if event.compared[2] else "not ") + "compared."
+    volts, amperes = (
+        np.abs(event.offsets[: event.phases]).max(),
+        np.abs(event.offsets[event.phases :]).max(),
+    )
+    zero = (
+        ""
+        if event.phases == 1
+        else " Zero sequence is " + ("" if event.compared[2] else "not ") + "compared."
+    )
     return (
-        f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up to"
-        f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage before the dip is"
-        f" continued back for {event.lead * event.f0 / event.rate:.0f} cycles, in which the simulation reaches its"
-        f" steady state: over the last of them the calculated currents still change by {fit.unsettled:.2g} of their"
+        f"{event.record.name}: {event.f0:.3f} Hz, {cycles:.1f} cycles before the dip; offsets of up"
+        " to"
+        f" {1000 * volts:.3g} V and {1000 * amperes:.3g} A taken off.{zero} The periodic voltage"
+        " before the dip is"
+        f" continued back for {event.lead * event.f0 / event.rate:.0f} cycles, in which the"
+        " simulation reaches its"
+        " steady state: over the last of them the calculated currents still change by"
+        f" {fit.unsettled:.2g} of their"
         " size."
     )

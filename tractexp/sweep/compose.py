@@ -1,7 +1,8 @@
 """The configurations of many jobs, composed once per choice of groups instead of once per job.
 
-Hydra takes 0.1 s to compose a configuration, mostly to gather its files. A plain value (`seed=3`) is set on a
-composed one afterwards, which is what Hydra does with it too, in well under a hundredth of that.
+Hydra takes 0.1 s to compose a configuration, mostly to gather its files. A plain value (`seed=3`)
+is set on a composed one afterwards, which is what Hydra does with it too, in well under a hundredth
+of that.
 """
 
 import copy
@@ -17,7 +18,9 @@ BY_NUMBER = "${hydra.job.num}"  # `hydra.sweep.subdir` as it is by default
 
 
 class Composer:
-    """Composes jobs of one sweep. Raises what Hydra raises for a choice or value it does not know."""
+    """Composes jobs of one sweep. Raises what Hydra raises for a choice or value it
+    does not know.
+    """
 
     def __init__(self, loader: Any, master: DictConfig):
         from hydra.core.override_parser.overrides_parser import OverridesParser
@@ -28,7 +31,9 @@ class Composer:
         self._is_group = functools.cache(lambda key: bool(loader.get_group_options(key)))
         self._base = functools.cache(self._composed_base)
         self._subdir = OmegaConf.to_container(master.hydra.sweep, resolve=False)["subdir"]  # type: ignore[index, call-overload]
-        self._reads_hydra = bool(master.hydra.callbacks) or master.hydra.job_logging.get("root") is not None
+        self._reads_hydra = (
+            bool(master.hydra.callbacks) or master.hydra.job_logging.get("root") is not None
+        )
 
     def __call__(self, overrides: Sequence[str], number: int) -> Composed:
         """The job of this number with these overrides."""
@@ -46,12 +51,16 @@ class Composer:
         return Composed(_plain(task), dict(whole.hydra.runtime.choices))
 
     def _as_hydra_composes(self, overrides: tuple[str, ...], number: int) -> Composed:
-        """The job whole, where its folder's name or somebody's callback may ask for any part of it."""
+        """The job whole, where its folder's name or somebody's callback may ask for
+        any part of it.
+        """
         whole = self._composed(overrides)
         _number(whole, number)
         subdir = "" if self._subdir == BY_NUMBER else str(whole.hydra.sweep.subdir)
         hydra = whole if self._reads_hydra else None
-        return Composed(_plain(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra)
+        return Composed(
+            _plain(_without_hydra(whole)), dict(whole.hydra.runtime.choices), subdir, hydra
+        )
 
     def _is_value(self, text: str) -> bool:
         """Whether an override changes one plain value that is there already."""

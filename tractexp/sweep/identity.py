@@ -14,13 +14,17 @@ from tractexp.files import locate_file
 
 
 def configuration(config: Mapping[str, Any], choices: Mapping[str, str]) -> str:
-    """SHA-256 of a job's settings. Where it is logged and what it returns do not belong to what it does."""
+    """SHA-256 of a job's settings. Where it is logged and what it returns do not belong to what it
+    does.
+    """
     settings = {key: value for key, value in config.items() if key not in ("tracking", "sweep")}
     return _digest(json.dumps([settings, dict(choices)], sort_keys=True, default=str).encode())
 
 
 def inputs(config: Mapping[str, Any]) -> str:
-    """SHA-256 of the installed code, plugins of all packages included, and of the data files the job names."""
+    """SHA-256 of the installed code, plugins of all packages included, and of the data files the
+    job names.
+    """
     named = sorted(set(texts(config.get("data") or {})))
     return _digest("".join([provenance.code(), *map(_file, named)]).encode())
 
@@ -31,7 +35,9 @@ def _digest(content: bytes) -> str:
 
 @functools.cache
 def _file(name: str) -> str:
-    """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); "" for no file."""
+    """The content of the file `name` and of its companions of the same stem (a sidecar, a .dat); ""
+    for no file.
+    """
     try:
         path = locate_file(name)
         if not path.is_file():

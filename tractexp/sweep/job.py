@@ -25,7 +25,8 @@ OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
 class Composed:
     """One job of a sweep, resolved. `subdir` is "" where its number is its folder's name.
 
-    `hydra` is Hydra's own whole configuration of the job where something of the user's reads it: a callback, a logger.
+    `hydra` is Hydra's own whole configuration of the job where something of the user's reads it: a
+    callback, a logger.
     """
 
     config: Mapping[str, Any]
@@ -44,27 +45,46 @@ class SweepJob:
     configuration: str
     inputs: str
     folder: Path
-    given: Mapping[str, str] = field(default_factory=dict)  # what the user chose, {"optimizer": "pso"}
+    # what the user chose, {"optimizer": "pso"}
+    given: Mapping[str, str] = field(default_factory=dict)
     subdir: str = ""  # the folder's name within the sweep's; "": the job's number
     alone: bool = False  # the only job of its sweep: somebody looks at it
-    hydra: Any = None  # its whole configuration, where a callback or a logger of the user's reads that
+    # its whole configuration, where a callback or a logger of the user's reads that
+    hydra: Any = None
     callbacks: Any = None  # of Hydra's, where there is `hydra`
 
     @classmethod
     def of(cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()) -> "SweepJob":
-        """A job as it was composed; Hydra's own choices are left out. Raises `UserError` for passwords."""
+        """A job as it was composed; Hydra's own choices are left out. Raises `UserError` for
+        passwords.
+        """
         config, choices = composed.config, composed.choices
         credentials.check("", config)
-        groups = {g: c for g, c in sorted(choices.items()) if c and g != "experiment" and not g.startswith("hydra/")}
+        groups = {
+            g: c
+            for g, c in sorted(choices.items())
+            if c and g != "experiment" and not g.startswith("hydra/")
+        }
         return cls(
-            config, groups, tuple(overrides), identity.configuration(config, groups), identity.inputs(config), folder,
-            collect_chosen_settings(overrides, choices), composed.subdir, hydra=composed.hydra,
-        )  # fmt: skip
+            config,
+            groups,
+            tuple(overrides),
+            identity.configuration(config, groups),
+            identity.inputs(config),
+            folder,
+            collect_chosen_settings(overrides, choices),
+            composed.subdir,
+            hydra=composed.hydra,
+        )
 
     @property
     def sweep(self) -> Path:
         """The folder of the sweep."""
-        return self.folder.parents[len(Path(self.subdir).parts) - 1] if self.subdir else self.folder.parent
+        return (
+            self.folder.parents[len(Path(self.subdir).parts) - 1]
+            if self.subdir
+            else self.folder.parent
+        )
 
     @property
     def name(self) -> str:
@@ -72,8 +92,12 @@ class SweepJob:
         return self.subdir or self.folder.name
 
     def variant(self, common: Collection[str]) -> str:
-        """What the optimizer is called with the settings that it does not share with all jobs: the `common` ones."""
-        own = collect_chosen_settings((text for text in self.overrides if text not in common), self.choices)
+        """What the optimizer is called with the settings that it does not share with all jobs: the
+        `common` ones.
+        """
+        own = collect_chosen_settings(
+            (text for text in self.overrides if text not in common), self.choices
+        )
         data = f" on {self.choices['data']}" if "data" in own else ""
         return variant(self.choices["optimizer"], own) + data
 
@@ -84,12 +108,16 @@ class SweepJob:
 
     def returned(self, end: Status) -> float | list[float] | None:
         """What it gives back, having ended so."""
-        return select_returned_metrics(end.metrics, self.returns) if end.status == FINISHED else None
+        return (
+            select_returned_metrics(end.metrics, self.returns) if end.status == FINISHED else None
+        )
 
     @property
     def status(self) -> Status:
         """How this job stands when it starts."""
-        return Status(RUNNING, "", self.configuration, self.inputs, 0.0, self.choices, self.config["seed"])
+        return Status(
+            RUNNING, "", self.configuration, self.inputs, 0.0, self.choices, self.config["seed"]
+        )
 
 
 def find_shared_overrides(jobs: Sequence[SweepJob]) -> set[str]:
@@ -98,9 +126,11 @@ def find_shared_overrides(jobs: Sequence[SweepJob]) -> set[str]:
 
 
 def work(job: SweepJob, logs: bool = False) -> Status:
-    """Run a job in its own folder, emptied before. Never raises: what goes wrong is in the status returned.
+    """Run a job in its own folder, emptied before. Never raises: what goes wrong is in the status
+    returned.
 
-    Unless it `logs`, it leaves that to who reads its folder (`recorder`): to import MLflow takes longer than many jobs.
+    Unless it `logs`, it leaves that to who reads its folder (`recorder`): to import MLflow takes
+    longer than many jobs.
 
     What the task prints goes to `output.txt`; an unexpected error leaves its `traceback.txt`.
     """
@@ -112,16 +142,24 @@ def work(job: SweepJob, logs: bool = False) -> Status:
     with output, printing_to(output), surround_job(job) as conclude:
         message = _run(job, measured, logs)
         status, seconds = FAILED if message else FINISHED, time.perf_counter() - started
-        ended = replace(job.status, status=status, message=message, seconds=seconds, metrics=files.plain(measured))
+        ended = replace(
+            job.status,
+            status=status,
+            message=message,
+            seconds=seconds,
+            metrics=files.plain(measured),
+        )
         conclude(ended)
     ended.write(job.folder)
     return ended
 
 
 def run_job(config: Any) -> float | list[float] | None:
-    """Run a job that another launcher of Hydra's has composed and placed, as on a cluster; returns what it is worth.
+    """Run a job that another launcher of Hydra's has composed and placed, as on a cluster; returns
+    what it is worth.
 
-    Raises `UserError` where it failed and the sweeper is not ours, which reads how jobs ended from their folders.
+    Raises `UserError` where it failed and the sweeper is not ours, which reads how jobs ended from
+    their folders.
     """
     from hydra.core.hydra_config import HydraConfig
     from omegaconf import OmegaConf
@@ -145,7 +183,13 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
 
     try:
         parent, of_many = parent_of(folder_of(job.folder)), not job.alone
-        about: Any = {"in_sweep": True, "of_many": of_many, "logs": logs, "given": job.given, "measured": measured}
+        about: Any = {
+            "in_sweep": True,
+            "of_many": of_many,
+            "logs": logs,
+            "given": job.given,
+            "measured": measured,
+        }
         perform(Job(job.config, job.choices, job.folder, parent, **about))
         select_returned_metrics(measured, job.returns)
     except UserError as error:
@@ -164,9 +208,16 @@ def _prepare(job: SweepJob) -> None:
         shutil.rmtree(job.folder)
     hydra = job.folder / ".hydra"
     runtime = {"cwd": str(Path.cwd()), "output_dir": str(job.folder), "choices": dict(job.choices)}
-    around = {"hydra": {"mode": "MULTIRUN", "overrides": {"task": list(job.overrides)}, "runtime": runtime}}
+    around = {
+        "hydra": {
+            "mode": "MULTIRUN",
+            "overrides": {"task": list(job.overrides)},
+            "runtime": runtime,
+        }
+    }
     contents = {"config": dict(job.config), "overrides": list(job.overrides), "hydra": around}
-    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)  # ten times as fast, where PyYAML was built with it
+    # ten times as fast, where PyYAML was built with it
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     for name, content in contents.items():
         text = yaml.dump(content, Dumper=dumper, sort_keys=False, allow_unicode=True)
         files.write(hydra / f"{name}.yaml", text, lasting=False)

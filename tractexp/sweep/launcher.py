@@ -1,4 +1,6 @@
-"""`hydra/launcher=cores`: the jobs of a sweep on the workers of a joblib backend, here or on a cluster."""
+"""`hydra/launcher=cores`: the jobs of a sweep on the workers of a joblib backend, here or on a
+cluster.
+"""
 
 import contextlib
 from collections.abc import Sequence
@@ -23,7 +25,8 @@ from tractexp.sweep.recorder import Recorder
 from tractexp.sweep.status import FAILED, FINISHED, RUNNING, Status
 from tractexp.workers import Workers, backends
 
-FORKING = ("multiprocessing",)  # backends whose workers would inherit a half-done import of another thread
+# backends whose workers would inherit a half-done import of another thread
+FORKING = ("multiprocessing",)
 SPELLINGS = {"processes": "loky"}  # of a backend in earlier versions
 
 
@@ -32,20 +35,26 @@ class CoresConfig:
     """Schema of `hydra.launcher`."""
 
     _target_: str = f"{NAMESPACE}.Cores"
-    backend: str = "loky"  # of joblib: "loky" (processes), "dask" (of a cluster), "threading", or a registered one
+    # of joblib: "loky" (processes), "dask" (of a cluster), "threading", or a registered one
+    backend: str = "loky"
     n_jobs: int = -1  # workers; -1: one for each core this process may use, or all of a cluster
-    address: str | None = None  # of a Dask scheduler, such as tcp://host:8786; null: a cluster of our own, here
+    # of a Dask scheduler, such as tcp://host:8786; null: a cluster of our own, here
+    address: str | None = None
     tries: int = 3  # how often a job is run whose worker is killed
 
 
 class Cores(Launcher):
-    """Runs jobs on workers. A job whose worker is killed is run again, by itself, so that it alone is blamed.
+    """Runs jobs on workers. A job whose worker is killed is run again, by itself, so that it alone
+    is blamed.
 
     Raises `UserError` for settings out of range, and where workers cannot be started.
     """
 
     def __init__(self, backend: str, n_jobs: int, address: str | None, tries: int):
-        self.workers, self.tries = Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True), tries
+        self.workers, self.tries = (
+            Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True),
+            tries,
+        )
         self.launched: dict[Path, SweepJob] = {}  # for a sweeper that is not ours
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
@@ -55,10 +64,14 @@ class Cores(Launcher):
             check_range("hydra.launcher.n_jobs", self.workers.n_jobs, 1)
         check_range("hydra.launcher.tries", self.tries, 1)
 
-    def launch(self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int) -> Sequence[JobReturn]:
-        """As Hydra's other sweepers call it, batch by batch: what a job returns is what `sweep.returns` names.
+    def launch(
+        self, job_overrides: Sequence[Sequence[str]], initial_job_idx: int
+    ) -> Sequence[JobReturn]:
+        """As Hydra's other sweepers call it, batch by batch: what a job returns is what
+        `sweep.returns` names.
 
-        A job that was done before, in this sweep or an earlier one in the same folder, is not run again.
+        A job that was done before, in this sweep or an earlier one in the same folder, is not run
+        again.
         """
         compose = Composer(self.hydra_context.config_loader, self.config)
         folder = Path(self.config.hydra.sweep.dir).absolute()
@@ -67,7 +80,10 @@ class Cores(Launcher):
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
         with parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder:
-            self.run([job for job in {job.folder: job for job in jobs}.values() if not is_finished(job)], recorder)
+            self.run(
+                [job for job in {job.folder: job for job in jobs}.values() if not is_finished(job)],
+                recorder,
+            )
         return [_build_job_return(job, status.read(job.folder)) for job in jobs]
 
     def run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> list[Status]:
@@ -95,7 +111,10 @@ class Cores(Launcher):
 
     def _killed(self, job: SweepJob) -> Status:
         """The end of a job that killed its worker each time."""
-        message = f"its worker was killed each of the {self.tries} times it was run; is there enough memory for it?"
+        message = (
+            f"its worker was killed each of the {self.tries} times it was run; is there enough"
+            " memory for it?"
+        )
         end = replace(job.status, status=FAILED, message=message)
         end.write(job.folder)
         return end
@@ -114,7 +133,9 @@ def _has_ended(folder: Path) -> bool:
 
 
 def warm(jobs: Sequence[SweepJob]) -> None:
-    """Compile the kernels of the jobs' models, once for each, so that the workers find them on disk."""
+    """Compile the kernels of the jobs' models, once for each, so that the workers find them on
+    disk.
+    """
     import json
 
     seen = set()
@@ -149,4 +170,6 @@ def _build_job_return(job: SweepJob, end: Status | None) -> JobReturn:
     if end is not None and end.status != FAILED:
         return Ended(job.overrides, status=JobStatus.COMPLETED, _return_value=job.returned(end))
     why = end.message if end else "its worker was killed or never started"
-    return Ended(job.overrides, status=JobStatus.FAILED, _return_value=UserError(f"job {job.name}: {why}"))
+    return Ended(
+        job.overrides, status=JobStatus.FAILED, _return_value=UserError(f"job {job.name}: {why}")
+    )

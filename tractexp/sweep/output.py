@@ -12,14 +12,18 @@ _redirected = contextlib.ExitStack()
 
 
 class _ByThread:
-    """A stream that is the output of the job in this thread, or of the one in the main thread, or else `usual`."""
+    """A stream that is the output of the job in this thread, or of the one in the main thread, or
+    else `usual`.
+    """
 
     def __init__(self, usual: Any):
         self.usual = usual
 
     def __getattr__(self, name: str) -> Any:
         main = threading.main_thread().ident or 0
-        return getattr(_outputs.get(threading.get_ident()) or _outputs.get(main) or self.usual, name)
+        return getattr(
+            _outputs.get(threading.get_ident()) or _outputs.get(main) or self.usual, name
+        )
 
 
 @contextlib.contextmanager

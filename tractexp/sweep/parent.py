@@ -19,12 +19,16 @@ from tractexp.tracking.sweepfile import FILE, parent_of
 
 
 @contextmanager
-def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool) -> Iterator[Recorder]:
-    """Open the parent run of a sweep's jobs, or open it again, and close it with the status the sweep ends with.
+def parent_run(
+    folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
+) -> Iterator[Recorder]:
+    """Open the parent run of a sweep's jobs, or open it again, and close it with the status the
+    sweep ends with.
 
-    It is opened while the workers start, for to import MLflow takes seconds; what is yielded logs jobs below it.
-    FINISHED where every job is, KILLED where the sweep is interrupted, FAILED otherwise. What could not be logged is
-    then sent, but where it is interrupted: who ends a sweep does not wait. `afresh` never opens an old one again.
+    It is opened while the workers start, for to import MLflow takes seconds; what is yielded logs
+    jobs below it. FINISHED where every job is, KILLED where the sweep is interrupted, FAILED
+    otherwise. What could not be logged is then sent, but where it is interrupted: who ends a sweep
+    does not wait. `afresh` never opens an old one again.
     """
     node = jobs[0].config["tracking"]
     if not node["enabled"]:
@@ -45,12 +49,16 @@ def parent_run(folder: Path, jobs: list[Any], overrides: list[str], afresh: bool
             status = "KILLED"
             raise
         finally:
-            _close_parent_run(folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri)
+            _close_parent_run(
+                folder, replace(run, status=status, metrics=metrics(jobs)), recorder.parent(), uri
+            )
             if status != "KILLED":
                 _send(folder, uri)
 
 
-def _begun(folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str, Any]) -> str | None:
+def _begun(
+    folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str, Any]
+) -> str | None:
     """Open the run and note its id, by which jobs find it; None where the store cannot be used."""
     run_id = _open_parent_run(folder, run, uri, afresh)
     write_json(folder / FILE, {"run": run_id, **content}, private=True)
@@ -58,7 +66,9 @@ def _begun(folder: Path, run: Any, uri: str, afresh: bool, content: Mapping[str,
 
 
 def _open_parent_run(folder: Path, run: Any, uri: str, afresh: bool) -> str | None:
-    """The id of the parent run, opened or opened again; None, and a sentence, where the store cannot be used."""
+    """The id of the parent run, opened or opened again; None, and a sentence, where the store
+    cannot be used.
+    """
     try:
         run_id = parent_of(folder)
         if afresh or run_id is None or not tracking.reopen_parent(run_id, uri):
@@ -91,8 +101,14 @@ def _send(folder: Path, uri: str) -> None:
 def metrics(jobs: list[Any]) -> dict[str, float]:
     """Figures of a sweep as a whole."""
     ends = [s for job in jobs if (s := read(job.folder)) is not None]
-    counts = {f"jobs_{kind}": sum(s.status == kind for s in ends) for kind in (FINISHED, FAILED, INTERRUPTED)}
-    measured = {name: [f for s in ends if (f := s.metric(name)) is not None] for name in (ESTIMATED, SEARCHED)}
+    counts = {
+        f"jobs_{kind}": sum(s.status == kind for s in ends)
+        for kind in (FINISHED, FAILED, INTERRUPTED)
+    }
+    measured = {
+        name: [f for s in ends if (f := s.metric(name)) is not None]
+        for name in (ESTIMATED, SEARCHED)
+    }
     best = {f"best_{name}": min(values) for name, values in measured.items() if values}
     return {"jobs": len(jobs), **counts, **best}
 
@@ -100,7 +116,11 @@ def metrics(jobs: list[Any]) -> dict[str, float]:
 def shared_settings(configs: Sequence[Mapping[str, Any]]) -> dict[str, str]:
     """The settings that all jobs of a sweep have, as `tracking.flatten` spells them."""
     settings = [tracking.flatten(config) for config in configs]
-    return {key: value for key, value in settings[0].items() if all(flat.get(key) == value for flat in settings)}
+    return {
+        key: value
+        for key, value in settings[0].items()
+        if all(flat.get(key) == value for flat in settings)
+    }
 
 
 def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
@@ -109,6 +129,10 @@ def _describe_sweep(folder: Path, jobs: list[Any], overrides: list[str]) -> Any:
         experiment=first.experiment,
         name=f"sweep {folder.name}",
         parameters=shared_settings([job.config for job in jobs]),
-        tags={"task": first.choices["task"], "sweep": " ".join(overrides), "git_commit": provenance.commit()},
+        tags={
+            "task": first.choices["task"],
+            "sweep": " ".join(overrides),
+            "git_commit": provenance.commit(),
+        },
         description=f"A sweep of {len(jobs)} jobs: {quoting.markdown(' '.join(overrides))}",
     )

@@ -13,11 +13,12 @@ from tractexp.sweep.status import FINISHED, RUNNING
 
 
 def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
-    """Give each job its folder: that of the same configuration in an earlier sweep here, else a free one.
+    """Give each job its folder: that of the same configuration in an earlier sweep here, else a
+    free one.
 
-    Free is the folder of `hydra.sweep.subdir`, or the next number; also a folder that holds nothing yet but what Hydra
-    hides in it, as a full disk or a kill leaves it. Raises `UserError` where the folder of `hydra.sweep.subdir` is
-    another job's, somebody else's or not below the sweep's.
+    Free is the folder of `hydra.sweep.subdir`, or the next number; also a folder that holds nothing
+    yet but what Hydra hides in it, as a full disk or a kill leaves it. Raises `UserError` where the
+    folder of `hydra.sweep.subdir` is another job's, somebody else's or not below the sweep's.
     """
     folders = {s.configuration: p for p in _of_jobs(folder) if (s := status.read(p)) is not None}
     taken = set(folders.values())
@@ -31,7 +32,9 @@ def place(jobs: Sequence[SweepJob], folder: Path) -> list[SweepJob]:
             above.update(there.parents)
             folders[job.configuration] = there
         there = folders[job.configuration]
-        placed.append(replace(job, folder=there, subdir=job.subdir and there.relative_to(folder).as_posix()))
+        placed.append(
+            replace(job, folder=there, subdir=job.subdir and there.relative_to(folder).as_posix())
+        )
     return placed
 
 
@@ -42,26 +45,39 @@ def _own(folder: Path, job: SweepJob, taken: set[Path], above: set[Path]) -> Pat
     """
     there = Path(folder, *Path(job.subdir).parts)
     if ".." in there.parts or folder not in there.parents:
-        raise UserError(f"hydra.sweep.subdir={job.subdir} does not lie below the sweep's folder {folder}")
+        raise UserError(
+            f"hydra.sweep.subdir={job.subdir} does not lie below the sweep's folder {folder}"
+        )
     if there in above or not taken.isdisjoint((there, *there.parents)):
         raise UserError(
-            f"hydra.sweep.subdir={job.subdir} is the folder of two jobs; name all that differs, such as "
-            "hydra.sweep.subdir='${optimizer.name}_${seed}', or all of it: '${hydra.job.override_dirname}'"
+            f"hydra.sweep.subdir={job.subdir} is the folder of two jobs; name all that differs,"
+            " such as "
+            "hydra.sweep.subdir='${optimizer.name}_${seed}', or all of it:"
+            " '${hydra.job.override_dirname}'"
         )
     if _holds_something(there):
-        raise UserError(f"hydra.sweep.subdir={job.subdir}: {there} holds files that are not this job's; name another")
+        raise UserError(
+            f"hydra.sweep.subdir={job.subdir}: {there} holds files that are not this job's; name"
+            " another"
+        )
     return there
 
 
 def placement(job: SweepJob) -> list[str]:
     """The overrides by which any launcher of Hydra's puts a job into its folder."""
-    return [f"hydra.sweep.dir={quoting.hydra(str(job.sweep))}", f"hydra.sweep.subdir={quoting.hydra(job.name)}"]
+    return [
+        f"hydra.sweep.dir={quoting.hydra(str(job.sweep))}",
+        f"hydra.sweep.subdir={quoting.hydra(job.name)}",
+    ]
 
 
 def is_finished(job: SweepJob) -> bool:
     """Whether this job, with the same code and data, has been done in its folder."""
     state = status.read(job.folder)
-    same = state is not None and (state.configuration, state.inputs) == (job.configuration, job.inputs)
+    same = state is not None and (state.configuration, state.inputs) == (
+        job.configuration,
+        job.inputs,
+    )
     return same and state.status == FINISHED  # type: ignore[union-attr]
 
 
@@ -79,4 +95,6 @@ def _of_jobs(folder: Path) -> list[Path]:
 
 
 def _holds_something(folder: Path) -> bool:
-    return folder.exists() and not (folder.is_dir() and all(p.name.startswith(".") for p in folder.iterdir()))
+    return folder.exists() and not (
+        folder.is_dir() and all(p.name.startswith(".") for p in folder.iterdir())
+    )

@@ -1,4 +1,6 @@
-"""What a person sees while a sweep runs: jobs done, the best of each variant so far, the time left."""
+"""What a person sees while a sweep runs: jobs done, the best of each variant so far,
+the time left.
+"""
 
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -49,13 +51,18 @@ class Tally:
         if self.failed:
             parts.append(f"{self.failed} failed")
         if self.best:
-            parts.append("best objectives " + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:MOST_NAMED_VARIANTS]))
+            parts.append(
+                "best objectives "
+                + ", ".join(f"{n} {f:.4g}" for n, f in self.ranked()[:MOST_NAMED_VARIANTS])
+            )
         return f"  {', '.join(parts)}; {self.left}"
 
 
 @contextmanager
 def progress(jobs: Sequence[SweepJob]) -> Iterator[Callable[[SweepJob, Status], None]]:
-    """Yield what is to be called with each job's end: a live bar on a terminal, a line now and then in a log file."""
+    """Yield what is to be called with each job's end: a live bar on a terminal, a line now and then
+    in a log file.
+    """
     tally = Tally(jobs)
     if console().is_terminal:
         with _live(tally) as callback:

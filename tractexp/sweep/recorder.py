@@ -1,6 +1,7 @@
 """The jobs of a sweep in MLflow: logged by the sweep's own process, while its workers go on.
 
-So MLflow is imported once and not by each worker, and workers that reach neither store nor disk are logged, too.
+So MLflow is imported once and not by each worker, and workers that reach neither store nor disk are
+logged, too.
 """
 
 from concurrent.futures import Future
@@ -13,7 +14,9 @@ from tractexp.tracking import log, runfile
 
 
 class Recorder:
-    """Logs jobs that have ended. What cannot be logged stays in its folder, and is sent when the sweep ends."""
+    """Logs jobs that have ended. What cannot be logged stays in its folder, and is sent when the
+    sweep ends.
+    """
 
     def __init__(self, folder: Path, opening: "Future[str | None] | None" = None):
         """`opening` will be the id of the sweep's run, or None where that cannot be logged."""
@@ -25,7 +28,9 @@ class Recorder:
         return None if self.opening is None else self.opening.result()
 
     def log(self, folder: Path) -> None:
-        """Log what a job has kept for the store; nothing where it kept nothing, or where the sweep's run waits."""
+        """Log what a job has kept for the store; nothing where it kept nothing, or where the
+        sweep's run waits.
+        """
         if self.refused or (parent := self.parent()) is None:
             return
         try:

@@ -14,14 +14,22 @@ SEARCHED = "search_objective"  # the metric by which optimizers are compared
 ESTIMATED = "objective"
 RUNNING, FINISHED, FAILED, INTERRUPTED = "running", "finished", "failed", "interrupted"
 KINDS: Mapping[str, Any] = {  # of the entries, which somebody else may have written
-    "status": str, "message": str, "configuration": str, "inputs": str, "seconds": (int, float), "choices": dict,
-    "seed": int, "metrics": dict,
-}  # fmt: skip
+    "status": str,
+    "message": str,
+    "configuration": str,
+    "inputs": str,
+    "seconds": (int, float),
+    "choices": dict,
+    "seed": int,
+    "metrics": dict,
+}
 
 
 @dataclass(frozen=True)
 class Status:
-    """The content of `status.json`. A job that was killed has no end to report and stays "running"."""
+    """The content of `status.json`. A job that was killed has no end to report and
+    stays "running".
+    """
 
     status: str
     message: str  # a sentence where it failed, "" otherwise
@@ -30,10 +38,13 @@ class Status:
     seconds: float
     choices: Mapping[str, str]
     seed: int
-    metrics: Mapping[str, float | None] = field(default_factory=dict)  # as logged; None: never reached
+    # as logged; None: never reached
+    metrics: Mapping[str, float | None] = field(default_factory=dict)
 
     def metric(self, name: str) -> float | None:
-        """What was measured; None where the job has not ended well or its task measures no such thing."""
+        """What was measured; None where the job has not ended well or its task measures no such
+        thing.
+        """
         value = self.metrics.get(name)
         return float(value) if value is not None and self.status == FINISHED else None
 
@@ -52,21 +63,32 @@ def read(folder: Path) -> Status | None:
 
 
 def objective(folder: Path, name: str = SEARCHED) -> float | None:
-    """A metric of the job in `folder`, by default where its search ended; None where there is none."""
+    """A metric of the job in `folder`, by default where its search ended; None where
+    there is none.
+    """
     end = read(folder)
     return end.metric(name) if end is not None else None
 
 
-def select_returned_metrics(metrics: Mapping[str, float | None], names: Sequence[str] | None) -> float | list[float] | None:
-    """What a job gives back to whoever optimizes over jobs: the metrics of these names, one or a list.
+def select_returned_metrics(
+    metrics: Mapping[str, float | None], names: Sequence[str] | None
+) -> float | list[float] | None:
+    """What a job gives back to whoever optimizes over jobs: the metrics of these names, one or a
+    list.
 
-    Without names where its search ended; None where its task searches for nothing. What was never reached is infinite.
+    Without names where its search ended; None where its task searches for nothing. What was never
+    reached is infinite.
     Raises `UserError` for a metric that the task does not measure.
     """
     for name in names or ():
         if name not in metrics:
-            raise UserError(f"sweep.returns names {name}, which this task does not measure{among(name, metrics)}")
+            raise UserError(
+                f"sweep.returns names {name}, which this task does not"
+                f" measure{among(name, metrics)}"
+            )
     if not names and SEARCHED not in metrics:
         return None
-    values = [float("inf") if (value := metrics[name]) is None else value for name in names or [SEARCHED]]
+    values = [
+        float("inf") if (value := metrics[name]) is None else value for name in names or [SEARCHED]
+    ]
     return values if len(values) > 1 else values[0]

@@ -1,4 +1,6 @@
-"""What Hydra puts around a job, where something of the user's reads it: loggers, and the callbacks of others."""
+"""What Hydra puts around a job, where something of the user's reads it: loggers, and the callbacks
+of others.
+"""
 
 import contextlib
 import logging
@@ -53,6 +55,8 @@ def _as_hydra_returns(job: "SweepJob", config: Any, end: Status) -> Any:
     failed = end.status == FAILED
     status = JobStatus.FAILED if failed else JobStatus.COMPLETED
     value: Any = RuntimeError(end.message) if failed else job.returned(end)
-    outcome = JobReturn(list(job.overrides), config, config, os.getcwd(), config.hydra.job.name, status)
+    outcome = JobReturn(
+        list(job.overrides), config, config, os.getcwd(), config.hydra.job.name, status
+    )
     outcome.return_value = value
     return outcome

@@ -47,20 +47,26 @@ class GridConfig:
     params: dict[str, str] | None = None  # as on the command line: {"seed": "range(0,30)"}
     redo: bool = False  # run finished jobs again
     compare: bool = True  # end a sweep of several variants and seeds with the page of task=compare
-    comparison: dict[str, Any] = field(default_factory=dict)  # settings of that task for it: {bbob: 3}
+    # settings of that task for it: {bbob: 3}
+    comparison: dict[str, Any] = field(default_factory=dict)
     open: bool = True  # show that page, where there is a desktop and somebody at it
 
 
 class Grid(Sweeper):
-    """Runs every combination of the swept values that is not finished yet, and says what became of them.
+    """Runs every combination of the swept values that is not finished yet, and says what became of
+    them.
 
     Raises `UserError` for a sweep without jobs, and at its end where jobs have failed.
     """
 
     def __init__(
-        self, params: Mapping[str, str] | None, redo: bool, compare: bool, comparison: Mapping[str, Any],
+        self,
+        params: Mapping[str, str] | None,
+        redo: bool,
+        compare: bool,
+        comparison: Mapping[str, Any],
         open: bool,
-    ):  # fmt: skip
+    ):
         self.params, self.redo, self.open = params or {}, redo, open
         self.comparison = {**comparison} if compare else None
 
@@ -87,7 +93,8 @@ class Grid(Sweeper):
         if done := len(jobs) - len(remaining):
             say(f"  {done} of them are finished and kept; hydra.sweeper.redo=true runs them again")
         if remaining:
-            if (folder / MULTIRUN).exists():  # what an earlier sweep came to goes before its configuration does
+            # what an earlier sweep came to goes before its configuration does
+            if (folder / MULTIRUN).exists():
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
@@ -147,11 +154,16 @@ class Grid(Sweeper):
                 self.launcher.launch(batch, initial_job_idx=0)
         except KeyboardInterrupt as stop:
             end, problem = INTERRUPTED, ""
-            raise Stopped(f"the sweep is interrupted; {REPEAT}", getattr(stop, "code", 130)) from None
+            raise Stopped(
+                f"the sweep is interrupted; {REPEAT}", getattr(stop, "code", 130)
+            ) from None
         except UserError:
             raise
         except Exception as error:
-            problem = f"the launcher gave up: {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
+            problem = (
+                "the launcher gave up:"
+                f" {str(error).strip().partition(chr(10))[0] or type(error).__name__}"
+            )
         finally:
             for job in jobs:
                 if end != INTERRUPTED or job.folder.exists():  # a job that has not begun has no end
@@ -159,24 +171,30 @@ class Grid(Sweeper):
 
 
 def values_of(override: Override) -> list[str]:
-    """The values an override asks for: one, or those it sweeps over. Raises `UserError` where they cannot be listed."""
+    """The values an override asks for: one, or those it sweeps over. Raises `UserError` where they
+    cannot be listed.
+    """
     if not override.is_sweep_override():
         return [override.get_value_element_as_str()]
     if not override.is_discrete_sweep():
         raise UserError(
-            f"{override.input_line}: a sweep over a grid needs values to count, such as 0.1,0.2,0.5 or range(0,1,0.1)"
+            f"{override.input_line}: a sweep over a grid needs values to count, such as 0.1,0.2,0.5"
+            " or range(0,1,0.1)"
         )
     values = [*override.sweep_string_iterator()]
     if not values:
         raise UserError(
-            f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second number, "
+            f"the sweep has no jobs: {override.input_line} is empty; a range ends before its second"
+            " number, "
             "as range(0,30) is 0 to 29, and a glob needs a name that matches"
         )
     return values
 
 
 def comparable(jobs: Sequence[SweepJob]) -> bool:
-    """Whether a sweep holds several variants under several seeds, of which more than one job has ended well."""
+    """Whether a sweep holds several variants under several seeds, of which more than one job has
+    ended well.
+    """
     common = find_shared_overrides(jobs)
     variants = {job.variant(common) for job in jobs}
     if len(variants) < 2 or len({job.config["seed"] for job in jobs}) < 2:
@@ -187,7 +205,9 @@ def comparable(jobs: Sequence[SweepJob]) -> bool:
 
 def show(page: Path) -> None:
     """Open a page in the browser of a desktop; a terminal elsewhere, or none, is left alone."""
-    desktop = sys.platform in ("darwin", "win32") or any(map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY")))
+    desktop = sys.platform in ("darwin", "win32") or any(
+        map(os.environ.get, ("DISPLAY", "WAYLAND_DISPLAY"))
+    )
     if sys.stdout.isatty() and desktop:
         webbrowser.open(page.absolute().as_uri())
 
@@ -204,7 +224,9 @@ def summary(jobs: Sequence[SweepJob]) -> None:
         say()
         rows = sorted((sorted(values), name) for name, values in objectives.items())
         cells = [[n, str(len(v)), *(f"{x:.4e}" for x in (v[0], median(v), v[-1]))] for v, n in rows]
-        for line in str(Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)).splitlines():
+        for line in str(
+            Table(["optimizer", "jobs", "best objective", "median", "worst"], cells)
+        ).splitlines():
             say(line)
         say("objectives in pu² at the end of the search, before the estimate is polished")
 
@@ -220,6 +242,7 @@ def failures(jobs: Sequence[SweepJob]) -> str:
     for job, why in failed:  # not in columns: they would cut the sentences
         say(f"  {job.name:>4}  {' '.join(o for o in job.overrides if o not in common)}: {why}")
     return (
-        f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt of their folders in "
+        f"{len(failed)} of {len(jobs)} jobs failed, as listed; what they printed is in output.txt"
+        " of their folders in "
         f"{jobs[0].sweep}, an unexpected error in traceback.txt; {REPEAT}"
     )

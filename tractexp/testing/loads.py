@@ -22,7 +22,8 @@ LEAST_VISIBLE_CHANGE = 1e-5  # pu: what a record can show at all
 SCALED = 1e-8  # of the largest power: what two bases of power may differ by
 LARGEST = 30.0  # pu: no load draws more
 SUBSTEPS = 4
-COUNTS = (2, 4, 8, 16, 32, 64, 128, 256)  # Runge-Kutta steps a sample, of which those in the asymptotic range count
+# Runge-Kutta steps a sample, of which those in the asymptotic range count
+COUNTS = (2, 4, 8, 16, 32, 64, 128, 256)
 ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
 
 
@@ -31,19 +32,29 @@ ASYMPTOTIC = (1e-11, 1e-6)  # pu: errors of the fourth order, above rounding
 
 @functools.cache
 def partners() -> tuple[type[Motor], type[Static]]:
-    """The registered motor and static load a contract is played with: few parameters, a flux and a speed that move."""
+    """The registered motor and static load a contract is played with: few parameters, a flux and a
+    speed that move.
+    """
     motors = [cls for cls in _all("model/motor") if cls.parameters and _moves(cls)]
     statics = [cls for cls in _all("model/static") if cls.parameters and not cls.reads]
     if not (motors and statics):
-        raise UserError("contracts need a registered motor with flux and speed and a static load with parameters")
-    return tuple(min(classes, key=lambda cls: (len(cls.parameters), cls.name)) for classes in (motors, statics))  # type: ignore[return-value]
+        raise UserError(
+            "contracts need a registered motor with flux and speed and a static load with"
+            " parameters"
+        )
+    return tuple(
+        min(classes, key=lambda cls: (len(cls.parameters), cls.name))
+        for classes in (motors, statics)
+    )  # type: ignore[return-value]
 
 
 def _moves(cls: type[Motor]) -> bool:
     """Whether a motor has a flux and a speed that move."""
     from tractexp.model.declaration import motor_alone
 
-    return {"flux", "speed"} <= {s.role for s in motor_alone(cls()).states.values() if s.derivative != 0}
+    return {"flux", "speed"} <= {
+        s.role for s in motor_alone(cls()).states.values() if s.derivative != 0
+    }
 
 
 def _all(group: str) -> list[type]:
@@ -53,7 +64,9 @@ def _all(group: str) -> list[type]:
 @functools.cache
 def model(motor: type[Motor], static: type[Static], *effects: type[Effect]) -> Model:
     """A load of these parts with default settings."""
-    return compose(motor(), static(), [cls() for cls in effects], domain=_domain(motor, static, *effects))
+    return compose(
+        motor(), static(), [cls() for cls in effects], domain=_domain(motor, static, *effects)
+    )
 
 
 def _domain(*parts: type[Part]) -> str:
@@ -80,7 +93,9 @@ def build_base_model(cls: type[Effect]) -> Model:
 
 @functools.cache
 def _base(cls: type[Effect]) -> tuple[type[Motor], type[Static]]:
-    """The parts of the base model of an effect: the usual partners, or the first pair that takes it."""
+    """The parts of the base model of an effect: the usual partners, or the first pair that takes
+    it.
+    """
     for motor, static in _bases():
         if _explain_refused_base(motor, static, cls) is None:
             return motor, static
@@ -95,12 +110,18 @@ def _bases() -> Iterator[tuple[type[Motor], type[Static]]]:
     yield from ((motor, other) for other in _all("model/static") if other is not static)
 
 
-def _explain_refused_base(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str | None:
-    """Why a base model refuses an effect, None where it takes it. Anything but a sentence is raised."""
+def _explain_refused_base(
+    motor: type[Motor], static: type[Static], cls: type[Effect]
+) -> str | None:
+    """Why a base model refuses an effect, None where it takes it. Anything but a sentence is
+    raised.
+    """
     return compose(motor(), static(), domain=_domain(motor, static, cls)).acceptance(cls()).refusal
 
 
-def values(of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None) -> np.ndarray:
+def values(
+    of: Model, pick: Callable[[Parameter], float] = lambda p: p.default, only: Part | None = None
+) -> np.ndarray:
     """The defaults (d,), but `pick` for the parameters of `only`, or of all."""
     chosen = of.parameters if only is None else only.parameters
     return np.array([pick(p) if p in chosen else p.default for p in of.parameters])
@@ -113,13 +134,16 @@ def choose_active_size(p: Parameter) -> float:
 
 
 def play(of: Model, drive: Drive, chosen: np.ndarray, substeps: int = SUBSTEPS) -> np.ndarray:
-    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails at no rest."""
+    """P and Q (2, n, N) [pu], or the current in its frame and of zero sequence (3, n, N); fails at
+    no rest.
+    """
     response = of.simulate(drive, chosen, substeps)
     if (response.miss != 0).any():
         missed = np.atleast_2d(chosen)[int(np.argmax((response.miss != 0).any(axis=0)))]
         why = of.refusal(missed, drive)
         raise AssertionError(
-            f"{of.title} has no steady state at {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
+            f"{of.title} has no steady state at"
+            f" {dict(zip(of.names, missed.tolist(), strict=True))}: {why}"
         )
     return _select_still_outputs(of, drive, response.outputs)
 
@@ -137,9 +161,13 @@ def _select_still_outputs(of: Model, drive: Drive, outputs: np.ndarray) -> np.nd
 
 
 def says_what_it_is(cls: type[Part]) -> None:
-    """The docstring has equations, their source and what departs from it; parameters have units and bounds."""
+    """The docstring has equations, their source and what departs from it; parameters have units and
+    bounds.
+    """
     text = cls.__doc__ or ""
-    assert "=" in text or "->" in text, f"the docstring of '{cls.name}' has no equation: no line with '=' or '->'"
+    assert "=" in text or "->" in text, (
+        f"the docstring of '{cls.name}' has no equation: no line with '=' or '->'"
+    )
     for needed in ("Source:", "Departures:"):
         assert needed in text, f"the docstring of '{cls.name}' has no line '{needed}'"
     for parameter in cls.parameters:
@@ -150,11 +178,15 @@ def prints_its_equations(cls: type[Part]) -> None:
     """The equations in LaTeX show every parameter."""
     text = " ".join(with_part(cls).latex())
     for parameter in cls.parameters:
-        assert parameter.symbol in text, f"the equations of '{cls.name}' do not show {parameter.symbol}"
+        assert parameter.symbol in text, (
+            f"the equations of '{cls.name}' do not show {parameter.symbol}"
+        )
 
 
 def rests(cls: type[Part]) -> None:
-    """Under a steady voltage the load stays where it was before, whatever its parameters near their defaults."""
+    """Under a steady voltage the load stays where it was before, whatever its parameters near their
+    defaults.
+    """
     of = with_part(cls)
     chosen = values(of, choose_active_size)
     near = np.random.default_rng(1).uniform(0.95, 1.05, (10, len(chosen))) * chosen
@@ -167,7 +199,9 @@ def rests(cls: type[Part]) -> None:
 
 
 def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
-    """In every corner of its bounds a dip gives finite power, or the point is refused; at most 64 corners."""
+    """In every corner of its bounds a dip gives finite power, or the point is refused; at most 64
+    corners.
+    """
     of = with_part(cls)
     corners = list(itertools.islice(itertools.product(*(p.bounds for p in cls.parameters)), 64))
     rows = np.tile(values(of), (len(corners), 1))
@@ -178,14 +212,24 @@ def is_finite_or_refused_at_its_bounds(cls: type[Part]) -> None:
     power = response.outputs[:, good]
     finite = np.isfinite(power).all(axis=(0, 2))
     if not finite.all():
-        corner = zip((p.name for p in cls.parameters), np.array(corners)[good][np.argmin(finite)], strict=True)
+        corner = zip(
+            (p.name for p in cls.parameters),
+            np.array(corners)[good][np.argmin(finite)],
+            strict=True,
+        )
         at = ", ".join(f"{name}={value:g}" for name, value in corner)
-        raise AssertionError(f"{of.title} is not finite in a corner of the bounds of '{cls.name}', at {at}")
-    assert np.abs(power).max(initial=0.0) < LARGEST, f"{of.title} draws more than {LARGEST:g} pu in a corner"
+        raise AssertionError(
+            f"{of.title} is not finite in a corner of the bounds of '{cls.name}', at {at}"
+        )
+    assert np.abs(power).max(initial=0.0) < LARGEST, (
+        f"{of.title} draws more than {LARGEST:g} pu in a corner"
+    )
 
 
 def scales_with_its_base(cls: type[Part]) -> None:
-    """In another base of power the same load answers the same: each parameter goes as its `power_exponent` says."""
+    """In another base of power the same load answers the same: each parameter goes as its
+    `power_exponent` says.
+    """
     of, per_unit = with_part(cls), 2.5
     chosen = values(of, choose_active_size)
     other = chosen * per_unit ** np.array([p.power_exponent for p in of.parameters], dtype=float)
@@ -193,7 +237,8 @@ def scales_with_its_base(cls: type[Part]) -> None:
     scaled = play(of, drives.drive(0.3, 0.5, domain=of.domain, power=per_unit), other) / per_unit
     off = np.abs(scaled - one).max() / np.abs(one).max()
     assert off < SCALED, (
-        f"{of.title} answers otherwise in another base of power (by {off:.2g}): say in 'power_exponent' how each"
+        f"{of.title} answers otherwise in another base of power (by {off:.2g}): say in"
+        " 'power_exponent' how each"
         f" parameter of '{cls.name}' goes with it"
     )
 
@@ -205,7 +250,12 @@ def converges_in_order_four(cls: type[Part]) -> None:
     of = with_part(cls)
     eq = of.equations
     written = [
-        eq.expand(e) for e in (*(s.derivative for s in eq.states.values()), *eq.outputs().values(), *eq.steps.values())
+        eq.expand(e)
+        for e in (
+            *(s.derivative for s in eq.states.values()),
+            *eq.outputs().values(),
+            *eq.steps.values(),
+        )
     ]
     if eq.memories or not eq.states or any(e.has(sympy.Max, sympy.Min) for e in written):
         return  # a corner costs the order
@@ -218,14 +268,18 @@ def converges_in_order_four(cls: type[Part]) -> None:
         assert errors.min() < ASYMPTOTIC[0], f"{of.title} does not converge: errors {errors}"
         return
     slope = np.polyfit(np.log2(np.array(COUNTS)[used]), np.log2(errors[used]), 1)[0]
-    assert abs(slope + 4) < 0.4, f"{of.title} converges in order {-slope:.2f}, not 4: errors {errors}"
+    assert abs(slope + 4) < 0.4, (
+        f"{of.title} converges in order {-slope:.2f}, not 4: errors {errors}"
+    )
 
 
 # Motors and static loads
 
 
 def composes_with_every_other(cls: type[Part]) -> None:
-    """Every registered static load or motor beside it gives a model, or is refused in a sentence."""
+    """Every registered static load or motor beside it gives a model, or is refused
+    in a sentence.
+    """
     for other in _all("model/static" if issubclass(cls, Motor) else "model/motor"):
         try:
             _ = (model(cls, other) if issubclass(cls, Motor) else model(other, cls)).equations
@@ -237,7 +291,9 @@ def takes_or_refuses_every_effect(cls: type[Part]) -> None:
     """Every registered effect is an edit of it, or is refused with a reason."""
     of = with_part(cls)
     for effect in _all("effect"):
-        assert of.acceptance(effect()).refusal != "", f"'{effect.name}' refuses '{cls.name}' without a reason"
+        assert of.acceptance(effect()).refusal != "", (
+            f"'{effect.name}' refuses '{cls.name}' without a reason"
+        )
 
 
 # Effects
@@ -248,21 +304,36 @@ def has_sizes_that_matter(cls: type[Effect]) -> None:
     sizes = [p for p in cls.parameters if p.null is not None]
     effects = discover()["effect"]
     for p in sizes:
-        assert p.default == p.null, f"the size {p.name} of '{cls.name}' starts at {p.default:g}, not at its null"
-        assert p.name in cls.relevant, f"'{cls.name}' does not say in 'relevant' from where its size {p.name} matters"
+        assert p.default == p.null, (
+            f"the size {p.name} of '{cls.name}' starts at {p.default:g}, not at its null"
+        )
+        assert p.name in cls.relevant, (
+            f"'{cls.name}' does not say in 'relevant' from where its size {p.name} matters"
+        )
     for name in cls.confused_with:
         others = effects.keys() - {cls.name}
-        assert name in others, f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
+        assert name in others, (
+            f"'{cls.name}' is confused with '{name}', no other effect{among(name, others)}"
+        )
 
 
 def acts_where_it_says(cls: type[Effect]) -> None:
-    """It declares where it acts and what it does there, and edits the sites of these places and no others."""
-    assert cls.places, f"'{cls.name}' does not say in 'places' where it acts; choose of {', '.join(sites.PLACES)}"
-    assert cls.kind, f"'{cls.name}' does not say in 'kind' what it does; choose of {', '.join(sites.KINDS)}"
+    """It declares where it acts and what it does there, and edits the sites of these places and no
+    others.
+    """
+    assert cls.places, (
+        f"'{cls.name}' does not say in 'places' where it acts; choose of {', '.join(sites.PLACES)}"
+    )
+    assert cls.kind, (
+        f"'{cls.name}' does not say in 'kind' what it does; choose of {', '.join(sites.KINDS)}"
+    )
     edited = with_part(cls).equations.edits.get(cls.name, [])
     for site in edited:
         there = any(site in sites.PLACES[place] for place in cls.places)
-        assert there, f"'{cls.name}' edits the site {site}, which is in none of its places: {', '.join(cls.places)}"
+        assert there, (
+            f"'{cls.name}' edits the site {site}, which is in none of its places:"
+            f" {', '.join(cls.places)}"
+        )
     for place in cls.places:
         measures = place == "measurement" and issubclass(cls, Measurement)
         free = place == "bus" or not sites.PLACES[place] or measures  # what it draws needs no site
@@ -271,35 +342,61 @@ def acts_where_it_says(cls: type[Effect]) -> None:
 
 
 def belongs_to_its_family(cls: type[Effect]) -> None:
-    """A member of a family names a textbook effect of its kind, says what differs, and nests it where it says so."""
+    """A member of a family names a textbook effect of its kind, says what differs, and nests it
+    where it says so.
+    """
     effects = discover()["effect"]
     if not cls.family:
         return
-    assert cls.family in effects, f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, effects)}"
+    assert cls.family in effects, (
+        f"'{cls.name}' belongs to '{cls.family}', no effect{among(cls.family, effects)}"
+    )
     textbook = effects[cls.family]
     assert issubclass(textbook, Effect)
-    assert not textbook.family, f"'{cls.name}' belongs to '{cls.family}', which is itself a member of a family"
-    assert textbook.kind == cls.kind, f"'{cls.name}' is a {cls.kind}, and '{cls.family}' a {textbook.kind}"
+    assert not textbook.family, (
+        f"'{cls.name}' belongs to '{cls.family}', which is itself a member of a family"
+    )
+    assert textbook.kind == cls.kind, (
+        f"'{cls.name}' is a {cls.kind}, and '{cls.family}' a {textbook.kind}"
+    )
     assert cls.differs, f"'{cls.name}' does not say in 'differs' what differs from '{cls.family}'"
     own, theirs = {p.name for p in cls.parameters}, {p.name for p in textbook.parameters}
     assert cls.as_textbook.keys() <= own, f"'as_textbook' of '{cls.name}' names no parameter of it"
-    assert {*cls.as_textbook.values()} <= theirs, f"'as_textbook' of '{cls.name}' names no parameter of '{cls.family}'"
+    assert {*cls.as_textbook.values()} <= theirs, (
+        f"'as_textbook' of '{cls.name}' names no parameter of '{cls.family}'"
+    )
     if not cls.nests_textbook:
         return
     of, book = with_part(cls), with_part(textbook)
     sizes = {p.name: choose_active_size(p) for p in textbook.parameters if p.null is not None}
     chosen = {p.name: sizes.get(p.name, p.default) for p in textbook.parameters}
     drive = drives.drive(0.3, 0.5, domain=of.domain)
-    mine = values(of, lambda p: chosen[cls.as_textbook[p.name]] if p.name in cls.as_textbook else p.default)
-    off = np.abs(play(of, drive, mine) - play(book, drive, values(book, lambda p: chosen.get(p.name, p.default)))).max()
-    assert off < EQUATION_ROUNDING, f"'{cls.name}' does not nest '{cls.family}': {off:.2g} pu apart where both should be one"
+    mine = values(
+        of, lambda p: chosen[cls.as_textbook[p.name]] if p.name in cls.as_textbook else p.default
+    )
+    off = np.abs(
+        play(of, drive, mine)
+        - play(book, drive, values(book, lambda p: chosen.get(p.name, p.default)))
+    ).max()
+    assert off < EQUATION_ROUNDING, (
+        f"'{cls.name}' does not nest '{cls.family}': {off:.2g} pu apart where both should be one"
+    )
 
 
 def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
-    """With its sizes at their nulls the load is the base model, whatever its other parameters: the two are nested."""
+    """With its sizes at their nulls the load is the base model, whatever its other parameters: the
+    two are nested.
+    """
     of, bare = with_part(cls), build_base_model(cls)
-    drive, rng, own = drives.drive(0.3, 0.5, 0.65, domain=of.domain), np.random.default_rng(2), cls()
-    rows = [values(of, lambda p: rng.uniform(*p.bounds) if p.null is None else p.null, own) for _ in range(3)]
+    drive, rng, own = (
+        drives.drive(0.3, 0.5, 0.65, domain=of.domain),
+        np.random.default_rng(2),
+        cls(),
+    )
+    rows = [
+        values(of, lambda p: rng.uniform(*p.bounds) if p.null is None else p.null, own)
+        for _ in range(3)
+    ]
     plain = play(bare, drive, values(bare))
     if isinstance(own, Measurement):  # a simulation does not ask it there
         outputs = np.repeat(bare.simulate(drive, values(bare), SUBSTEPS).outputs, len(rows), axis=1)
@@ -309,11 +406,15 @@ def is_the_base_model_at_its_null(cls: type[Effect]) -> None:
     else:
         played = play(of, drive, np.array(rows))
     off = np.abs(played - plain).max()
-    assert off < EQUATION_ROUNDING, f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
+    assert off < EQUATION_ROUNDING, (
+        f"at its null '{cls.name}' is {off:.2g} pu away from the base model"
+    )
 
 
 def shows_in_a_dip(cls: type[Effect]) -> None:
-    """Each size has a derivative at its null, and the size that matters changes the response of a dip."""
+    """Each size has a derivative at its null, and the size that matters changes the response of a
+    dip.
+    """
     of, own = with_part(cls), cls()
     drive = drives.drive(0.6, domain=of.domain)
     for p, null in ((p, p.null) for p in cls.parameters if p.null is not None):
@@ -321,16 +422,25 @@ def shows_in_a_dip(cls: type[Effect]) -> None:
         slopes = []
         for h in (1e-4 * (high - low), 2e-4 * (high - low)):
             ends = [min(max(null + side * h, low), high) for side in (-1, 1)]
-            rows = np.array([values(of, lambda q, p=p, end=end: end if q is p else q.default, own) for end in ends])
+            rows = np.array(
+                [
+                    values(of, lambda q, p=p, end=end: end if q is p else q.default, own)
+                    for end in ends
+                ]
+            )
             slopes.append(np.diff(play(of, drive, rows), axis=1) / (ends[1] - ends[0]))
         largest = np.abs(slopes[0]).max()
-        assert largest * cls.relevant.get(p.name, 0.1 * (high - low)) > LEAST_VISIBLE_CHANGE, f"{p.name} shows nothing"
+        assert largest * cls.relevant.get(p.name, 0.1 * (high - low)) > LEAST_VISIBLE_CHANGE, (
+            f"{p.name} shows nothing"
+        )
         off = np.abs(slopes[1] - slopes[0]).max()
         assert off < 0.03 * largest, f"{p.name} of '{cls.name}' has no derivative at its null"
 
 
 def is_taken_or_refused_by_every_model(cls: type[Effect]) -> None:
-    """Every registered motor and static load takes it, or refuses it with a reason; one takes it."""
+    """Every registered motor and static load takes it, or refuses it with a reason;
+    one takes it.
+    """
     reasons = [_reason(motor, static, cls) for motor, static in _bases()]
     assert None in reasons, f"no model takes '{cls.name}': {reasons[0]}"
     assert "" not in reasons, f"'{cls.name}' is refused without a reason"
@@ -344,21 +454,39 @@ def _reason(motor: type[Motor], static: type[Static], cls: type[Effect]) -> str 
 
 
 def sees_each_event_by_itself(cls: type[Measurement]) -> None:
-    """The end of one event does not leak into the beginning of the next, and power keeps its shape."""
+    """The end of one event does not leak into the beginning of the next, and power
+    keeps its shape.
+    """
     of = with_part(cls)
     chosen = values(of, choose_active_size)
-    together, alone = (play(of, drives.drive(*dips, domain=of.domain), chosen) for dips in ((0.3, 0.6), (0.6,)))
+    together, alone = (
+        play(of, drives.drive(*dips, domain=of.domain), chosen) for dips in ((0.3, 0.6), (0.6,))
+    )
     assert np.array_equal(together[:, :, -alone.shape[2] :], alone), f"'{cls.name}' mixes events"
 
 
 Check = Callable[[type], None]
-EVERY: tuple[Check, ...] = (says_what_it_is, is_finite_or_refused_at_its_bounds, scales_with_its_base)
+EVERY: tuple[Check, ...] = (
+    says_what_it_is,
+    is_finite_or_refused_at_its_bounds,
+    scales_with_its_base,
+)
 EQUATIONS: tuple[Check, ...] = (prints_its_equations, rests, converges_in_order_four)
-PARTS: tuple[Check, ...] = (*EVERY, *EQUATIONS, composes_with_every_other, takes_or_refuses_every_effect)
+PARTS: tuple[Check, ...] = (
+    *EVERY,
+    *EQUATIONS,
+    composes_with_every_other,
+    takes_or_refuses_every_effect,
+)
 EFFECTS: tuple[Check, ...] = (
-    *EVERY, acts_where_it_says, belongs_to_its_family, has_sizes_that_matter, is_the_base_model_at_its_null,
-    shows_in_a_dip, is_taken_or_refused_by_every_model,
-)  # fmt: skip
+    *EVERY,
+    acts_where_it_says,
+    belongs_to_its_family,
+    has_sizes_that_matter,
+    is_the_base_model_at_its_null,
+    shows_in_a_dip,
+    is_taken_or_refused_by_every_model,
+)
 SUITES: Sequence[tuple[type, tuple[type, ...], tuple[Check, ...]]] = (
     (Motor, (), PARTS),
     (Static, (), PARTS),

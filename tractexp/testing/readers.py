@@ -15,7 +15,9 @@ Samples = Mapping[str, Sequence[Mapping[str, Any]]]
 def says_what_it_is(cls: type[Reader], samples: Samples) -> None:
     """The docstring says which format it reads, by which standard, and what it does not read."""
     for needed in ("Source:", "Departures:"):
-        assert needed in (cls.__doc__ or ""), f"the docstring of '{cls.name}' has no line '{needed}'"
+        assert needed in (cls.__doc__ or ""), (
+            f"the docstring of '{cls.name}' has no line '{needed}'"
+        )
 
 
 def refuses_what_is_missing_in_a_sentence(cls: type[Reader], samples: Samples) -> None:
@@ -28,7 +30,8 @@ def refuses_what_is_missing_in_a_sentence(cls: type[Reader], samples: Samples) -
         else:
             said = "a reader that reads without any file" if not settings else ""
         assert " " in said, (
-            f"'{cls.name}' reads files that do not exist, or refuses them without a sentence: {settings}"
+            f"'{cls.name}' reads files that do not exist, or refuses them without a sentence:"
+            f" {settings}"
         )
 
 
@@ -52,6 +55,8 @@ def _without_files(value: Any) -> Any:
 
 
 CHECKS: tuple[Callable[..., None], ...] = (
-    says_what_it_is, refuses_what_is_missing_in_a_sentence, reads_its_samples_into_checked_records,
-)  # fmt: skip
+    says_what_it_is,
+    refuses_what_is_missing_in_a_sentence,
+    reads_its_samples_into_checked_records,
+)
 SUITE = (Reader, (), CHECKS)

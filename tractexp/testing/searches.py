@@ -40,7 +40,9 @@ class Noted(Bowl):
 def says_what_it_is(cls: type[Optimizer]) -> None:
     """The docstring says where the method comes from and what departs from it."""
     for needed in ("Source:", "Departures:"):
-        assert needed in (cls.__doc__ or ""), f"the docstring of '{cls.name}' has no line '{needed}'"
+        assert needed in (cls.__doc__ or ""), (
+            f"the docstring of '{cls.name}' has no line '{needed}'"
+        )
     cls().check()
 
 
@@ -57,8 +59,12 @@ def stays_in_the_box_and_ends_at_the_budget(cls: type[Optimizer]) -> None:
     problem = Noted()
     result = _run(cls, problem, 3)
     points = np.concatenate(problem.batches)
-    assert len(points) == result.simulations <= BUDGET, f"'{cls.name}' spent {len(points)} of {BUDGET} simulations"
-    assert ((points >= Bowl.lower) & (points <= Bowl.upper)).all(), f"'{cls.name}' was evaluated outside the bounds"
+    assert len(points) == result.simulations <= BUDGET, (
+        f"'{cls.name}' spent {len(points)} of {BUDGET} simulations"
+    )
+    assert ((points >= Bowl.lower) & (points <= Bowl.upper)).all(), (
+        f"'{cls.name}' was evaluated outside the bounds"
+    )
 
 
 def yields_once_an_iteration(cls: type[Optimizer]) -> None:
@@ -82,8 +88,12 @@ def yields_once_an_iteration(cls: type[Optimizer]) -> None:
         counts.append(spent[0])
         if len(counts) == MOST_ITERATIONS:
             break
-    assert len(counts) > 1, f"'{cls.name}' yields {len(counts)} times; it must yield at the end of each iteration"
-    assert (np.diff([0, *counts]) > 0).any(), f"'{cls.name}' yields without having evaluated anything"
+    assert len(counts) > 1, (
+        f"'{cls.name}' yields {len(counts)} times; it must yield at the end of each iteration"
+    )
+    assert (np.diff([0, *counts]) > 0).any(), (
+        f"'{cls.name}' yields without having evaluated anything"
+    )
 
 
 def finds_the_bottom_of_a_bowl(cls: type[Optimizer]) -> None:
@@ -102,7 +112,10 @@ def _run(cls: type[Optimizer], problem: Bowl, seed: int, space: str = "unit") ->
 
 
 CHECKS: tuple[Callable[[type], None], ...] = (
-    says_what_it_is, gives_the_same_bits_for_the_same_seed, stays_in_the_box_and_ends_at_the_budget,
-    yields_once_an_iteration, finds_the_bottom_of_a_bowl,
-)  # fmt: skip
+    says_what_it_is,
+    gives_the_same_bits_for_the_same_seed,
+    stays_in_the_box_and_ends_at_the_budget,
+    yields_once_an_iteration,
+    finds_the_bottom_of_a_bowl,
+)
 SUITE = (Optimizer, (), CHECKS)

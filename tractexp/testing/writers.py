@@ -14,12 +14,19 @@ from tractexp.recording.reader import WaveformReader
 
 T = np.arange(400) / 200
 RECORD = Record(
-    "dip", T, 1 - 0.3 * ((T > 1) & (T < 1.2)), 0.8 + 0.01 * np.sin(9 * T), 0.3 + 0 * T, base=Base(27.5, 12.0)
+    "dip",
+    T,
+    1 - 0.3 * ((T > 1) & (T < 1.2)),
+    0.8 + 0.01 * np.sin(9 * T),
+    0.3 + 0 * T,
+    base=Base(27.5, 12.0),
 )
 
 
 def writes_a_record_that_is_read_again(cls: type[Writer]) -> None:
-    """A record is written into the files returned, and a reader that takes them gives its numbers back."""
+    """A record is written into the files returned, and a reader that takes them gives its numbers
+    back.
+    """
     with tempfile.TemporaryDirectory() as folder:
         files = _written(cls, lambda: cls().record(RECORD, Path(folder, f"dip{cls.endings[0]}")))
         if not files or files[0].suffix not in endings():
@@ -42,7 +49,9 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
     """The same for a recording: its channels, by name, have the same values."""
     t = np.arange(800) / 4000
     names = ("Ua", "Ub", "Uc", "Ia", "Ib", "Ic")
-    raw = [np.round(30000 * np.cos(2 * np.pi * (50 * t - k / 3))).astype(np.int16) for k in range(6)]
+    raw = [
+        np.round(30000 * np.cos(2 * np.pi * (50 * t - k / 3))).astype(np.int16) for k in range(6)
+    ]
     kinds = [("kV", "voltage")] * 3 + [("kA", "current")] * 3
     channels = [
         Channel(n, x, *kind, "ABC"[k % 3], gain=1e-3)
@@ -59,7 +68,9 @@ def writes_a_recording_that_is_read_again(cls: type[Writer]) -> None:
         )
         again = build("data", {"name": reader.name, **reader.of(str(files[0]))}).recording()
         for one, other in zip(whole.channels, again.channels, strict=True):
-            assert one.name == other.name, f"'{cls.name}' writes channel {one.name}, which is read as {other.name}"
+            assert one.name == other.name, (
+                f"'{cls.name}' writes channel {one.name}, which is read as {other.name}"
+            )
             off = np.abs(one.values() - other.values()).max()
             assert off < 1e-9, f"'{cls.name}' writes channel {one.name} that is read {off:.2g} off"
 
@@ -73,9 +84,14 @@ def _written(cls: type[Writer], write: Callable[[], list[Path]]) -> list[Path]:
         return []  # a format of one kind alone refuses the other
     for file in files:
         assert file.is_file(), f"'{cls.name}' names {file.name}, which is not there"
-        assert file.suffix in cls.endings, f"'{cls.name}' writes {file.name}, and its endings are {cls.endings}"
+        assert file.suffix in cls.endings, (
+            f"'{cls.name}' writes {file.name}, and its endings are {cls.endings}"
+        )
     return files
 
 
-CHECKS: tuple[Callable[..., None], ...] = (writes_a_record_that_is_read_again, writes_a_recording_that_is_read_again)
+CHECKS: tuple[Callable[..., None], ...] = (
+    writes_a_record_that_is_read_again,
+    writes_a_recording_that_is_read_again,
+)
 SUITE = (Writer, (), CHECKS)

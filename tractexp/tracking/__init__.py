@@ -1,4 +1,6 @@
-"""The one package that knows MLflow. Plain data goes in; MLflow is imported when something is logged, not before."""
+"""The one package that knows MLflow. Plain data goes in; MLflow is imported when something is
+logged, not before.
+"""
 
 from tractexp.tracking.run import TrackedRun as TrackedRun
 from tractexp.tracking.run import at_common_steps as at_common_steps

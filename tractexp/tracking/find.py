@@ -19,9 +19,11 @@ FILES = ("result.json", "history.csv")
 
 @dataclass(frozen=True)
 class Logged:
-    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing step.
+    """One run as it lies in MLflow. `curves` are {name: (steps (n,), values (n,))}, by increasing
+    step.
 
-    `files` is the text of its artifacts {"result.json": ...}, without those that it never had or that are gone.
+    `files` is the text of its artifacts {"result.json": ...}, without those that it never had or
+    that are gone.
     """
 
     run_id: str
@@ -35,10 +37,14 @@ class Logged:
     files: Mapping[str, str] = field(default_factory=dict)
 
 
-def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES) -> list[Logged]:
-    """Runs that match MLflow's `filter`, such as "tags.data = 'tibet_50pct'", oldest first, in one experiment or all.
+def find(
+    uri: str, filter: str, experiment: str | None = None, curves: tuple[str, ...] = CURVES
+) -> list[Logged]:
+    """Runs that match MLflow's `filter`, such as "tags.data = 'tibet_50pct'", oldest first, in one
+    experiment or all.
 
-    Raises `UserError` where there is no such experiment or the filter is not one; an empty list where none match.
+    Raises `UserError` where there is no such experiment or the filter is not one; an empty list
+    where none match.
     """
     client = open_store(uri)
     with sentences(uri):
@@ -47,12 +53,15 @@ def find(uri: str, filter: str, experiment: str | None = None, curves: tuple[str
         chosen = [key for key, name in names.items() if name == experiment]
         if not chosen:
             raise UserError(
-                f"the MLflow store {uri} has no experiment '{experiment}'{among(experiment, names.values())}"
+                f"the MLflow store {uri} has no experiment"
+                f" '{experiment}'{among(experiment, names.values())}"
             )
         names = {chosen[0]: experiment}
     with sentences(uri):
         runs = _search(client, list(names), filter)
-        return [_read_logged_run(client, run, names[run.info.experiment_id], curves) for run in runs]
+        return [
+            _read_logged_run(client, run, names[run.info.experiment_id], curves) for run in runs
+        ]
 
 
 def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
@@ -71,11 +80,20 @@ def _search(client: Any, experiments: list[str], filter: str) -> list[Any]:
 
 
 def _read_logged_run(client: Any, run: Any, experiment: str, curves: tuple[str, ...]) -> Logged:
-    read = {name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics}
+    read = {
+        name: _curve(client, run.info.run_id, name) for name in curves if name in run.data.metrics
+    }
     return Logged(
-        run.info.run_id, run.info.run_name, run.info.status, experiment,
-        dict(run.data.params), dict(run.data.metrics), dict(run.data.tags), read, _files(client, run.info.run_id),
-    )  # fmt: skip
+        run.info.run_id,
+        run.info.run_name,
+        run.info.status,
+        experiment,
+        dict(run.data.params),
+        dict(run.data.metrics),
+        dict(run.data.tags),
+        read,
+        _files(client, run.info.run_id),
+    )
 
 
 def _files(client: Any, run_id: str) -> dict[str, str]:
@@ -86,11 +104,15 @@ def _files(client: Any, run_id: str) -> dict[str, str]:
     with tempfile.TemporaryDirectory() as folder:
         for name in FILES:
             with contextlib.suppress(MlflowException, OSError, ValueError, UserError):
-                texts[name] = files.read_text(client.download_artifacts(run_id, name, folder), files.RESULT)
+                texts[name] = files.read_text(
+                    client.download_artifacts(run_id, name, folder), files.RESULT
+                )
     return texts
 
 
 def _curve(client: Any, run_id: str, name: str) -> tuple[np.ndarray, np.ndarray]:
-    points = np.array([(m.step, m.value) for m in client.get_metric_history(run_id, name)], dtype=float)
+    points = np.array(
+        [(m.step, m.value) for m in client.get_metric_history(run_id, name)], dtype=float
+    )
     points = points[np.argsort(points[:, 0], kind="stable")]
     return points[:, 0], points[:, 1]

@@ -1,4 +1,6 @@
-"""The process that writes a run, so that another process can decide whether a run marked as running still is."""
+"""The process that writes a run, so that another process can decide whether a run marked as running
+still is.
+"""
 
 import contextlib
 import functools
@@ -14,8 +16,12 @@ closed: list[str] = []  # runs that this process has closed where it opened a st
 
 @functools.cache
 def _machine() -> tuple[str, str, str]:
-    """This computer, its boot, and its namespace of processes; "-" where the system does not say."""
-    number, boot = (_read(Path(path))[:12] for path in ("/etc/machine-id", "/proc/sys/kernel/random/boot_id"))
+    """This computer, its boot, and its namespace of processes; "-" where the system
+    does not say.
+    """
+    number, boot = (
+        _read(Path(path))[:12] for path in ("/etc/machine-id", "/proc/sys/kernel/random/boot_id")
+    )
     try:
         namespace = os.readlink("/proc/self/ns/pid")
     except OSError:
@@ -31,7 +37,9 @@ def _read(path: Path) -> str:
 
 
 def _begun(pid: int) -> str:
-    """When a process began, in the system's own count; "" where there is none, "-" where the system does not say."""
+    """When a process began, in the system's own count; "" where there is none, "-" where the system
+    does not say.
+    """
     if os.name == "nt":
         return "-"
     try:
@@ -77,11 +85,15 @@ def list_running(client: Any) -> list[Any]:
     return search(client, experiments, "attributes.status = 'RUNNING'") if experiments else []
 
 
-def search(client: Any, experiments: list[str], filter: str, order: tuple[str, ...] = ()) -> list[Any]:
+def search(
+    client: Any, experiments: list[str], filter: str, order: tuple[str, ...] = ()
+) -> list[Any]:
     """All runs of some experiments that match MLflow's `filter`, page by page."""
     runs, token = [], None
     while True:
-        page = client.search_runs(experiments, filter, max_results=PAGE, order_by=[*order], page_token=token)
+        page = client.search_runs(
+            experiments, filter, max_results=PAGE, order_by=[*order], page_token=token
+        )
         runs += page
         token = page.token
         if not token:

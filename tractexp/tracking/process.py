@@ -1,9 +1,10 @@
 """Log from a second process that gets MLflow ready while the job computes.
 
-Importing MLflow and opening the store take two seconds, and in a thread they would hold up the job by as much
-(measured). In a process of their own they cost a job that takes as long next to nothing, if they begin when the command
-does: before the configuration is composed, and long before there is anything to log. For a single job;
-the workers of a sweep keep every core busy and import MLflow once each, so they call `tracking.log`.
+Importing MLflow and opening the store take two seconds, and in a thread they would hold up the job
+by as much (measured). In a process of their own they cost a job that takes as long next to nothing,
+if they begin when the command does: before the configuration is composed, and long before there is
+anything to log. For a single job; the workers of a sweep keep every core busy and import MLflow
+once each, so they call `tracking.log`.
 """
 
 import atexit
@@ -22,7 +23,8 @@ from tractexp.errors import UserError
 from tractexp.tracking.run import TrackedRun, log
 from tractexp.tracking.store import import_mlflow, open_store
 
-OPTIONAL = ("pandas", "polars", "pyarrow", "scipy", "IPython", "pygments")  # what MLflow imports and logs without
+# what MLflow imports and logs without
+OPTIONAL = ("pandas", "polars", "pyarrow", "scipy", "IPython", "pygments")
 _ahead: "list[Logger]" = []
 
 
@@ -34,7 +36,9 @@ def start_ahead() -> None:
 
 
 def _end_ahead() -> None:
-    """End the processes that nobody took. A process that was taken but got no run ends by itself."""
+    """End the processes that nobody took. A process that was taken but got no run
+    ends by itself.
+    """
     while _ahead:
         _ahead.pop().close()
 
@@ -49,8 +53,8 @@ def logger(uri: str) -> "Logger":
 class Logger:
     """`with Logger(uri) as logger: ...; logger.log(run)`. Without a run it logs nothing.
 
-    It imports MLflow at once. It creates the store when it gets the address, here or by `open`: do so once the input is
-    valid.
+    It imports MLflow at once. It creates the store when it gets the address, here or by `open`: do
+    so once the input is valid.
     """
 
     def __init__(self, uri: str = ""):
@@ -58,7 +62,8 @@ class Logger:
             interpreter.command("-c", f"from {__name__} import main; main()"),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is the job's business: it ends this process by leaving the `with`
+            # Ctrl-C is the job's business: it ends this process by leaving the `with`
+            start_new_session=True,
         )
         self._opened = False
         if uri:
@@ -68,7 +73,9 @@ class Logger:
         return self
 
     def open(self, uri: str) -> None:
-        """Let the process create or open the store at `uri` meanwhile, once; `log` raises what is wrong with it."""
+        """Let the process create or open the store at `uri` meanwhile, once; `log` raises what is
+        wrong with it.
+        """
         self._tell(uri)
         self._opened = True
 
@@ -86,7 +93,9 @@ class Logger:
         self._tell(run)
         answer, _ = self._process.communicate()
         if not answer:
-            raise UserError(f"the process that logs to MLflow ended with code {self._process.returncode}")
+            raise UserError(
+                f"the process that logs to MLflow ended with code {self._process.returncode}"
+            )
         run_id, error = pickle.loads(answer)
         if error:
             raise UserError(error)
@@ -99,13 +108,17 @@ class Logger:
                 self._process.kill()
             self._process.communicate()  # it reads the end of its input and ends
 
-    def __exit__(self, kind: type | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.close()
 
 
 @contextlib.contextmanager
 def absent(names: Iterable[str]) -> Iterator[None]:
-    """Let imports of these packages fail as where they are not installed; what was imported before stays."""
+    """Let imports of these packages fail as where they are not installed; what was imported before
+    stays.
+    """
     modules: dict[str, Any] = dict.fromkeys(name for name in names if name not in sys.modules)
     sys.modules.update(modules)  # None in the place of a module refuses its import
     try:
@@ -116,10 +129,11 @@ def absent(names: Iterable[str]) -> Iterator[None]:
 
 
 def main() -> None:
-    """Get ready, wait for an address and a run on standard input, log the run, answer on standard output.
+    """Get ready, wait for an address and a run on standard input, log the run, answer on standard
+    output.
 
-    What ends the job may be sent to all its processes. This one ends when the job does, by the end of its input, and
-    finishes the run that it has.
+    What ends the job may be sent to all its processes. This one ends when the job does, by the end
+    of its input, and finishes the run that it has.
     """
     signal.signal(signal.SIGTERM, signal.SIG_IGN)
     run_id = problem = ""
@@ -136,4 +150,5 @@ def main() -> None:
     with contextlib.suppress(BrokenPipeError):
         sys.stdout.buffer.write(pickle.dumps((run_id, problem)))
         sys.stdout.flush()
-    os._exit(0)  # all is on disk: do not keep the job waiting for the teardown of some thousand modules
+    # all is on disk: do not keep the job waiting for the teardown of some thousand modules
+    os._exit(0)

@@ -1,7 +1,8 @@
 """A run as plain data, and how it is written: at its end and in one go.
 
-MLflow knows no transaction over a whole run. One whose writer is killed meanwhile stays RUNNING until the store is
-opened next, which closes it (`owner`); its content is stored beside the results (`runfile`).
+MLflow knows no transaction over a whole run. One whose writer is killed meanwhile stays RUNNING
+until the store is opened next, which closes it (`owner`); its content is stored beside the results
+(`runfile`).
 """
 
 import contextlib
@@ -28,7 +29,8 @@ STATUSES = ("FINISHED", "FAILED", "KILLED")
 KEY = "tractexp.key"  # a tag
 PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
-BATCH_METRICS, BATCH_PARAMETERS = 900, 100  # MLflow takes at most 1000 entries a batch, 100 of them parameters
+# MLflow takes at most 1000 entries a batch, 100 of them parameters
+BATCH_METRICS, BATCH_PARAMETERS = 900, 100
 VALUE_LENGTH = 6000  # characters MLflow stores of a parameter
 Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a curve
 
@@ -37,12 +39,13 @@ Line: TypeAlias = "Sequence[float] | np.ndarray"  # (n,), steps or values of a c
 class TrackedRun:
     """What one job leaves in MLflow.
 
-    `parameters` is the flattened configuration, `metrics` the figures of the result. An infinite one, of what was never
-    reached, is left out: a database keeps the largest number there is in its place.
-    `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by iteration. `artifacts` are
-    files or folders to be copied. `parent` is the run id of the sweep. `seconds` is what the job took: MLflow shows
-    it as the run's duration. `model` is a result file that `tractexp.identification.result.load` reads; with it the run
-    offers a model for `mlflow.pyfunc.load_model`. `description` is Markdown. `children` are logged below this run.
+    `parameters` is the flattened configuration, `metrics` the figures of the result. An infinite
+    one, of what was never reached, is left out: a database keeps the largest number there is in its
+    place. `curves` maps a name to (steps (n,) whole numbers, values (n,)), such as "fitness" by
+    iteration. `artifacts` are files or folders to be copied. `parent` is the run id of the sweep.
+    `seconds` is what the job took: MLflow shows it as the run's duration. `model` is a result file
+    that `tractexp.identification.result.load` reads; with it the run offers a model for
+    `mlflow.pyfunc.load_model`. `description` is Markdown. `children` are logged below this run.
     """
 
     experiment: str
@@ -63,21 +66,29 @@ class TrackedRun:
     ended: float | None = None  # s since 1970; None: now
 
     def check(self) -> None:
-        """Raise `UserError` for a missing name, an unknown status, a file that is not there or a lopsided curve."""
+        """Raise `UserError` for a missing name, an unknown status, a file that is not there or a
+        lopsided curve.
+        """
         for key in ("experiment", "name"):
             if not getattr(self, key).strip():
                 raise UserError(f"tracking: a run needs {key}, which is empty")
         check_choice("status", self.status, STATUSES)
         for path in (*self.artifacts, *([self.model] if self.model else [])):
             if not Path(path).exists():
-                raise UserError(f"tracking: the artifact {path} of run '{self.name}' does not exist")
+                raise UserError(
+                    f"tracking: the artifact {path} of run '{self.name}' does not exist"
+                )
         for name, (steps, values) in self.curves.items():
             if len(steps) != len(values):
-                raise UserError(f"tracking: the curve '{name}' has {len(steps)} steps and {len(values)} values")
+                raise UserError(
+                    f"tracking: the curve '{name}' has {len(steps)} steps and {len(values)} values"
+                )
 
 
 def flatten(config: Mapping[str, Any], prefix: str = "") -> dict[str, str]:
-    """A nested configuration as {"optimizer.population": "50"}; lists stay whole, values are spelled as in JSON."""
+    """A nested configuration as {"optimizer.population": "50"}; lists stay whole, values are
+    spelled as in JSON.
+    """
     flat: dict[str, str] = {}
     for key, value in config.items():
         if isinstance(value, Mapping):
@@ -98,12 +109,16 @@ def _text(value: Any) -> str:
 
 
 def metric_name(text: str) -> str:
-    """Text as MLflow takes it for the name of a metric: "median issa levy=false" has a colon for the sign."""
+    """Text as MLflow takes it for the name of a metric: "median issa levy=false" has a colon for
+    the sign.
+    """
     return re.sub(r"[^\w.\- :/]", "_", text.replace("=", ":"), flags=re.ASCII)
 
 
 def choose_curve_points(count: int) -> "np.ndarray":
-    """The points of a curve of `count` points that are logged: `CURVE_POINTS` of them, evenly spread, or all."""
+    """The points of a curve of `count` points that are logged: `CURVE_POINTS` of them, evenly
+    spread, or all.
+    """
     import numpy as np
 
     return np.unique(np.linspace(0, count - 1, min(count, CURVE_POINTS)).round().astype(int))
@@ -112,7 +127,8 @@ def choose_curve_points(count: int) -> "np.ndarray":
 def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndarray, np.ndarray]":
     """A curve (n,) of what was reached, by steps (n,) above 0, at steps that all such curves share.
 
-    MLflow averages runs step by step: where each has its own, the average jumps from one run to the next.
+    MLflow averages runs step by step: where each has its own, the average jumps from one run to the
+    next.
     """
     import numpy as np
 
@@ -123,9 +139,11 @@ def at_common_steps(steps: "np.ndarray", values: "np.ndarray") -> "tuple[np.ndar
 
 
 def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
-    """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run that fails `check`.
+    """Write one finished run and return its id. Raises `UserError`; nothing is logged for a run
+    that fails `check`.
 
-    A run that is sent `again` is written once: the rest of an earlier attempt is deleted, a whole run stays.
+    A run that is sent `again` is written once: the rest of an earlier attempt is deleted, a whole
+    run stays.
     """
     run.check()
     client = open_store(uri)
@@ -146,12 +164,16 @@ def log(run: TrackedRun, uri: str, *, again: bool = False) -> str:
 
 
 def _whole_run(client: Any, run: TrackedRun) -> str:
-    """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is deleted."""
+    """The run of this key where the store has it whole, else ""; the rest of an earlier attempt is
+    deleted.
+    """
     experiments = [one.experiment_id for one in client.search_experiments()]
     for one in client.search_runs(experiments, f"tags.`{KEY}` = '{run.key}'") if run.key else ():
         if one.info.status in (run.status, STATUSES[0]):
             return one.info.run_id
-        for child in client.search_runs(experiments, f"tags.`mlflow.parentRunId` = '{one.info.run_id}'"):
+        for child in client.search_runs(
+            experiments, f"tags.`mlflow.parentRunId` = '{one.info.run_id}'"
+        ):
             client.delete_run(child.info.run_id)
         client.delete_run(one.info.run_id)
     return ""
@@ -173,7 +195,9 @@ def run_of(client: Any, uri: str, run_id: str) -> Any:
 
 
 def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
-    """Copy files to the artifacts of a run that has ended; False where the store has no such run (any more)."""
+    """Copy files to the artifacts of a run that has ended; False where the store has no such run
+    (any more).
+    """
     client = open_store(uri)
     run = run_of(client, uri, run_id)
     if run is None or run.info.lifecycle_stage == "deleted":
@@ -185,7 +209,9 @@ def attach(run_id: str, uri: str, paths: Sequence[Path]) -> bool:
 
 
 def start_parent(run: TrackedRun, uri: str) -> str:
-    """Open the run of a sweep and return its id, for `TrackedRun.parent` of the jobs. Close it in a `finally`."""
+    """Open the run of a sweep and return its id, for `TrackedRun.parent` of the jobs. Close it in a
+    `finally`.
+    """
     run.check()
     client = open_store(uri)
     with sentences(uri):
@@ -195,7 +221,9 @@ def start_parent(run: TrackedRun, uri: str) -> str:
 
 
 def reopen_parent(run_id: str, uri: str) -> bool:
-    """Mark the run of a sweep that goes on as running again; False where the store has it no more."""
+    """Mark the run of a sweep that goes on as running again; False where the store
+    has it no more.
+    """
     client = open_store(uri)
     from mlflow.exceptions import MlflowException
 
@@ -210,9 +238,15 @@ def reopen_parent(run_id: str, uri: str) -> bool:
 
 
 def finish_parent(
-    run_id: str, uri: str, status: str, metrics: Mapping[str, float] | None = None, artifacts: Sequence[Path] = ()
+    run_id: str,
+    uri: str,
+    status: str,
+    metrics: Mapping[str, float] | None = None,
+    artifacts: Sequence[Path] = (),
 ) -> None:
-    """Close the run of a sweep with its status, adding the figures and files of the sweep as a whole."""
+    """Close the run of a sweep with its status, adding the figures and files of the sweep as a
+    whole.
+    """
     run = TrackedRun("sweep", run_id, metrics=metrics or {}, artifacts=artifacts, status=status)
     run.check()
     client = open_store(uri)
@@ -222,7 +256,9 @@ def finish_parent(
 
 
 def tag_experiment(experiment: str, tags: Mapping[str, str], uri: str) -> str:
-    """Set tags on an experiment, such as a stored view of its runs, and return the experiment's id."""
+    """Set tags on an experiment, such as a stored view of its runs, and return the
+    experiment's id.
+    """
     client = open_store(uri)
     with sentences(uri):
         experiment_id = _experiment(client, experiment, uri)
@@ -242,9 +278,13 @@ def _create(client: Any, run: TrackedRun, uri: str) -> str:
         KEY: run.key,
         owner.TAG: owner.signature(),
     }
-    tags = {key: value for key, value in tags.items() if value} | {k: str(v) for k, v in run.tags.items()}
+    tags = {key: value for key, value in tags.items() if value} | {
+        k: str(v) for k, v in run.tags.items()
+    }
     started = _milliseconds(run.ended) - round(1000 * run.seconds)
-    return client.create_run(_experiment(client, run.experiment, uri), started, tags, run.name).info.run_id
+    return client.create_run(
+        _experiment(client, run.experiment, uri), started, tags, run.name
+    ).info.run_id
 
 
 def _write(client: Any, run_id: str, run: TrackedRun) -> None:
@@ -256,7 +296,9 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
         points += [(name, values[i], steps[i]) for i in choose_curve_points(len(steps))]
     metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]
     parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
-    chunks = zip_longest(_chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[])
+    chunks = zip_longest(
+        _chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[]
+    )
     for some_metrics, some_parameters in chunks:
         client.log_batch(run_id, some_metrics, some_parameters)
     if run.records:
@@ -270,7 +312,9 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
 
 
 def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:
-    """Log what a run has read. Of two processes that register a record at once, one is refused and tries again."""
+    """Log what a run has read. Of two processes that register a record at once, one is refused and
+    tries again.
+    """
     from mlflow.exceptions import MlflowException
 
     try:
@@ -280,7 +324,9 @@ def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:
 
 
 def _input(record: Mapping[str, str]) -> Any:
-    """One record as MLflow lists what a run has read: its digest is the SHA-256 of its channels, shortened."""
+    """One record as MLflow lists what a run has read: its digest is the SHA-256 of its channels,
+    shortened.
+    """
     from mlflow.entities import Dataset, DatasetInput, InputTag
 
     source = json.dumps({"sha256": record["sha256"]})
@@ -293,7 +339,9 @@ def _chunks(items: list[Any], size: int) -> list[list[Any]]:
 
 
 def _experiment(client: Any, name: str, uri: str) -> str:
-    """The id of the experiment `name`, created if need be; artifacts lie beside the database wherever this runs."""
+    """The id of the experiment `name`, created if need be; artifacts lie beside the database
+    wherever this runs.
+    """
     from mlflow.exceptions import MlflowException
 
     experiment = client.get_experiment_by_name(name)
@@ -310,7 +358,8 @@ def _experiment(client: Any, name: str, uri: str) -> str:
     if experiment.lifecycle_stage == "deleted":
         raise UserError(
             f"the experiment '{name}' in {uri} was deleted: restore it with "
-            f"'mlflow experiments restore --experiment-id {experiment.experiment_id}' or log under another name"
+            f"'mlflow experiments restore --experiment-id {experiment.experiment_id}' or log under"
+            " another name"
         )
     return experiment.experiment_id
 

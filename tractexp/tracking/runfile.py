@@ -1,7 +1,8 @@
-"""`mlflow.json`: what is to be logged of a folder, stored beside its results until the store has it, and after.
+"""`mlflow.json`: what is to be logged of a folder, stored beside its results until the store has
+it, and after.
 
-It is written before anything is sent. So a server that is away, a locked store or a lost one costs nothing: `sync`
-sends what a store lacks, and sends nothing twice.
+It is written before anything is sent. So a server that is away, a locked store or a lost one costs
+nothing: `sync` sends what a store lacks, and sends nothing twice.
 """
 
 import json
@@ -22,19 +23,33 @@ FILE = "mlflow.json"
 MOST_CHILDREN = 1000  # runs below one: sets of effects, optimizers
 NUMBER = (int, float)
 SHAPES: Mapping[str, Any] = {  # kinds of the entries of a run that are no texts
-    "parameters": dict, "metrics": dict, "curves": dict, "tags": dict, "artifacts": list, "records": list,
-    "children": list, "model": (str, type(None)), "parent": (str, type(None)), "seconds": NUMBER,
+    "parameters": dict,
+    "metrics": dict,
+    "curves": dict,
+    "tags": dict,
+    "artifacts": list,
+    "records": list,
+    "children": list,
+    "model": (str, type(None)),
+    "parent": (str, type(None)),
+    "seconds": NUMBER,
     "ended": (*NUMBER, type(None)),  # None of a run below another, which ends with it
-}  # fmt: skip
+}
 INNER: Mapping[str, Any] = {  # and of what these hold
-    "metrics": NUMBER, "tags": str, "artifacts": str, "records": dict, "children": dict, "curves": list,
-}  # fmt: skip
+    "metrics": NUMBER,
+    "tags": str,
+    "artifacts": str,
+    "records": dict,
+    "children": dict,
+    "curves": list,
+}
 KEY = re.compile(r"[\w-]*", re.ASCII)  # what may stand in MLflow's filter
 
 
 @dataclass(frozen=True)
 class RunFile:
-    """The content of `mlflow.json`: a run, where it is to be logged, and under which id it is; "" where it is not yet.
+    """The content of `mlflow.json`: a run, where it is to be logged, and under which id it is; ""
+    where it is not yet.
 
     `sweep` marks the run of a whole sweep, below which those of its jobs are.
     """
@@ -47,8 +62,17 @@ class RunFile:
 
     def write(self) -> "RunFile":
         """Write it. Raises `UserError` where that is impossible."""
-        content = {"uri": self.uri, "run_id": self.run_id, "sweep": self.sweep, "run": _plain(self.run, self.folder)}
-        files.write(self.folder / FILE, json.dumps(content, ensure_ascii=False, default=str) + "\n", private=True)
+        content = {
+            "uri": self.uri,
+            "run_id": self.run_id,
+            "sweep": self.sweep,
+            "run": _plain(self.run, self.folder),
+        }
+        files.write(
+            self.folder / FILE,
+            json.dumps(content, ensure_ascii=False, default=str) + "\n",
+            private=True,
+        )
         return self
 
     def logged(self, run_id: str, uri: str | None = None) -> "RunFile":
@@ -57,7 +81,9 @@ class RunFile:
 
 
 def save(folder: Path, run: TrackedRun, uri: str, sweep: bool = False) -> RunFile:
-    """Write down what is to be logged, with a key that identifies it, and the time at which the run ended."""
+    """Write down what is to be logged, with a key that identifies it, and the time at which the run
+    ended.
+    """
     key, ended = run.key or uuid.uuid4().hex, run.ended or time.time()
     return RunFile(folder, replace(run, key=key, ended=ended), uri, sweep=sweep).write()
 
@@ -73,14 +99,20 @@ def read(folder: Path) -> RunFile | None:
     except FileNotFoundError:
         return None
     except UserError as error:
-        raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
+        raise UserError(
+            f"{path} is damaged ({error}); remove it, or run its command again"
+        ) from error
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError) as error:
-        raise UserError(f"{path} is damaged ({error}); remove it, or run its command again") from error
+        raise UserError(
+            f"{path} is damaged ({error}); remove it, or run its command again"
+        ) from error
 
 
 def below(root: Path) -> list[Path]:
     """The folders at `root` and below that have such a file, those above first."""
-    return sorted((path.parent for path in root.rglob(FILE)), key=lambda folder: (len(folder.parts), folder))
+    return sorted(
+        (path.parent for path in root.rglob(FILE)), key=lambda folder: (len(folder.parts), folder)
+    )
 
 
 def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
@@ -104,7 +136,11 @@ def _thin(steps: Line, values: Line) -> list[list[float]]:
 
 def _relative(path: Path, folder: Path) -> str:
     path = Path(path).absolute()
-    return path.relative_to(folder.absolute()).as_posix() if path.is_relative_to(folder.absolute()) else str(path)
+    return (
+        path.relative_to(folder.absolute()).as_posix()
+        if path.is_relative_to(folder.absolute())
+        else str(path)
+    )
 
 
 def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
@@ -127,7 +163,9 @@ def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
         if not all(isinstance(value, kinds) for value in each):
             raise TypeError(f"its {name} hold what they cannot: {content[name]!r:.60}")
     if len(content["children"]) > MOST_CHILDREN:
-        raise ValueError(f"it has {len(content['children'])} runs below it, and at most {MOST_CHILDREN} can be")
+        raise ValueError(
+            f"it has {len(content['children'])} runs below it, and at most {MOST_CHILDREN} can be"
+        )
     there = {
         "artifacts": [folder / path for path in content["artifacts"]],
         "model": None if content["model"] is None else folder / content["model"],

@@ -1,7 +1,9 @@
-"""The store behind an address: created once by the first process, opened quickly, its errors as one sentence.
+"""The store behind an address: created once by the first process, opened quickly, its errors as one
+sentence.
 
-MLflow's own migrations fail when two processes start them together, and stay half-done when a process is killed. Here
-the first process makes the database in memory, under a lock, and moves it into place whole.
+MLflow's own migrations fail when two processes start them together, and stay half-done when a
+process is killed. Here the first process makes the database in memory, under a lock, and moves it
+into place whole.
 """
 
 import contextlib
@@ -36,7 +38,8 @@ def chosen_uri(setting: str | None) -> str:
 
 
 def address(setting: str | None) -> str:
-    """The store that was chosen, or the default one; both from the current folder, as an absolute address.
+    """The store that was chosen, or the default one; both from the current folder, as an absolute
+    address.
 
     Raises `UserError` where it holds a password.
     """
@@ -49,20 +52,27 @@ def address(setting: str | None) -> str:
 
 
 def database_of(uri: str) -> Path | None:
-    """The file behind an SQLite address, None for any other store; a relative one counts from the current folder."""
+    """The file behind an SQLite address, None for any other store; a relative one counts from the
+    current folder.
+    """
     return Path(uri.removeprefix("sqlite:///")).absolute() if uri.startswith("sqlite:///") else None
 
 
 @functools.cache
 def open_store(uri: str) -> Any:
-    """An open `MlflowClient`, the store behind it created where it is not there yet. One per store and process.
+    """An open `MlflowClient`, the store behind it created where it is not there yet. One per store
+    and process.
 
-    Any number of processes may do so at the same moment. Runs still marked as running by processes that have ended are
-    closed. Raises `UserError` for a store that cannot be written or reached, or comes from another version of MLflow.
+    Any number of processes may do so at the same moment. Runs still marked as running by processes
+    that have ended are closed. Raises `UserError` for a store that cannot be written or reached, or
+    comes from another version of MLflow.
     """
     credentials.check("the MLflow store", uri)
     if not uri.strip():
-        raise UserError("tracking: the address of the MLflow store is empty; it is like sqlite:////folder/mlflow.db")
+        raise UserError(
+            "tracking: the address of the MLflow store is empty; it is like"
+            " sqlite:////folder/mlflow.db"
+        )
     database = database_of(uri)
     import_mlflow(sql=database is not None)
     from mlflow import MlflowClient
@@ -85,9 +95,11 @@ def open_store(uri: str) -> Any:
 
 
 def _create_database(database: Path) -> None:
-    """Migrate an empty database in memory and move a copy into place, so that a killed process leaves no half of one.
+    """Migrate an empty database in memory and move a copy into place, so that a killed process
+    leaves no half of one.
 
-    On disk the migrations wait hundreds of times for the drive: 3 to 6 s on a busy one, against 1 s.
+    On disk the migrations wait hundreds of times for the drive: 3 to 6 s on a busy one, against 1
+    s.
     """
     from mlflow import MlflowClient
 
@@ -102,7 +114,9 @@ def _create_database(database: Path) -> None:
 
 
 def _check_database(database: Path) -> None:
-    """Raise soon what MLflow would take minutes of retrying to find: no database, one damaged, locked or read-only."""
+    """Raise soon what MLflow would take minutes of retrying to find: no database, one damaged,
+    locked or read-only.
+    """
     with contextlib.closing(sqlite3.connect(database, timeout=PATIENCE)) as connection:
         connection.execute("SELECT count(*) FROM sqlite_master").fetchall()
     if not os.access(database, os.W_OK):
@@ -111,11 +125,14 @@ def _check_database(database: Path) -> None:
 
 @functools.cache
 def import_mlflow(sql: bool = False) -> None:
-    """Import MLflow without its telemetry and remarks, and with `sql` what it needs for a database."""
+    """Import MLflow without its telemetry and remarks, and with `sql` what it needs
+    for a database.
+    """
     os.environ.setdefault("MLFLOW_DISABLE_TELEMETRY", "true")
     os.environ.setdefault("MLFLOW_LOGGING_LEVEL", "WARNING")
     os.environ.setdefault("MLFLOW_ENABLE_ARTIFACTS_PROGRESS_BAR", "false")
-    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")  # what cannot be sent now is sent later by `sync`
+    # what cannot be sent now is sent later by `sync`
+    os.environ.setdefault("MLFLOW_HTTP_REQUEST_MAX_RETRIES", "2")
     os.environ.setdefault("MLFLOW_HTTP_REQUEST_TIMEOUT", "30")
     with light_import():
         import mlflow
@@ -128,8 +145,8 @@ def import_mlflow(sql: bool = False) -> None:
 def light_import() -> Iterator[None]:
     """Import large packages quietly and without looking for garbage.
 
-    What they make lives for ever: looking through it costs a third of the import, and as much again at the end of
-    the process unless it is set aside (`gc.freeze`).
+    What they make lives for ever: looking through it costs a third of the import, and as much again
+    at the end of the process unless it is set aside (`gc.freeze`).
     """
     collecting = gc.isenabled()
     gc.disable()
@@ -145,10 +162,11 @@ def light_import() -> Iterator[None]:
 
 @contextlib.contextmanager
 def sentences(uri: str) -> Iterator[None]:
-    """Turn what MLflow, the database and the file system raise into one sentence that names the store.
+    """Turn what MLflow, the database and the file system raise into one sentence that names the
+    store.
 
-    What they warn of, and what MLflow logs of an error before it raises it, is for those who develop with them, and
-    stays off the user's terminal.
+    What they warn of, and what MLflow logs of an error before it raises it, is for those who
+    develop with them, and stays off the user's terminal.
     """
     from mlflow.exceptions import MlflowException
 
@@ -164,7 +182,8 @@ def sentences(uri: str) -> Iterator[None]:
         if "database schema" in reason or "Can't locate revision" in reason:
             raise UserError(
                 f"the MLflow store {uri} comes from another version of MLflow: '"
-                f"{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date (keep a copy), a "
+                f"{quoting.shell('mlflow', 'db', 'upgrade', uri)}' brings an older one up to date"
+                " (keep a copy), a "
                 "newer one needs the newer MLflow"
             ) from error
         raise UserError(f"the MLflow store {uri} cannot be used: {reason}") from error
@@ -183,7 +202,9 @@ def _silent(name: str) -> Iterator[None]:
 
 
 def _reach(uri: str) -> None:
-    """Ask a server for its health, briefly: MLflow itself would go on trying for minutes. Raises `OSError`."""
+    """Ask a server for its health, briefly: MLflow itself would go on trying for minutes. Raises
+    `OSError`.
+    """
     if not uri.startswith(("http://", "https://")):
         return
     import ssl

@@ -12,8 +12,12 @@ PAGES = ("comparison.json", "comparison.html")  # of a sweep, written when its j
 
 
 def folder_of(job: Path) -> Path:
-    """The folder of the sweep that a job's folder is of: `hydra.sweep.subdir` may put it several levels deep."""
-    return next((f for f in job.parents if (f / FILE).is_file() or (f / MULTIRUN).is_file()), job.parent)
+    """The folder of the sweep that a job's folder is of: `hydra.sweep.subdir` may put it several
+    levels deep.
+    """
+    return next(
+        (f for f in job.parents if (f / FILE).is_file() or (f / MULTIRUN).is_file()), job.parent
+    )
 
 
 def parent_of(folder: Path) -> str | None:

@@ -1,4 +1,6 @@
-"""Bring into a store what folders hold and it lacks: runs that could not be logged, or that a lost store had."""
+"""Bring into a store what folders hold and it lacks: runs that could not be logged, or that a lost
+store had.
+"""
 
 import os
 from collections import Counter
@@ -10,25 +12,43 @@ from typing import Any
 from tractexp import files, quoting
 from tractexp.errors import UserError
 from tractexp.tracking import runfile
-from tractexp.tracking.run import KEY, TrackedRun, finish_parent, log, reopen_parent, run_of, start_parent
+from tractexp.tracking.run import (
+    KEY,
+    TrackedRun,
+    finish_parent,
+    log,
+    reopen_parent,
+    run_of,
+    start_parent,
+)
 from tractexp.tracking.runfile import RunFile
 from tractexp.tracking.store import address, open_store, sentences
 from tractexp.tracking.sweepfile import FILE, PAGES, folder_of, parent_of
 
-THERE, BROUGHT, DELETED, NOT = "already there", "brought in", "deleted in MLflow and left so", "not logged"
+THERE, BROUGHT, DELETED, NOT = (
+    "already there",
+    "brought in",
+    "deleted in MLflow and left so",
+    "not logged",
+)
 
-MODEL = "mlmodel"  # of a file, by which MLflow knows a folder as a model; small, as some file systems have it
+# of a file, by which MLflow knows a folder as a model; small, as some file systems have it
+MODEL = "mlmodel"
 RESERVED = ("mlflow.", "tractexp.")  # how tags begin that MLflow and this package set
 
 
 def sync(
-    root: Path, uri: str | None = None, tell: Callable[[str], None] = lambda line: None, own: str | None = None
+    root: Path,
+    uri: str | None = None,
+    tell: Callable[[str], None] = lambda line: None,
+    own: str | None = None,
 ) -> Counter[str]:
-    """Send every run file at `root` and below to its store, or to `uri`, unless it is there; counts by outcome.
+    """Send every run file at `root` and below to its store, or to `uri`, unless it is there; counts
+    by outcome.
 
-    `tell` hears a sentence for each that could not be. Sending twice is harmless: its key identifies a run. Where the
-    folder may be somebody else's, `own` is the only store that what stands in it may name. Of a run nothing is sent
-    that does not lie in its folder.
+    `tell` hears a sentence for each that could not be. Sending twice is harmless: its key
+    identifies a run. Where the folder may be somebody else's, `own` is the only store that what
+    stands in it may name. Of a run nothing is sent that does not lie in its folder.
     """
     counts: Counter[str] = Counter()
     said: set[str] = set()
@@ -46,7 +66,10 @@ def sync(
         try:
             where = address(where)
             if own is not None and uri is None and where != own:
-                raise UserError(f"the MLflow store {where} is named in {root} alone, not by you: {_describe_store(where)}")
+                raise UserError(
+                    f"the MLflow store {where} is named in {root} alone, not by you:"
+                    f" {_describe_store(where)}"
+                )
             if where in broken:
                 raise UserError(broken[where])
             counts[_sent(replace(one, run=_within(one.run, one.folder, tell)), where)] += 1
@@ -66,9 +89,11 @@ def _describe_store(uri: str) -> str:
 
 
 def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> TrackedRun:
-    """The run with those of its files, and of the runs below it, that are there and lie in its folder.
+    """The run with those of its files, and of the runs below it, that are there and lie in its
+    folder.
 
-    Nothing goes along that MLflow would obey: a model that it loads, a tag of its own, Markdown of others.
+    Nothing goes along that MLflow would obey: a model that it loads, a tag of its own, Markdown of
+    others.
     """
 
     def lies(path: Path) -> bool:
@@ -77,7 +102,10 @@ def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> Track
         if not files.inside(path, folder):
             tell(f"{path} is not sent: it does not lie in the folder {folder} of its run")
         elif any(one.name.lower() == MODEL for one in (path, *path.rglob("*"))):
-            tell(f"{path} is not sent: MLflow would load it as a model, and run what its maker put into it")
+            tell(
+                f"{path} is not sent: MLflow would load it as a model, and run what its maker put"
+                " into it"
+            )
         else:
             return True
         return False
@@ -97,7 +125,9 @@ def _within(run: TrackedRun, folder: Path, tell: Callable[[str], None]) -> Track
     model = run.model if run.model and lies(run.model) and reads(run.model) else None
     tags = {name: text for name, text in run.tags.items() if not name.startswith(RESERVED)}
     told = quoting.markdown_again(run.description)
-    return replace(run, artifacts=artifacts, model=model, children=children, tags=tags, description=told)
+    return replace(
+        run, artifacts=artifacts, model=model, children=children, tags=tags, description=told
+    )
 
 
 def _sent(one: RunFile, uri: str) -> str:
@@ -123,7 +153,10 @@ def _same(one: RunFile, run_there: Any) -> bool:
     """Whether a run in the store is that of the file, whose id may be anybody's."""
     tags = run_there.data.tags
     if one.sweep:
-        return (run_there.info.run_name, tags.get("sweep")) == (one.run.name, one.run.tags.get("sweep"))
+        return (run_there.info.run_name, tags.get("sweep")) == (
+            one.run.name,
+            one.run.tags.get("sweep"),
+        )
     return tags.get(KEY) == one.run.key
 
 
@@ -134,12 +167,18 @@ def _sweep(one: RunFile, run_there: Any, uri: str) -> str:
     run_id = one.run_id
     if run_there is None or not reopen_parent(run_id, uri):
         run_id = start_parent(replace(one.run, metrics={}), uri)
-    pages = [path for name in PAGES if (path := one.folder / name).is_file() and files.inside(path, one.folder)]
+    pages = [
+        path
+        for name in PAGES
+        if (path := one.folder / name).is_file() and files.inside(path, one.folder)
+    ]
     finish_parent(run_id, uri, one.run.status, one.run.metrics, pages)
     one.logged(run_id, uri)
     sweep_file = one.folder / FILE
     files.write_json(
-        sweep_file, {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()}, private=True
+        sweep_file,
+        {"run": run_id, "uri": uri, "overrides": one.run.tags.get("sweep", "").split()},
+        private=True,
     )
     return BROUGHT
 

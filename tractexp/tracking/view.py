@@ -1,7 +1,9 @@
-"""The view that MLflow's page opens on: runs grouped by variant, averaged over seeds, with their fitness curves.
+"""The view that MLflow's page opens on: runs grouped by variant, averaged over seeds, with their
+fitness curves.
 
-MLflow keeps shared views as experiment tags. That is its internal affair and not documented: the address below is
-understood by the versions tested, and one that does not know it shows its ordinary page.
+MLflow keeps shared views as experiment tags. That is its internal affair and not documented: the
+address below is understood by the versions tested, and one that does not know it shows its ordinary
+page.
 """
 
 import base64
@@ -17,13 +19,22 @@ KEY = "tractexp"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
-LOAD = "load"  # a tag of runs on the records of a station: these are compared load by load, not by optimizer
-ERRORS = ("model_error", "model_error_held_out", "model_error_over_linear_network")  # the first columns
+# a tag of runs on the records of a station: these are compared load by load, not by optimizer
+LOAD = "load"
+# the first columns
+ERRORS = ("model_error", "model_error_held_out", "model_error_over_linear_network")
 GROUPS = ("variant", "optimizer")  # tags to group by: early runs have only the second
 METRICS = (
-    "search_objective", "search_epsilon_p", "search_epsilon_q", "search_simulations", *ERRORS, "grade", "objective",
-    "epsilon_p", "epsilon_q",
-)  # fmt: skip
+    "search_objective",
+    "search_epsilon_p",
+    "search_epsilon_q",
+    "search_simulations",
+    *ERRORS,
+    "grade",
+    "objective",
+    "epsilon_p",
+    "epsilon_q",
+)
 COLUMNS = [*(f"metrics.`{name}`" for name in METRICS), "tags.`variant`", "tags.`seed`"]
 STATE = {
     "searchFilter": RUNS,
@@ -36,64 +47,110 @@ STATE = {
     "compareRunsMode": "CHART",
 }
 AXES = {
-    "xAxisKey": "step", "xAxisScaleType": "linear", "yAxisKey": "metric", "lineSmoothness": 0, "range": {},
-    "useGlobalXaxisKey": True, "useGlobalLineSmoothing": True, "yAxisExpressions": [],
-}  # fmt: skip
+    "xAxisKey": "step",
+    "xAxisScaleType": "linear",
+    "yAxisKey": "metric",
+    "lineSmoothness": 0,
+    "range": {},
+    "useGlobalXaxisKey": True,
+    "useGlobalLineSmoothing": True,
+    "yAxisExpressions": [],
+}
 
 
 def _plot_comparison(metric_x: str, metric_y: str) -> dict[str, Any]:
     """What one metric cost in terms of another, a point a run."""
-    axes = {axis: {"key": key, "type": "METRIC"} for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))}
+    axes = {
+        axis: {"key": key, "type": "METRIC"}
+        for axis, key in (("xaxis", metric_x), ("yaxis", metric_y))
+    }
     return _chart("SCATTER", f"{metric_y} by {metric_x}", **axes)
 
 
 def _chart(kind: str, metric: str, **more: Any) -> dict[str, Any]:
     return {
-        "type": kind, "uuid": f"tractexp-{metric}", "metricKey": metric, "metricSectionId": SECTION,
-        "runsCountToCompare": 100, "deleted": False, "isGenerated": False, **more,
-    }  # fmt: skip
+        "type": kind,
+        "uuid": f"tractexp-{metric}",
+        "metricKey": metric,
+        "metricSectionId": SECTION,
+        "runsCountToCompare": 100,
+        "deleted": False,
+        "isGenerated": False,
+        **more,
+    }
 
 
 def _state(runs: Sequence[Mapping[str, str]]) -> dict[str, Any]:
-    """The view of runs with these tags: one closed group for each variant, the fitness curves first.
+    """The view of runs with these tags: one closed group for each variant, the fitness curves
+    first.
 
-    What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals: the rest is points.
+    What spans decades has a logarithmic axis. Bars have none and are labelled with two decimals:
+    the rest is points.
     """
     if any(LOAD in tags for tags in runs):
         return STATE | _of_loads()
     keys = GROUPS[:1] if all("variant" in tags for tags in runs) else GROUPS
     groups = {".".join(f"{key}.{tags.get(key, '')}" for key in keys) for tags in runs}
     curves = [
-        _chart("LINE", metric, selectedMetricKeys=[metric], **AXES | {"scaleType": "log", "xAxisScaleType": scale})
+        _chart(
+            "LINE",
+            metric,
+            selectedMetricKeys=[metric],
+            **AXES | {"scaleType": "log", "xAxisScaleType": scale},
+        )
         for metric, scale in (("fitness_by_simulations", "log"), ("fitness", "linear"))
     ]
     points = [
-        _chart("LINE", metric, selectedMetricKeys=[metric], displayPoints=True, **AXES | {"scaleType": "log"})
+        _chart(
+            "LINE",
+            metric,
+            selectedMetricKeys=[metric],
+            displayPoints=True,
+            **AXES | {"scaleType": "log"},
+        )
         for metric in ("search_objective", "objective", "epsilon_p", "epsilon_q")
     ]
-    bars = [_chart("BAR", metric, dataAccessKey=metric) for metric in ("search_simulations", "search_seconds")]
+    bars = [
+        _chart("BAR", metric, dataAccessKey=metric)
+        for metric in ("search_simulations", "search_seconds")
+    ]
     bars.insert(0, _plot_comparison("search_simulations", "search_objective"))
-    section = {"uuid": SECTION, "name": "Comparison", "display": True, "deleted": False, "isGenerated": False}
+    section = {
+        "uuid": SECTION,
+        "name": "Comparison",
+        "display": True,
+        "deleted": False,
+        "isGenerated": False,
+    }
     return STATE | {
         "groupBy": {
-            "aggregateFunction": "average", "groupByKeys": [{"mode": "tag", "groupByData": key} for key in keys],
+            "aggregateFunction": "average",
+            "groupByKeys": [{"mode": "tag", "groupByData": key} for key in keys],
         },
         "selectedColumns": COLUMNS,
         "groupsExpanded": {f"tag.{group}": False for group in groups},
         "compareRunCharts": [*curves, *points, *bars],
         "compareRunSections": [section | {"isReordered": False}],
-    }  # fmt: skip
+    }
 
 
 def _of_loads() -> dict[str, Any]:
-    """The table of a station's runs, the best model of each load first to be found: columns that sort."""
+    """The table of a station's runs, the best model of each load first to be found: columns that
+    sort.
+    """
     metrics = (*ERRORS, "epsilon_p", "epsilon_q", "epsilon_i", "objective")
     tags = (LOAD, "model", "optimizer", "seed")
     return {
-        "groupBy": None, "useGroupedValuesInCharts": False, "compareRunsMode": "TABLE",
-        "orderByKey": "metrics.`model_error`", "orderByAsc": True,
-        "selectedColumns": [*(f"metrics.`{name}`" for name in metrics), *(f"tags.`{name}`" for name in tags)],
-    }  # fmt: skip
+        "groupBy": None,
+        "useGroupedValuesInCharts": False,
+        "compareRunsMode": "TABLE",
+        "orderByKey": "metrics.`model_error`",
+        "orderByAsc": True,
+        "selectedColumns": [
+            *(f"metrics.`{name}`" for name in metrics),
+            *(f"tags.`{name}`" for name in tags),
+        ],
+    }
 
 
 def page(experiment_id: str, mode: str) -> str:
@@ -102,14 +159,19 @@ def page(experiment_id: str, mode: str) -> str:
 
 
 def tags_of_new(experiment_id: str) -> dict[str, str]:
-    """The tags by which a new experiment has the view as a table, and its description leads there from any page."""
+    """The tags by which a new experiment has the view as a table, and its description leads there
+    from any page.
+    """
     table = STATE | {"groupBy": None, "compareRunsMode": "TABLE", "selectedColumns": COLUMNS}
-    note = f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
+    note = (
+        f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
+    )
     return {TAG: _pack_view(table), "mlflow.note.content": note}
 
 
 def comparison_view(uri: str) -> str:
-    """Store the view in the experiment that has the newest identification, and return its page for `serve`.
+    """Store the view in the experiment that has the newest identification, and return its page for
+    `serve`.
 
     "" where nothing was identified yet.
     """
@@ -120,7 +182,9 @@ def comparison_view(uri: str) -> str:
         if not newest:
             return ""
         experiment_id = newest[0].info.experiment_id
-        runs = client.search_runs([experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"])
+        runs = client.search_runs(
+            [experiment_id], RUNS, max_results=1000, order_by=["start_time DESC"]
+        )
     state = _state([run.data.tags for run in runs])
     tag_experiment(names[experiment_id], {TAG: _pack_view(state)}, uri)
     return page(experiment_id, state["compareRunsMode"])

@@ -1,4 +1,5 @@
-"""Records in which an effect is hidden, made by equations and solvers that the product does not share.
+"""Records in which an effect is hidden, made by equations and solvers that the product does not
+share.
 
 Nothing of `tractexp` or of its plugins is imported. See README.md for what each case is.
 """

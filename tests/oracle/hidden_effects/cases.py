@@ -1,4 +1,6 @@
-"""The suites of the study: what is hidden where, under which noise. Each trial is a case and a seed."""
+"""The suites of the study: what is hidden where, under which noise. Each trial is a case and a
+seed.
+"""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -38,7 +40,9 @@ NOISES = {
 
 @dataclass(frozen=True)
 class Trial:
-    """One data set of the study: `label` names its row, `multiples` says how many detection limits are hidden."""
+    """One data set of the study: `label` names its row, `multiples` says how many detection limits
+    are hidden.
+    """
 
     label: str
     case: Case
@@ -48,7 +52,9 @@ class Trial:
 
 @dataclass(frozen=True)
 class Planned:
-    """A trial that is not made yet: limits and sizes take longer than the rest of a study's book-keeping."""
+    """A trial that is not made yet: limits and sizes take longer than the rest of a study's
+    book-keeping.
+    """
 
     label: str
     seed: int
@@ -56,7 +62,9 @@ class Planned:
 
 
 def seeds(label: str, salt: int | None = None) -> Iterator[int]:
-    """An endless series of seeds of its own for each label, and for each salt where one is given."""
+    """An endless series of seeds of its own for each label, and for each salt where
+    one is given.
+    """
     own = crc32(label.encode())
     rng = np.random.default_rng(own if salt is None else [salt, own])
     while True:
@@ -66,11 +74,16 @@ def seeds(label: str, salt: int | None = None) -> Iterator[int]:
 def nulls(noise: str, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
     """Nothing hidden, under one of `NOISES`; `settings` are fields of `Case`."""
     case = Case(noise=NOISES[noise], **settings)
-    return (Planned(noise, seed, partial(Trial, noise, case, seed)) for seed in seeds(f"null {noise}", salt))
+    return (
+        Planned(noise, seed, partial(Trial, noise, case, seed))
+        for seed in seeds(f"null {noise}", salt)
+    )
 
 
 def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """Nothing hidden but faults of measurement: skew up to 3 ms, windows of one to four cycles, drift."""
+    """Nothing hidden but faults of measurement: skew up to 3 ms, windows of one to four cycles,
+    drift.
+    """
     for seed in seeds("nuisances", salt):
         rng = np.random.default_rng([seed, 4])
         chosen = {
@@ -78,12 +91,17 @@ def nuisances(salt: int | None = None, **settings: Any) -> Iterator[Planned]:
             str(rng.choice(["measurement_window", "phasor_window"])): 0.02 * rng.integers(1, 5),
             "load_change": rng.uniform(-0.005, 0.005),
         }
-        faults = tuple((name, float(amount / NUISANCES[name].reference)) for name, amount in chosen.items())
-        yield Planned("nuisances", seed, partial(Trial, "nuisances", Case(nuisances=faults, **settings), seed))
+        faults = tuple(
+            (name, float(amount / NUISANCES[name].reference)) for name, amount in chosen.items()
+        )
+        yield Planned(
+            "nuisances", seed, partial(Trial, "nuisances", Case(nuisances=faults, **settings), seed)
+        )
 
 
 def imperfect(case: Case, seed: int, error: float) -> Case:
-    """The case with a load of which the base model, once fitted, misses about `error` of the response in S.
+    """The case with a load of which the base model, once fitted, misses about `error` of the
+    response in S.
 
     All kinds of imperfection are there at once, in drawn proportions.
     """
@@ -94,7 +112,10 @@ def imperfect(case: Case, seed: int, error: float) -> Case:
     size = 1.0
     for _ in range(3):  # nearly linear
         sizes = zip(IMPERFECTIONS.items(), (size * parts).tolist(), strict=True)
-        case = replace(case, imperfections=tuple((n, min(s, own.largest / own.reference)) for (n, own), s in sizes))
+        case = replace(
+            case,
+            imperfections=tuple((n, min(s, own.largest / own.reference)) for (n, own), s in sizes),
+        )
         try:
             size *= min(error / misfit(case, seed), 4.0)
         except (ValueError, ArithmeticError):  # no steady state
@@ -106,74 +127,113 @@ def inexact(error: float, salt: int | None = None, **settings: Any) -> Iterator[
     """Nothing hidden in a load that no model is exact for, under each of `NOISES` in turn."""
 
     def made(noise: str, seed: int) -> Trial:
-        return Trial(f"error {error:.0%}", imperfect(Case(noise=NOISES[noise], **settings), seed, error), seed)
+        return Trial(
+            f"error {error:.0%}",
+            imperfect(Case(noise=NOISES[noise], **settings), seed, error),
+            seed,
+        )
 
     for noise, seed in zip(cycle(NOISES), seeds("inexact", salt), strict=False):
         yield Planned(f"error {error:.0%}", seed, partial(made, noise, seed))
 
 
-def in_the_field(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """One effect under a drawn recorder and noise, in a load of which no model is exact to 0.5 % in every second set.
+def in_the_field(
+    name: str, multiple: float, salt: int | None = None, **settings: Any
+) -> Iterator[Planned]:
+    """One effect under a drawn recorder and noise, in a load of which no model is exact to 0.5 % in
+    every second set.
 
-    Its size is a multiple of its detection limit, and of the size at which it leaves as much as the load's own error.
+    Its size is a multiple of its detection limit, and of the size at which it leaves as much as the
+    load's own error.
     """
 
     def made(seed: int) -> Trial:
         rng = np.random.default_rng([seed, 6])
         rate, window = float(rng.choice(RATES)), str(rng.choice(["", "cycle", "P", "M"]))
         recorder = Recorder(
-            rate, int(2 * rate) if rate > 50 else 150, phasor_window=0.02 * (window == "cycle"),
+            rate,
+            int(2 * rate) if rate > 50 else 150,
+            phasor_window=0.02 * (window == "cycle"),
             pmu=window if window in ("P", "M") else "",
-        )  # fmt: skip
+        )
         noise = NOISES[str(rng.choice(list(NOISES)))]
         error = float(rng.choice([0.0, 0.005]))
-        return in_an_inexact_load(name, multiple, seed, error, **settings | {"noise": noise, "recorder": recorder})
+        return in_an_inexact_load(
+            name, multiple, seed, error, **settings | {"noise": noise, "recorder": recorder}
+        )
 
     return (Planned(name, seed, partial(made, seed)) for seed in seeds(f"field {name}", salt))
 
 
 def loud(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """One effect in noise of 0.1 %, twenty times less than any model of the load leaves, as in records of faults."""
+    """One effect in noise of 0.1 %, twenty times less than any model of the load leaves, as in
+    records of faults.
+    """
     own = settings | {"noise": Noise(0.001)}
     made = partial(in_an_inexact_load, name, multiple, error=0.02, **own)
     return (Planned(name, seed, partial(made, seed)) for seed in seeds(f"loud {name}", salt))
 
 
-def in_an_inexact_load(name: str, multiple: float, seed: int, error: float, **settings: Any) -> Trial:
+def in_an_inexact_load(
+    name: str, multiple: float, seed: int, error: float, **settings: Any
+) -> Trial:
     """One effect in a load of which no model is exact to `error` of the response."""
     case = imperfect(Case(effect=name, **settings), seed, error)
     return at_limit((name,), multiple, seed, imperfections=case.imperfections, **settings)
 
 
-def single(name: str, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """One effect, of the catalogue or not, at a multiple of its detection limit on each data set."""
-    return (Planned(name, seed, partial(at_limit, (name,), multiple, seed, **settings)) for seed in seeds(name, salt))
+def single(
+    name: str, multiple: float, salt: int | None = None, **settings: Any
+) -> Iterator[Planned]:
+    """One effect, of the catalogue or not, at a multiple of its detection limit on
+    each data set.
+    """
+    return (
+        Planned(name, seed, partial(at_limit, (name,), multiple, seed, **settings))
+        for seed in seeds(name, salt)
+    )
 
 
-def several(together: int, multiple: float, salt: int | None = None, **settings: Any) -> Iterator[Planned]:
-    """So many physical effects at once, at a multiple of their joint limit; every set comes before one comes again."""
+def several(
+    together: int, multiple: float, salt: int | None = None, **settings: Any
+) -> Iterator[Planned]:
+    """So many physical effects at once, at a multiple of their joint limit; every set comes before
+    one comes again.
+    """
     every = list(combinations(PHYSICAL, together))
     order = np.random.default_rng(0 if salt is None else salt).permutation(len(every))
-    for k, seed in zip(cycle(order), seeds("pairs" if together == 2 else f"{together} at once", salt), strict=False):
-        yield Planned(" + ".join(every[k]), seed, partial(at_limit, every[k], multiple, seed, **settings))
+    for k, seed in zip(
+        cycle(order), seeds("pairs" if together == 2 else f"{together} at once", salt), strict=False
+    ):
+        yield Planned(
+            " + ".join(every[k]), seed, partial(at_limit, every[k], multiple, seed, **settings)
+        )
 
 
 def at_limit(names: tuple[str, ...], multiple: float, seed: int, **settings: Any) -> Trial:
-    """A data set with effects at a multiple of their (joint) detection limit, or, in a load with imperfections, of the
-    size at which each leaves as much as those; less where that makes no sense."""
-    needed = {what: any(EFFECTS[name].needs == what for name in names) for what in ("swing", "negative")}
+    """A data set with effects at a multiple of their (joint) detection limit, or, in a load with
+    imperfections, of the size at which each leaves as much as those; less where that makes no
+    sense.
+    """
+    needed = {
+        what: any(EFFECTS[name].needs == what for name in names) for what in ("swing", "negative")
+    }
     case = Case(**needed | settings)
     hidden = replace(case, effect=names if len(names) > 1 else names[0])
     alone = [replace(hidden, effect=name) for name in names]
-    limits = np.array(joint_limit(hidden, seed) if len(names) > 1 else [detection_limit(hidden, seed)])
-    limits = np.maximum(limits, [size_of_error(one, seed) for one in alone])  # 0 where the load is exact
+    limits = np.array(
+        joint_limit(hidden, seed) if len(names) > 1 else [detection_limit(hidden, seed)]
+    )
+    # 0 where the load is exact
+    limits = np.maximum(limits, [size_of_error(one, seed) for one in alone])
     most = np.array([EFFECTS[name].largest / EFFECTS[name].reference for name in names])
     sizes = np.minimum(multiple * limits, most)
     while True:
         made = replace(case, effect=names, size=tuple(sizes.tolist()))
         try:
             scene(made, seed).responses()
-        except (ValueError, ArithmeticError):  # no static load left, a stall, a collapse behind the feeder
+        # no static load left, a stall, a collapse behind the feeder
+        except (ValueError, ArithmeticError):
             sizes = 0.8 * sizes
             continue
         return Trial(" + ".join(names), made, seed, tuple((sizes / limits).tolist()))

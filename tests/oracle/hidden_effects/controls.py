@@ -1,6 +1,8 @@
-"""Devices whose controls are not those that the catalogue's formulas describe: what else stands at such a bus.
+"""Devices whose controls are not those that the catalogue's formulas describe: what else stands at
+such a bus.
 
-Interfaces, units and signs are those of `devices`. u is the voltage over that before, power and current likewise.
+Interfaces, units and signs are those of `devices`. u is the voltage over that before, power and
+current likewise.
 """
 
 from dataclasses import dataclass, field, replace
@@ -28,10 +30,11 @@ class Rated(Device):
 
 @dataclass(frozen=True)
 class Rectifier(Rated):
-    """A diode bridge that feeds constant dc power up to a limit of its current; commutation costs voltage.
+    """A diode bridge that feeds constant dc power up to a limit of its current; commutation costs
+    voltage.
 
-    The dc voltage falls by `overlap` of the current, u_d = u - k i, and so does the power factor, u_d/u. Source: Mohan,
-    Undeland and Robbins 2003, section 5-6.
+    The dc voltage falls by `overlap` of the current, u_d = u - k i, and so does the power factor,
+    u_d/u. Source: Mohan, Undeland and Robbins 2003, section 5-6.
     """
 
     overlap: float = 0.12
@@ -50,7 +53,8 @@ class Rectifier(Rated):
 class CurrentControlled(Rated):
     """A converter with an inner current loop of first order and an outer integrator of its power.
 
-    z' = k (1 - u i) without windup, i' = (min(z, limit) - i)/tau. Source: Yazdani and Iravani 2010, section 8.4.
+    z' = k (1 - u i) without windup, i' = (min(z, limit) - i)/tau. Source: Yazdani and Iravani 2010,
+    section 8.4.
     """
 
     tau: float = 0.004  # s
@@ -64,7 +68,10 @@ class CurrentControlled(Rated):
         u, asked, i = abs(V) / self.V0, x[0].real, x[1].real
         missing = 1 - u * i
         moves = 0.0 if asked >= self.limit and missing > 0 else self.rate * missing
-        return drawn(complex(self.power * u * i), V), [moves, (min(asked, self.limit) - i) / self.tau]
+        return drawn(complex(self.power * u * i), V), [
+            moves,
+            (min(asked, self.limit) - i) / self.tau,
+        ]
 
 
 @dataclass(frozen=True)
@@ -90,10 +97,13 @@ class VoltageLink(Rated):
 
 @dataclass(frozen=True)
 class IntegralLink(Rated):
-    """A converter whose dc voltage v has a proportional and an integral control, and whose current has a limit.
+    """A converter whose dc voltage v has a proportional and an integral control, and whose current
+    has a limit.
 
-    T v v' = u i - 1, i = min(limit, 1 + z + 2 zeta w T (1 - v)), z' = w^2 T (1 - v), which stands still at the limit.
-    Source: Yazdani and Iravani 2010, Voltage-Sourced Converters in Power Systems, section 8.6 (dc-bus control).
+    T v v' = u i - 1, i = min(limit, 1 + z + 2 zeta w T (1 - v)), z' = w^2 T (1 - v), which stands
+    still at the limit.
+    Source: Yazdani and Iravani 2010, Voltage-Sourced Converters in Power Systems, section 8.6
+    (dc-bus control).
     """
 
     storage: float = 0.06  # s, T
@@ -118,7 +128,8 @@ class IntegralLink(Rated):
 class Ramped(Rated):
     """A converter that may lower its current at once and raises it along a ramp.
 
-    Source: WECC 2014, generic converter model REGC_A: low-voltage current limit and recovery ramp, of a load.
+    Source: WECC 2014, generic converter model REGC_A: low-voltage current limit and recovery ramp,
+    of a load.
     """
 
     rate: float = 5.0  # 1/s
@@ -135,10 +146,11 @@ class Ramped(Rated):
 
 @dataclass(frozen=True)
 class InputFilter(Rated):
-    """A drive of constant power behind a filter of L and C, which hardly damps: its resistance is negative.
+    """A drive of constant power behind a filter of L and C, which hardly damps: its resistance is
+    negative.
 
-    i' = w (u (1 + R) - v - R i)/Z, v' = w Z (i - j(v)), j = 1/v down to v = 0.85, there a conductance; the damping
-    ratio is (R/Z - Z)/2. Source: Middlebrook 1976.
+    i' = w (u (1 + R) - v - R i)/Z, v' = w Z (i - j(v)), j = 1/v down to v = 0.85, there a
+    conductance; the damping ratio is (R/Z - Z)/2. Source: Middlebrook 1976.
     """
 
     frequency: float = 4.0  # Hz
@@ -162,10 +174,11 @@ class InputFilter(Rated):
 
 @dataclass(frozen=True)
 class SynchronousMotor(Rated):
-    """A rotary frequency converter, seen as a synchronous motor behind its transient reactance, swings on the bus.
+    """A rotary frequency converter, seen as a synchronous motor behind its transient reactance,
+    swings on the bus.
 
-    P = E u sin(d)/X, Q = (u^2 - E u cos(d))/X, d' = w_0 (f - w), 2 H w' = P + D (f - w) - P_0; its powers per unit of
-    its rating, of which it is loaded to 0.7. Source: Kundur 1994, section 12.3.
+    P = E u sin(d)/X, Q = (u^2 - E u cos(d))/X, d' = w_0 (f - w), 2 H w' = P + D (f - w) - P_0; its
+    powers per unit of its rating, of which it is loaded to 0.7. Source: Kundur 1994, section 12.3.
     """
 
     frequency: float = 2.5  # Hz of the swing
@@ -195,9 +208,11 @@ class SynchronousMotor(Rated):
 
 @dataclass(frozen=True)
 class SusceptanceControl(Device):
-    """A thyristor-controlled compensator: the voltage is measured late, its susceptance integrated with a droop.
+    """A thyristor-controlled compensator: the voltage is measured late, its susceptance integrated
+    with a droop.
 
-    m' = (u - m)/T_m, b' = K (1 - m - s b) without windup, within -1..1, of the rating. Source: Kundur 1994, 11.2.
+    m' = (u - m)/T_m, b' = K (1 - m - s b) without windup, within -1..1, of the rating. Source:
+    Kundur 1994, 11.2.
     """
 
     rating: float  # pu of susceptance
@@ -219,10 +234,11 @@ class SusceptanceControl(Device):
 
 @dataclass(frozen=True)
 class DeadBand(Device):
-    """A compensator of current that sleeps within a band of the voltage and moves no faster than its rate.
+    """A compensator of current that sleeps within a band of the voltage and moves no faster than
+    its rate.
 
-    Of the rating: i' = (K (|1 - u| - band)_+ sign(1 - u) - i)/T, within -1..1 and no faster than `rate`. Source:
-    generic; dead bands and limited rates are usual in such regulators.
+    Of the rating: i' = (K (|1 - u| - band)_+ sign(1 - u) - i)/T, within -1..1 and no faster than
+    `rate`. Source: generic; dead bands and limited rates are usual in such regulators.
     """
 
     rating: float  # pu of current
@@ -244,7 +260,9 @@ class DeadBand(Device):
 
 @dataclass(frozen=True)
 class SwitchedBanks(Device):
-    """Capacitor banks that relays switch in and out: `profile` of the susceptance `b` [pu] is in."""
+    """Capacitor banks that relays switch in and out: `profile` of the susceptance
+    `b` [pu] is in.
+    """
 
     b: float
     profile: Profile = field(default_factory=Profile)
@@ -255,9 +273,11 @@ class SwitchedBanks(Device):
 
 @dataclass(frozen=True)
 class Thermostat(Rated):
-    """Heating under thermostats: what is switched on grows until the heat is what it was, P = g u^2.
+    """Heating under thermostats: what is switched on grows until the heat is what it was, P = g
+    u^2.
 
-    g' = (1 - g u^2)/T, g at most 1.5. Source: Kundur 1994, section 7.1 (thermostatically controlled loads).
+    g' = (1 - g u^2)/T, g at most 1.5. Source: Kundur 1994, section 7.1 (thermostatically controlled
+    loads).
     """
 
     pace: float = 0.5  # s
@@ -273,9 +293,11 @@ class Thermostat(Rated):
 
 @dataclass(frozen=True)
 class TwoPaces(Rated):
-    """Load that falls with u^2 and comes back to a constant current, half of it soon and half of it late.
+    """Load that falls with u^2 and comes back to a constant current, half of it soon and half of it
+    late.
 
-    P = u^2 + x + y, T x' = (u - u^2)/2 - x and likewise y. Source: two loads of Karlsson and Hill 1994 side by side.
+    P = u^2 + x + y, T x' = (u - u^2)/2 - x and likewise y. Source: two loads of Karlsson and Hill
+    1994 side by side.
     """
 
     soon: float = 0.1  # s
@@ -286,13 +308,17 @@ class TwoPaces(Rated):
 
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         u = abs(V) / self.V0
-        rates: list[complex] = [((u - u**2) / 2 - y) / T for y, T in zip(x, (self.soon, self.late), strict=True)]
+        rates: list[complex] = [
+            ((u - u**2) / 2 - y) / T for y, T in zip(x, (self.soon, self.late), strict=True)
+        ]
         return drawn(complex(self.power * (u**2 + sum(y.real for y in x))), V), rates
 
 
 @dataclass(frozen=True)
 class Tapped(Rated):
-    """An impedance behind a transformer whose ratio is `profile` above that before: tap changers restore its power."""
+    """An impedance behind a transformer whose ratio is `profile` above that before: tap changers
+    restore its power.
+    """
 
     profile: Profile = field(default_factory=Profile)
 
@@ -303,9 +329,11 @@ class Tapped(Rated):
 
 @dataclass(frozen=True)
 class Held(Rated):
-    """Traction that gives up power quickly on its way down a curve, and asks for it again only once the line is back.
+    """Traction that gives up power quickly on its way down a curve, and asks for it again only once
+    the line is back.
 
-    P = m, m falls to 1 - (full - u)/(full - off) within 10 ms; it rises at `rate` while u is above `back`.
+    P = m, m falls to 1 - (full - u)/(full - off) within 10 ms; it rises at `rate` while u is above
+    `back`.
     Source: EN 50388-1 has power given back slowly, so that trains do not swing with the line.
     """
 
@@ -326,7 +354,9 @@ class Held(Rated):
 
 @dataclass(frozen=True)
 class Staged(Rated):
-    """Traction that takes back its power in stages, `profile` of it by now; between them power is held."""
+    """Traction that takes back its power in stages, `profile` of it by now; between them power is
+    held.
+    """
 
     profile: Profile = field(default_factory=Profile)
     limit: float = 1.5
@@ -340,7 +370,8 @@ class Staged(Rated):
 class ResistiveInrush(Inrush):
     """Inrush whose offset is driven back by the resistance that the unidirectional current meets.
 
-    The offset falls with the mean of the saturated current, fast at first and ever slower, beside a slow decay.
+    The offset falls with the mean of the saturated current, fast at first and ever slower, beside a
+    slow decay.
     """
 
     resistance: float = 20.0  # 1/s of flux per pu of mean current

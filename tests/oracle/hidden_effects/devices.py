@@ -1,8 +1,9 @@
 """What stands beside the motors: the static load, converters, compensators, transformers, arcs.
 
-A device is settled at the load's voltage before the event (`settled(V)` returns it with its states) and then answers,
-instant by instant, what current it draws and how its states move (`flow(now, V, x)`). Per unit of the record's base,
-times in s; currents are phasors in the frame that turns with the bus voltage, positive when drawn.
+A device is settled at the load's voltage before the event (`settled(V)` returns it with its states)
+and then answers, instant by instant, what current it draws and how its states move (`flow(now, V,
+x)`). Per unit of the record's base, times in s; currents are phasors in the frame that turns with
+the bus voltage, positive when drawn.
 """
 
 from dataclasses import dataclass, field, replace
@@ -33,7 +34,8 @@ class Device:
 class Static(Device):
     """Exponential static load that may depend on frequency, grow with time, or recover slowly.
 
-    Recovery is that of Karlsson and Hill 1994: at first the exponent is `p_v`, in the end `p_v - recovery`.
+    Recovery is that of Karlsson and Hill 1994: at first the exponent is `p_v`, in the end `p_v -
+    recovery`.
     """
 
     p_v: float
@@ -46,12 +48,17 @@ class Static(Device):
     grows_from: float | None = None  # s; None: from the start of the record
     recovery: float = 0.0
     pace: float = 1.0  # s, time constant of the recovery
-    mixing: float = 0.0  # 1/s, by which both exponents grow with time: other customers take their turn
+    # 1/s, by which both exponents grow with time: other customers take their turn
+    mixing: float = 0.0
 
     def sized(self, S: complex, V: complex) -> "Static":
-        """The static load that draws S at V; ValueError where that would be a source of active power."""
+        """The static load that draws S at V; ValueError where that would be a source of active
+        power.
+        """
         if S.real <= 0:
-            raise ValueError(f"the other parts leave {S.real:.3g} pu to the static load; it must be positive")
+            raise ValueError(
+                f"the other parts leave {S.real:.3g} pu to the static load; it must be positive"
+            )
         return replace(self, S=S, V0=abs(V))
 
     def settled(self, V: complex) -> tuple["Static", list[complex]]:
@@ -72,11 +79,13 @@ class Static(Device):
 
 @dataclass(frozen=True)
 class Converter(Device):
-    """A four-quadrant converter of unity power factor that draws `power`, its voltage seen through a filter.
+    """A four-quadrant converter of unity power factor that draws `power`, its voltage seen through
+    a filter.
 
-    Its power is held constant until the current reaches `limit` (of the current before); below `block` (of the
-    voltage before) it is a conductance. A limit by line voltage applies where `full` is given: full power down to
-    `full`, linearly to `rest` of it at `empty` (voltages over the one before), as EN 50388 asks of trains.
+    Its power is held constant until the current reaches `limit` (of the current before); below
+    `block` (of the voltage before) it is a conductance. A limit by line voltage applies where
+    `full` is given: full power down to `full`, linearly to `rest` of it at `empty` (voltages over
+    the one before), as EN 50388 asks of trains.
     """
 
     power: float
@@ -97,12 +106,15 @@ class Converter(Device):
             return self.allowed(self.block) * (u / self.block) ** 2
         allowed = 1.0
         if self.full and u < self.full:
-            allowed = max(self.rest, self.rest + (1 - self.rest) * (u - self.empty) / (self.full - self.empty))
+            allowed = max(
+                self.rest, self.rest + (1 - self.rest) * (u - self.empty) / (self.full - self.empty)
+            )
         return min(allowed, self.limit * u)
 
     def flow(self, now: Moment, V: complex, x: list[complex]) -> tuple[complex, list[complex]]:
         seen = max(x[0].real, 0.01)  # a solver's trial step may overshoot
-        # The current is set from the filtered voltage, so that power slips with u/seen while the filter follows.
+        # The current is set from the filtered voltage, so that power slips with u/seen while the
+        # filter follows.
         power = self.power * self.allowed(seen) * abs(V) / self.V0 / seen
         return drawn(complex(power), V), [(abs(V) / self.V0 - seen) / self.filter]
 
@@ -111,7 +123,8 @@ class Converter(Device):
 class Link(Device):
     """A converter behind a dc link: the stored energy W sets the current, W' = U i - P.
 
-    i = i_0 + k (W_0 - W) + c z, z' = W_0 - W: without c the power lags by 1/(k U), with it the link rings.
+    i = i_0 + k (W_0 - W) + c z, z' = W_0 - W: without c the power lags by 1/(k U), with it the link
+    rings.
     Source: energy balance of the dc link of a four-quadrant converter.
     """
 
@@ -153,10 +166,12 @@ class Capacitor(Device):
 
 @dataclass(frozen=True)
 class Inrush(Device):
-    """Transformers whose core flux is offset by a returning voltage; the offset decays and the core desaturates.
+    """Transformers whose core flux is offset by a returning voltage; the offset decays and the core
+    desaturates.
 
-    A core of saturated susceptance `b` carries current while its flux U cos(theta) + offset exceeds the knee; its
-    fundamental is reactive. Source: Blume et al. 1951, inrush of a core with a two-slope magnetizing curve.
+    A core of saturated susceptance `b` carries current while its flux U cos(theta) + offset exceeds
+    the knee; its fundamental is reactive. Source: Blume et al. 1951, inrush of a core with a
+    two-slope magnetizing curve.
     """
 
     b: float
@@ -177,12 +192,16 @@ class Inrush(Device):
         offset, U = x[0].real, abs(V)
         angle = self.saturated(offset, U)
         Q = self.b * U**2 * (angle - sin(angle) * cos(angle)) / pi
-        return drawn(complex(0.0, Q), V), [-offset / self.decay + self.offset * max(now.rate, 0.0) / self.depth]
+        return drawn(complex(0.0, Q), V), [
+            -offset / self.decay + self.offset * max(now.rate, 0.0) / self.depth
+        ]
 
 
 @dataclass(frozen=True)
 class Statcom(Device):
-    """A static compensator: reactive current against a falling voltage, proportional, delayed, limited to `rating`."""
+    """A static compensator: reactive current against a falling voltage, proportional, delayed,
+    limited to `rating`.
+    """
 
     rating: float  # pu of current
     gain: float = 10.0  # of the rating, per pu of voltage
@@ -200,9 +219,11 @@ class Statcom(Device):
 
 @dataclass(frozen=True)
 class Arc(Device):
-    """Arcs of constant arc voltage behind a reactance, which go out where the supply cannot feed them.
+    """Arcs of constant arc voltage behind a reactance, which go out where the supply cannot feed
+    them.
 
-    The arc voltage a is in phase with the current: a² + (x i)² = u², P = a i, Q = x i², all over their values before.
+    The arc voltage a is in phase with the current: a² + (x i)² = u², P = a i, Q = x i², all over
+    their values before.
     """
 
     power: float
@@ -220,7 +241,9 @@ class Arc(Device):
 
 @dataclass(frozen=True)
 class Switched(Device):
-    """An admittance that is switched: draws S (U/U_0)² times a profile in time, which starts at 0."""
+    """An admittance that is switched: draws S (U/U_0)² times a profile in time, which
+    starts at 0.
+    """
 
     S: complex
     profile: Profile = field(default_factory=Profile)
@@ -235,7 +258,9 @@ class Switched(Device):
 
 @dataclass(frozen=True)
 class Ring(Device):
-    """A decaying oscillation of power that begins by itself at `start`, whatever the voltage does."""
+    """A decaying oscillation of power that begins by itself at `start`, whatever the
+    voltage does.
+    """
 
     S: complex
     start: float
@@ -246,7 +271,9 @@ class Ring(Device):
         since = now.t - self.start
         if since <= 0:
             return 0j, []
-        return drawn(self.S * exp(-since / self.decay) * sin(2 * pi * self.frequency * since), V), []
+        return drawn(
+            self.S * exp(-since / self.decay) * sin(2 * pi * self.frequency * since), V
+        ), []
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,5 @@
-"""The catalogue's effects, hidden: each is built of physics in `motor`, `devices`, `site` and `recorder`.
+"""The catalogue's effects, hidden: each is built of physics in `motor`, `devices`, `site` and
+`recorder`.
 
 An amount is on the record's base. Names are those of the catalogue; nothing of its plugins is used.
 """
@@ -19,14 +20,17 @@ class StatorResistance(Hidden):
 
     def apply(self, site: Site) -> Site:
         changed = (
-            replace(m, machine=replace(m.machine, Rs=m.machine.Rs + self.amount * m.rating)) for m in site.motors
+            replace(m, machine=replace(m.machine, Rs=m.machine.Rs + self.amount * m.rating))
+            for m in site.motors
         )
         return replace(site, motors=tuple(changed))
 
 
 @dataclass(frozen=True)
 class SpeedDependentTorque(Hidden):
-    """A share of the driven machines are fans and pumps, whose torque grows with the square of the speed."""
+    """A share of the driven machines are fans and pumps, whose torque grows with the square of the
+    speed.
+    """
 
     reference, largest, unit = 0.5, 1.0, "1"
 
@@ -36,7 +40,9 @@ class SpeedDependentTorque(Hidden):
 
 @dataclass(frozen=True)
 class MagneticSaturation(Hidden):
-    """A cubic magnetizing curve of the air gap, which leaves Xm at its value before the event as it is."""
+    """A cubic magnetizing curve of the air gap, which leaves Xm at its value before the event as it
+    is.
+    """
 
     reference, largest, unit = 0.4, 2.5, "1/pu²"
 
@@ -63,14 +69,18 @@ class SecondMotorGroup(Hidden):
 
 @dataclass(frozen=True)
 class FrequencyDependence(Hidden):
-    """The static load goes with powers of the frequency: `amount` for P, `reactive` times as much for Q."""
+    """The static load goes with powers of the frequency: `amount` for P, `reactive` times as much
+    for Q.
+    """
 
     reference, largest, unit = 1.5, 20.0, "1"
     needs = "swing"
     reactive: float = -0.7
 
     def apply(self, site: Site) -> Site:
-        return replace(site, static=replace(site.static, k_p=self.amount, k_q=self.reactive * self.amount))
+        return replace(
+            site, static=replace(site.static, k_p=self.amount, k_q=self.reactive * self.amount)
+        )
 
 
 @dataclass(frozen=True)
@@ -90,7 +100,9 @@ class ExponentialRecovery(Hidden):
 
 @dataclass(frozen=True)
 class UndervoltageTrip(Hidden):
-    """A relay with timers opens a share of the whole load; contactors bring it back along a ramp."""
+    """A relay with timers opens a share of the whole load; contactors bring it back
+    along a ramp.
+    """
 
     reference, largest, unit = 0.05, 0.9, "1"
     level: float = 0.8
@@ -101,7 +113,8 @@ class UndervoltageTrip(Hidden):
 
     @classmethod
     def details(cls, rng, dips):
-        level = max(0.45, 1 - float(rng.uniform(0.4, 0.8)) * (1 - lowest(dips)))  # some dip gets below it
+        # some dip gets below it
+        level = max(0.45, 1 - float(rng.uniform(0.4, 0.8)) * (1 - lowest(dips)))
         delay = float(rng.uniform(0.2, 0.5)) * min(d.duration for d in dips)
         return {
             "level": level,
@@ -116,12 +129,16 @@ class UndervoltageTrip(Hidden):
         return Relay(self.level, self.reset, self.delay, self.wait, self.ramp)
 
     def apply(self, site: Site) -> Site:
-        return replace(site, opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
+        return replace(
+            site, opened=self.amount * self.relay.opened(site.dip, site.recorder.duration)
+        )
 
 
 @dataclass(frozen=True)
 class ConstantPowerConverter(Hidden):
-    """Converters with a current limit, of `amount` times the power before, in place of static load."""
+    """Converters with a current limit, of `amount` times the power before, in place of
+    static load.
+    """
 
     reference, largest, unit = 0.2, 0.9, "1"
     limit: float = 1.3
@@ -136,7 +153,9 @@ class ConstantPowerConverter(Hidden):
 
 @dataclass(frozen=True)
 class VoltageDependentPowerLimit(Hidden):
-    """Trains that must take less where the line voltage is low: all at `full`, auxiliaries only at `empty`."""
+    """Trains that must take less where the line voltage is low: all at `full`, auxiliaries only at
+    `empty`.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     full: float = 0.9
@@ -145,7 +164,9 @@ class VoltageDependentPowerLimit(Hidden):
 
     def apply(self, site: Site) -> Site:
         power = self.amount * site.S.real
-        return beside(site, Converter(power, full=self.full, empty=self.empty, rest=self.rest, limit=1.5))
+        return beside(
+            site, Converter(power, full=self.full, empty=self.empty, rest=self.rest, limit=1.5)
+        )
 
 
 @dataclass(frozen=True)
@@ -180,7 +201,9 @@ class FeederImpedance(Hidden):
 
 @dataclass(frozen=True)
 class ShuntCapacitor(Hidden):
-    """A fixed bank, which gives with the square of the voltage and with frequency; no larger than what it serves."""
+    """A fixed bank, which gives with the square of the voltage and with frequency; no larger than
+    what it serves.
+    """
 
     reference, largest, unit = 0.3, 0.5, "pu"
 
@@ -190,7 +213,9 @@ class ShuntCapacitor(Hidden):
 
 @dataclass(frozen=True)
 class NegativeSequenceBraking(Hidden):
-    """The motors' negative-sequence circuit brakes and draws power; 1 is what the T-circuit says."""
+    """The motors' negative-sequence circuit brakes and draws power; 1 is what the
+    T-circuit says.
+    """
 
     reference, largest, unit = 1.0, 8.0, "1"
     needs = "negative"
@@ -201,7 +226,9 @@ class NegativeSequenceBraking(Hidden):
 
 @dataclass(frozen=True)
 class TransformerInrush(Hidden):
-    """Cores driven into saturation as the voltage returns; `amount` is their saturated susceptance."""
+    """Cores driven into saturation as the voltage returns; `amount` is their saturated
+    susceptance.
+    """
 
     reference, largest, unit = 0.3, 10.0, "pu"
     decay: float = 0.3
@@ -224,7 +251,10 @@ class LowFrequencyOscillation(Hidden):
 
     @classmethod
     def details(cls, rng, dips):
-        return {"frequency": float(rng.uniform(2.0, 8.0)), "damping": float(rng.uniform(0.04, 0.15))}
+        return {
+            "frequency": float(rng.uniform(2.0, 8.0)),
+            "damping": float(rng.uniform(0.04, 0.15)),
+        }
 
     def apply(self, site: Site) -> Site:
         return beside(site, Link.ringing(self.amount * site.S.real, self.frequency, self.damping))
@@ -232,7 +262,9 @@ class LowFrequencyOscillation(Hidden):
 
 @dataclass(frozen=True)
 class StaticVarCompensator(Hidden):
-    """A compensator that gives reactive current while the voltage is low; `amount` is its rating."""
+    """A compensator that gives reactive current while the voltage is low; `amount`
+    is its rating.
+    """
 
     reference, largest, unit = 0.05, 1.0, "pu"
     delay: float = 0.03
@@ -267,7 +299,8 @@ class MeasurementWindow(Hidden):
 
 @dataclass(frozen=True)
 class PhasorWindow(Hidden):
-    """A phasor unit forms voltage and current by a discrete Fourier transform over one window: no effect, a nuisance.
+    """A phasor unit forms voltage and current by a discrete Fourier transform over one window: no
+    effect, a nuisance.
 
     Both channels see the same window, so that a linear load would not show it at all.
     """
@@ -280,7 +313,9 @@ class PhasorWindow(Hidden):
 
 @dataclass(frozen=True)
 class LoadChange(Hidden):
-    """Customers switch on: the static load grows steadily, by `amount` of the whole power per second."""
+    """Customers switch on: the static load grows steadily, by `amount` of the whole power per
+    second.
+    """
 
     reference, largest, unit = 0.01, 0.3, "1/s"
 

@@ -1,4 +1,6 @@
-"""From a case and a seed to records: the load and the dips are drawn, the effects hidden, the noise added."""
+"""From a case and a seed to records: the load and the dips are drawn, the effects hidden, the noise
+added.
+"""
 
 import json
 from dataclasses import asdict, dataclass, field, replace
@@ -27,12 +29,14 @@ SLOWEST = 0.75  # pu: a base case whose motors get slower than this is drawn ane
 
 @dataclass(frozen=True)
 class Case:
-    """What to make. `size` counts references of each effect (`hidden_effects.sizes()`); `nuisances` likewise, and
-    `imperfections`: the load's own departures from any model, which are there beside whatever is hidden.
+    """What to make. `size` counts references of each effect (`hidden_effects.sizes()`); `nuisances`
+    likewise, and `imperfections`: the load's own departures from any model, which are there beside
+    whatever is hidden.
 
-    `events`: dips, or how many to draw; a drawn dip swings in frequency or is unbalanced where `swing` or `negative`
-    say so, or where an effect needs it. `load`: None draws one. `spread`: how far the static load differs from event
-    to event, relative. f is recorded where it swings, U2 where there is any.
+    `events`: dips, or how many to draw; a drawn dip swings in frequency or is unbalanced where
+    `swing` or `negative` say so, or where an effect needs it. `load`: None draws one. `spread`: how
+    far the static load differs from event to event, relative. f is recorded where it swings, U2
+    where there is any.
     """
 
     effect: str | tuple[str, ...] | None = None
@@ -49,14 +53,24 @@ class Case:
 
     @property
     def hidden(self) -> tuple[tuple[str, float], ...]:
-        """(name, size) of each effect; ValueError for an unknown name or sizes that do not match."""
-        names = () if self.effect is None else (self.effect,) if isinstance(self.effect, str) else self.effect
+        """(name, size) of each effect; ValueError for an unknown name or sizes that
+        do not match.
+        """
+        names = (
+            ()
+            if self.effect is None
+            else (self.effect,)
+            if isinstance(self.effect, str)
+            else self.effect
+        )
         sizes = self.size if isinstance(self.size, tuple) else (self.size,) * len(names)
         for name in (*names, *(name for name, _ in (*self.nuisances, *self.imperfections))):
             if name not in EFFECTS:
                 raise ValueError(f"there is no effect '{name}'; there are {', '.join(EFFECTS)}")
         if len(sizes) != len(names):
-            raise ValueError(f"{len(names)} effects have {len(sizes)} sizes; give one size, or one of each")
+            raise ValueError(
+                f"{len(names)} effects have {len(sizes)} sizes; give one size, or one of each"
+            )
         return tuple(zip(names, sizes, strict=True))
 
     def needs(self, what: str) -> bool:
@@ -84,7 +98,13 @@ class Scene:
         """The site of one event, effects and nuisances in place."""
         load, dip = self.load, self.dips[event]
         motor = Motor(load.machine, load.rating, load.torque)
-        site = Site(dip, self.power(event), (motor,), devices.Static(load.static.p_v, load.static.q_v), self.recorder)
+        site = Site(
+            dip,
+            self.power(event),
+            (motor,),
+            devices.Static(load.static.p_v, load.static.q_v),
+            self.recorder,
+        )
         for _, effect in (*self.imperfections, *self.effects, *self.nuisances):
             site = effect.apply(site)
         return site
@@ -94,7 +114,9 @@ class Scene:
         return [self.site(k).response() for k in range(len(self.dips))]
 
     def records(self) -> list[dict[str, np.ndarray]]:
-        """The clean records: t [s], U, P, Q [pu] and, where there are any, f [Hz] and U2 [pu]; each (samples,)."""
+        """The clean records: t [s], U, P, Q [pu] and, where there are any, f [Hz] and U2 [pu]; each
+        (samples,).
+        """
         return [self._record(response) for response in self.responses()]
 
     def _record(self, response: Response) -> dict[str, np.ndarray]:
@@ -108,9 +130,13 @@ class Scene:
 
 
 def scene(case: Case, seed: int) -> Scene:
-    """Everything the seed draws, the same for every size: load, dips, static powers, details of the effects."""
+    """Everything the seed draws, the same for every size: load, dips, static powers, details of the
+    effects.
+    """
     count = case.events if isinstance(case.events, int) else len(case.events)
-    load, dips = _drawn(seed, case.events, case.load, case.recorder, case.needs("swing"), case.needs("negative"))
+    load, dips = _drawn(
+        seed, case.events, case.load, case.recorder, case.needs("swing"), case.needs("negative")
+    )
     levels = 1 + case.spread * np.random.default_rng([seed, 3]).uniform(-1, 1, (count, 2))
     static = tuple(complex(load.static.P * P, load.static.Q * Q) for P, Q in levels)
 
@@ -118,30 +144,52 @@ def scene(case: Case, seed: int) -> Scene:
         rngs = {name: np.random.default_rng([seed, crc32(name.encode())]) for name, _ in named}
         return tuple((name, EFFECTS[name].of(size, rngs[name], dips)) for name, size in named)
 
-    hidden, faults, own = (instances(named) for named in (case.hidden, case.nuisances, case.imperfections))
+    hidden, faults, own = (
+        instances(named) for named in (case.hidden, case.nuisances, case.imperfections)
+    )
     return Scene(load, dips, static, hidden, faults, own, case.recorder)
 
 
 @lru_cache(maxsize=256)
 def _drawn(
-    seed: int, events: int | tuple[Dip, ...], load: Load | None, recorder: Recorder, swing: bool, negative: bool
+    seed: int,
+    events: int | tuple[Dip, ...],
+    load: Load | None,
+    recorder: Recorder,
+    swing: bool,
+    negative: bool,
 ) -> tuple[Load, tuple[Dip, ...]]:
     """Load and dips that the base case survives."""
     rng = np.random.default_rng([seed, 1])
     given = load is not None and not isinstance(events, int)
     for _ in range(40):
         chosen = draw_load(rng) if load is None else load
-        dips = draw_dips(rng, events, recorder, swing, negative) if isinstance(events, int) else events
+        dips = (
+            draw_dips(rng, events, recorder, swing, negative) if isinstance(events, int) else events
+        )
         if given:
             return chosen, dips
-        base = Scene(chosen, dips, (complex(chosen.static.P, chosen.static.Q),) * len(dips), (), (), (), recorder)
+        base = Scene(
+            chosen,
+            dips,
+            (complex(chosen.static.P, chosen.static.Q),) * len(dips),
+            (),
+            (),
+            (),
+            recorder,
+        )
         if all(response.lowest_speed > SLOWEST for response in base.responses()):
             return chosen, dips
-    raise ValueError(f"seed {seed}: no load was drawn whose motors survive these dips; give shallower or shorter ones")
+    raise ValueError(
+        f"seed {seed}: no load was drawn whose motors survive these dips; give shallower or shorter"
+        " ones"
+    )
 
 
 def draw_load(rng: np.random.Generator) -> Load:
-    """A load of the third-order class: a motor without stator resistance beside an exponential static load."""
+    """A load of the third-order class: a motor without stator resistance beside an exponential
+    static load.
+    """
     machine = Machine(
         Rs=0.0,
         Xs=rng.uniform(0.07, 0.13),
@@ -151,21 +199,36 @@ def draw_load(rng: np.random.Generator) -> Load:
         H=rng.uniform(0.4, 1.5),
     )
     P0, share, torque = rng.uniform(0.6, 1.0), rng.uniform(0.3, 0.6), rng.uniform(0.5, 0.8)
-    static = Static((1 - share) * P0, rng.uniform(0.05, 0.25) * P0, rng.uniform(0.8, 2.0), rng.uniform(1.5, 4.0))
+    static = Static(
+        (1 - share) * P0, rng.uniform(0.05, 0.25) * P0, rng.uniform(0.8, 2.0), rng.uniform(1.5, 4.0)
+    )
     return Load(machine, share * P0 / torque, torque, static)
 
 
 def draw_dips(
-    rng: np.random.Generator, count: int, recorder: Recorder, swing: bool = False, negative: bool = False
+    rng: np.random.Generator,
+    count: int,
+    recorder: Recorder,
+    swing: bool = False,
+    negative: bool = False,
 ) -> tuple[Dip, ...]:
-    """Dips of 5-60 % and 60-600 ms, half a second into the record; several are spread over the range of depths."""
+    """Dips of 5-60 % and 60-600 ms, half a second into the record; several are spread over the
+    range of depths.
+    """
     strata = rng.permutation(count) if count > 1 else [0]
     step = 1 / recorder.rate
-    return tuple(_draw_dip(rng, 0.05 + 0.55 * (k + rng.random()) / count, step, swing, negative) for k in strata)
+    return tuple(
+        _draw_dip(rng, 0.05 + 0.55 * (k + rng.random()) / count, step, swing, negative)
+        for k in strata
+    )
 
 
-def _draw_dip(rng: np.random.Generator, depth: float, step: float, swing: bool, negative: bool) -> Dip:
-    """A dip whose edges take at least three steps of the record: a phasor's window would not let faster ones pass."""
+def _draw_dip(
+    rng: np.random.Generator, depth: float, step: float, swing: bool, negative: bool
+) -> Dip:
+    """A dip whose edges take at least three steps of the record: a phasor's window would not let
+    faster ones pass.
+    """
     fall = rng.uniform(max(0.02, 3 * step), max(0.04, 6 * step))
     return Dip(
         depth=depth,
@@ -186,17 +249,22 @@ def _draw_dip(rng: np.random.Generator, depth: float, step: float, swing: bool, 
 def make(case: Case, seed: int) -> list[dict[str, np.ndarray]]:
     """The records of a case, one of each event: t, U, P, Q [, f] [, U2], each (samples,).
 
-    Raises ValueError for an unknown effect, one too large to make sense, or a load that has no steady state.
+    Raises ValueError for an unknown effect, one too large to make sense, or a load that has no
+    steady state.
     """
     records = scene(case, seed).records()
-    return [case.noise.add(record, np.random.default_rng([seed, 2, k])) for k, record in enumerate(records)]
+    return [
+        case.noise.add(record, np.random.default_rng([seed, 2, k]))
+        for k, record in enumerate(records)
+    ]
 
 
 def truth(case: Case, seed: int) -> dict[str, Any]:
-    """What was hidden: effects and nuisances with amounts, the load in the third-order model's names, dips, noise.
+    """What was hidden: effects and nuisances with amounts, the load in the third-order model's
+    names, dips, noise.
 
-    `where` [{event, channel, start, end}] are the intervals in which the effects change a channel by a tenth of the
-    most they change it, or more; the load itself the same.
+    `where` [{event, channel, start, end}] are the intervals in which the effects change a channel
+    by a tenth of the most they change it, or more; the load itself the same.
     """
     made = scene(case, seed)
     return {
@@ -207,7 +275,8 @@ def truth(case: Case, seed: int) -> dict[str, Any]:
         "imperfections": [{"name": name, **effect.truth()} for name, effect in made.imperfections],
         "load": made.load.truth(),
         "events": [
-            {"P_s0": S.real, "Q_s0": S.imag, **asdict(dip)} for S, dip in zip(made.static, made.dips, strict=True)
+            {"P_s0": S.real, "Q_s0": S.imag, **asdict(dip)}
+            for S, dip in zip(made.static, made.dips, strict=True)
         ],
         "noise": asdict(case.noise),
         "where": _where(made),
@@ -224,16 +293,34 @@ def _where(made: Scene) -> list[dict[str, Any]]:
             change = np.abs(record[channel] - base[channel])
             seen = record["t"][change >= max(0.1 * change.max(), 1e-9)]
             if len(seen):
-                found.append({"event": k, "channel": channel, "start": float(seen[0]), "end": float(seen[-1])})
+                found.append(
+                    {
+                        "event": k,
+                        "channel": channel,
+                        "start": float(seen[0]),
+                        "end": float(seen[-1]),
+                    }
+                )
     return found
 
 
 def write(case: Case, seed: int, folder: Path) -> list[Path]:
-    """Write `event1.csv`, ... and, beside them, `truth.json` to a folder; returns the paths of the records."""
+    """Write `event1.csv`, ... and, beside them, `truth.json` to a folder; returns the paths of the
+    records.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     paths = []
     for k, record in enumerate(make(case, seed), 1):
         paths.append(folder / f"event{k}.csv")
-        np.savetxt(paths[-1], np.column_stack(list(record.values())), "%.9g", ",", header=",".join(record), comments="")
-    (folder / "truth.json").write_text(json.dumps(truth(case, seed), indent=1) + "\n", encoding="utf-8")
+        np.savetxt(
+            paths[-1],
+            np.column_stack(list(record.values())),
+            "%.9g",
+            ",",
+            header=",".join(record),
+            comments="",
+        )
+    (folder / "truth.json").write_text(
+        json.dumps(truth(case, seed), indent=1) + "\n", encoding="utf-8"
+    )
     return paths

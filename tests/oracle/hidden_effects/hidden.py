@@ -14,14 +14,17 @@ from independent.source import Dip
 
 @dataclass(frozen=True)
 class Hidden:
-    """An effect of size `amount`; at 0 it leaves the site as it is. Further fields are its details."""
+    """An effect of size `amount`; at 0 it leaves the site as it is. Further fields are
+    its details.
+    """
 
     amount: float
 
     reference: ClassVar[float]  # amount at size 1: what an engineer would call noticeable
     largest: ClassVar[float] = float("inf")  # amount beyond which it makes no physical sense
     unit: ClassVar[str]
-    needs: ClassVar[str] = ""  # what a dip must bring for it to show: "swing" (frequency), "negative" (unbalance)
+    # what a dip must bring for it to show: "swing" (frequency), "negative" (unbalance)
+    needs: ClassVar[str] = ""
 
     @classmethod
     def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
@@ -30,10 +33,15 @@ class Hidden:
 
     @classmethod
     def of(cls, size: float, rng: np.random.Generator, dips: Sequence[Dip]) -> "Hidden":
-        """The effect at `size` times its reference; ValueError beyond the largest that makes sense."""
+        """The effect at `size` times its reference; ValueError beyond the largest that
+        makes sense.
+        """
         amount = size * cls.reference
         if abs(amount) > cls.largest * (1 + 1e-12):
-            raise ValueError(f"{cls.__name__} of {amount:.3g} {cls.unit} is beyond {cls.largest:g}; lower the size")
+            raise ValueError(
+                f"{cls.__name__} of {amount:.3g} {cls.unit} is beyond {cls.largest:g}; lower the"
+                " size"
+            )
         return cls(amount, **cls.details(rng, dips))
 
     def apply(self, site: Site) -> Site:
@@ -58,7 +66,10 @@ def beside(site: Site, *devices: Device) -> Site:
 def split(site: Site, share: float, second: Motor) -> Site:
     """The site with `share` of its first group of motors replaced by motors like `second`."""
     first, *others = site.motors
-    groups = replace(first, rating=(1 - share) * first.rating), replace(second, rating=share * first.rating)
+    groups = (
+        replace(first, rating=(1 - share) * first.rating),
+        replace(second, rating=share * first.rating),
+    )
     return replace(site, motors=(*groups, *others))
 
 

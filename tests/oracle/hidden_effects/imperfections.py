@@ -1,4 +1,6 @@
-"""What makes every model of a load inexact: small departures of several kinds, no plugin's formula."""
+"""What makes every model of a load inexact: small departures of several kinds, no
+plugin's formula.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -13,7 +15,9 @@ from independent.source import Dip
 
 @dataclass(frozen=True)
 class BrokenTorque(Hidden):
-    """A share of the driven machines has a torque of a broken power of the speed above a stand-still speed."""
+    """A share of the driven machines has a torque of a broken power of the speed above a
+    stand-still speed.
+    """
 
     reference, largest, unit = 0.3, 1.0, "1"
     power: float = 1.4

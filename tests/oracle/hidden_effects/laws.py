@@ -1,9 +1,10 @@
-"""Effects of the catalogue's kinds by other laws and at other places: what nature does that uses no formula of ours.
+"""Effects of the catalogue's kinds by other laws and at other places: what nature does that uses no
+formula of ours.
 
-Each belongs to the family of a catalogue's effect, `FAMILY` says which; its formula is not that effect's, and that of
-another plugin only where `MEMBERS_LAW` says so. Circuits of constant elements (resistance, feeder, capacitor, negative
-sequence, a second group) and definitions (skew, window, powers of the frequency) have one law; all other effects have
-two and more that no plugin has.
+Each belongs to the family of a catalogue's effect, `FAMILY` says which; its formula is not that
+effect's, and that of another plugin only where `MEMBERS_LAW` says so. Circuits of constant elements
+(resistance, feeder, capacitor, negative sequence, a second group) and definitions (skew, window,
+powers of the frequency) have one law; all other effects have two and more that no plugin has.
 """
 
 from collections.abc import Sequence
@@ -53,7 +54,9 @@ class StaticTrip(UndervoltageTrip):
     reference, largest, unit = 0.1, 0.9, "1"
 
     def apply(self, site: Site) -> Site:
-        return replace(site, static_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
+        return replace(
+            site, static_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration)
+        )
 
 
 @dataclass(frozen=True)
@@ -63,12 +66,16 @@ class MotorTrip(UndervoltageTrip):
     reference, largest, unit = 0.1, 0.9, "1"
 
     def apply(self, site: Site) -> Site:
-        return replace(site, motors_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration))
+        return replace(
+            site, motors_opened=self.amount * self.relay.opened(site.dip, site.recorder.duration)
+        )
 
 
 @dataclass(frozen=True)
 class TwoStageTrip(UndervoltageTrip):
-    """A second relay, later and for deeper dips, opens as much again; both return as the first does."""
+    """A second relay, later and for deeper dips, opens as much again; both return as the first
+    does.
+    """
 
     reference, largest, unit = 0.05, 0.45, "1"
     further: float = 0.85  # level of the second relay over that of the first
@@ -80,13 +87,19 @@ class TwoStageTrip(UndervoltageTrip):
 
     def apply(self, site: Site) -> Site:
         first = self.relay
-        second = replace(first, level=self.further * self.level, delay=self.delay + self.later, wait=self.wait + 0.15)
+        second = replace(
+            first,
+            level=self.further * self.level,
+            delay=self.delay + self.later,
+            wait=self.wait + 0.15,
+        )
         return replace(site, opened=self.amount * together(site, (first, second)))
 
 
 @dataclass(frozen=True)
 class InverseTimeTrip(UndervoltageTrip):
-    """A relay that waits less the deeper the dip: its delay falls with what the voltage lacks to its level.
+    """A relay that waits less the deeper the dip: its delay falls with what the voltage lacks to
+    its level.
 
     Source: inverse-time undervoltage characteristics, t = k/(1 - U/U_s), as IEC 60255-127 has them.
     """
@@ -99,11 +112,19 @@ class InverseTimeTrip(UndervoltageTrip):
 
 @dataclass(frozen=True)
 class ContactorsOneByOne(UndervoltageTrip):
-    """Five contactors of as much load each, with levels about the relay's and waits of their own."""
+    """Five contactors of as much load each, with levels about the relay's and waits
+    of their own.
+    """
 
     def apply(self, site: Site) -> Site:
         contactors = [
-            Relay(self.level + 0.02 * k, self.reset + 0.01 * k, self.delay * (1 + 0.1 * k), self.wait + 0.06 * k, 0.01)
+            Relay(
+                self.level + 0.02 * k,
+                self.reset + 0.01 * k,
+                self.delay * (1 + 0.1 * k),
+                self.wait + 0.06 * k,
+                0.01,
+            )
             for k in range(-2, 3)
         ]
         return replace(site, opened=self.amount / len(contactors) * together(site, contactors))
@@ -111,7 +132,9 @@ class ContactorsOneByOne(UndervoltageTrip):
 
 @dataclass(frozen=True)
 class DriftFromDip(Hidden):
-    """Customers switch on after they noticed the dip: the static load grows steadily from its beginning."""
+    """Customers switch on after they noticed the dip: the static load grows steadily from its
+    beginning.
+    """
 
     reference, largest, unit = 0.02, 0.3, "1/s"
 
@@ -162,7 +185,8 @@ class AcceleratingDrift(Hidden):
 
 @dataclass(frozen=True)
 class FroelichSaturation(Hidden):
-    """A magnetizing curve of bounded flux, psi = a i/(b + i); `amount` is the flux before the event over a.
+    """A magnetizing curve of bounded flux, psi = a i/(b + i); `amount` is the flux before the event
+    over a.
 
     Source: Froelich 1881, as in Kundur 1994, section 3.8.2 among representations of saturation.
     """
@@ -175,7 +199,9 @@ class FroelichSaturation(Hidden):
 
 @dataclass(frozen=True)
 class ViscousTorque(Hidden):
-    """A share of the driven machines are conveyors and extruders, whose torque grows with the speed."""
+    """A share of the driven machines are conveyors and extruders, whose torque grows with the
+    speed.
+    """
 
     reference, largest, unit = 0.7, 1.0, "1"
 
@@ -226,12 +252,16 @@ class CurrentLoopConverter(Hidden):
         return {"rate": float(rng.uniform(60.0, 120.0)), "limit": float(rng.uniform(1.1, 1.5))}
 
     def apply(self, site: Site) -> Site:
-        return beside(site, CurrentControlled(self.amount * site.S.real, rate=self.rate, limit=self.limit))
+        return beside(
+            site, CurrentControlled(self.amount * site.S.real, rate=self.rate, limit=self.limit)
+        )
 
 
 @dataclass(frozen=True)
 class FleetOfConverters(Hidden):
-    """Converters of five sizes, more or less loaded, so that they reach their limits of current one after the other."""
+    """Converters of five sizes, more or less loaded, so that they reach their limits of current one
+    after the other.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     spread: float = 0.15
@@ -242,12 +272,16 @@ class FleetOfConverters(Hidden):
 
     def apply(self, site: Site) -> Site:
         power, limits = self.amount * site.S.real / 5, 1.3 + self.spread * np.linspace(-1, 1, 5)
-        return beside(site, *(Converter(power, limit=limit, filter=0.004) for limit in limits.tolist()))
+        return beside(
+            site, *(Converter(power, limit=limit, filter=0.004) for limit in limits.tolist())
+        )
 
 
 @dataclass(frozen=True)
 class DelayedPowerLimit(Hidden):
-    """Trains that must take less where the line voltage is low, which they measure over some cycles."""
+    """Trains that must take less where the line voltage is low, which they measure over some
+    cycles.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     measured: float = 0.05
@@ -258,7 +292,9 @@ class DelayedPowerLimit(Hidden):
 
     def apply(self, site: Site) -> Site:
         power = self.amount * site.S.real
-        return beside(site, Converter(power, full=0.9, empty=0.7, rest=0.1, limit=1.5, filter=self.measured))
+        return beside(
+            site, Converter(power, full=0.9, empty=0.7, rest=0.1, limit=1.5, filter=self.measured)
+        )
 
 
 @dataclass(frozen=True)
@@ -274,7 +310,10 @@ class StagedPowerLimit(Hidden):
         return {"delay": float(rng.uniform(0.01, 0.04)), "wait": float(rng.uniform(0.1, 0.4))}
 
     def apply(self, site: Site) -> Site:
-        stages = [Relay(level, level + 0.03, self.delay, self.wait * k, 0.1) for k, level in enumerate(STAGES, 1)]
+        stages = [
+            Relay(level, level + 0.03, self.delay, self.wait * k, 0.1)
+            for k, level in enumerate(STAGES, 1)
+        ]
         profile = together(site, stages)
         device = Staged(self.amount * site.S.real, profile=1 / len(stages) * profile)
         return replace(beside(site, device), breaks=(*site.breaks, *profile.times))
@@ -282,7 +321,9 @@ class StagedPowerLimit(Hidden):
 
 @dataclass(frozen=True)
 class HeldPowerLimit(Hidden):
-    """Trains that give up power along a curve at once, and take it back slowly and only once the line is back."""
+    """Trains that give up power along a curve at once, and take it back slowly and only once the
+    line is back.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     rate: float = 1.0
@@ -297,7 +338,9 @@ class HeldPowerLimit(Hidden):
 
 @dataclass(frozen=True)
 class FleetPowerLimit(Hidden):
-    """A fleet of five sorts of trains, each of which begins to take less at a level of its own and ends at another."""
+    """A fleet of five sorts of trains, each of which begins to take less at a level of its own and
+    ends at another.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     spread: float = 0.1
@@ -309,7 +352,9 @@ class FleetPowerLimit(Hidden):
     def apply(self, site: Site) -> Site:
         power, levels = self.amount * site.S.real / 5, 0.88 + self.spread * np.linspace(-1, 1, 5)
         alike = Converter(power, rest=0.2, limit=1.5, filter=0.006)
-        return beside(site, *(replace(alike, full=full, empty=full - 0.15) for full in levels.tolist()))
+        return beside(
+            site, *(replace(alike, full=full, empty=full - 0.15) for full in levels.tolist())
+        )
 
 
 @dataclass(frozen=True)
@@ -325,12 +370,16 @@ class LinkVoltageControl(Hidden):
 
     def apply(self, site: Site) -> Site:
         storage = 0.06
-        return beside(site, VoltageLink(self.amount * site.S.real, storage=storage, gain=storage / self.lag))
+        return beside(
+            site, VoltageLink(self.amount * site.S.real, storage=storage, gain=storage / self.lag)
+        )
 
 
 @dataclass(frozen=True)
 class LinkWithIntegralControl(Hidden):
-    """Converters whose control of the dc voltage has an integral part, so that the link swings back to its voltage."""
+    """Converters whose control of the dc voltage has an integral part, so that the link swings back
+    to its voltage.
+    """
 
     reference, largest, unit = 0.15, 0.9, "1"
     frequency: float = 4.0
@@ -385,10 +434,16 @@ class FilterOscillation(Hidden):
 
     @classmethod
     def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
-        return {"frequency": float(rng.uniform(2.0, 8.0)), "damping": float(rng.uniform(0.05, 0.15))}
+        return {
+            "frequency": float(rng.uniform(2.0, 8.0)),
+            "damping": float(rng.uniform(0.05, 0.15)),
+        }
 
     def apply(self, site: Site) -> Site:
-        return beside(site, InputFilter(self.amount * site.S.real, frequency=self.frequency, damping=self.damping))
+        return beside(
+            site,
+            InputFilter(self.amount * site.S.real, frequency=self.frequency, damping=self.damping),
+        )
 
 
 @dataclass(frozen=True)
@@ -401,10 +456,18 @@ class SynchronousSwing(Hidden):
 
     @classmethod
     def details(cls, rng: np.random.Generator, dips: Sequence[Dip]) -> dict[str, float]:
-        return {"frequency": float(rng.uniform(1.5, 3.5)), "damping": float(rng.uniform(0.05, 0.15))}
+        return {
+            "frequency": float(rng.uniform(1.5, 3.5)),
+            "damping": float(rng.uniform(0.05, 0.15)),
+        }
 
     def apply(self, site: Site) -> Site:
-        return beside(site, SynchronousMotor(self.amount * site.S.real, frequency=self.frequency, damping=self.damping))
+        return beside(
+            site,
+            SynchronousMotor(
+                self.amount * site.S.real, frequency=self.frequency, damping=self.damping
+            ),
+        )
 
 
 @dataclass(frozen=True)
@@ -457,7 +520,9 @@ class ThermostatRecovery(Hidden):
 
 @dataclass(frozen=True)
 class TapRecovery(Hidden):
-    """A share of the load stands behind a transformer whose quick tap changer restores its voltage step by step."""
+    """A share of the load stands behind a transformer whose quick tap changer restores its voltage
+    step by step.
+    """
 
     reference, largest, unit = 0.3, 0.9, "1"
     pause: float = 0.1
@@ -470,7 +535,9 @@ class TapRecovery(Hidden):
     def apply(self, site: Site) -> Site:
         t = np.arange(0.0, site.recorder.duration, self.pause / 50)
         ratio, since, changes = 0.0, 0.0, []
-        for now, u in zip(t.tolist(), (site.dip.magnitude(t) / site.dip.before).tolist(), strict=True):
+        for now, u in zip(
+            t.tolist(), (site.dip.magnitude(t) / site.dip.before).tolist(), strict=True
+        ):
             off = 1 - u * (1 + ratio)
             since = now if abs(off) < self.step else since
             if now - since >= self.pause and abs(ratio + np.sign(off) * self.step) < 0.15:
@@ -483,7 +550,9 @@ class TapRecovery(Hidden):
 
 @dataclass(frozen=True)
 class RecoveryAtTwoPaces(Hidden):
-    """Load that comes back to its current, some of it soon, such as drives, and some of it late, such as processes."""
+    """Load that comes back to its current, some of it soon, such as drives, and some of it late,
+    such as processes.
+    """
 
     reference, largest, unit = 0.3, 0.9, "1"
     soon: float = 0.1
@@ -499,7 +568,9 @@ class RecoveryAtTwoPaces(Hidden):
 
 @dataclass(frozen=True)
 class DeadBandCompensator(Hidden):
-    """A compensator that does nothing within a band of the voltage and whose current changes slowly."""
+    """A compensator that does nothing within a band of the voltage and whose current changes
+    slowly.
+    """
 
     reference, largest, unit = 0.05, 1.0, "pu"
     band: float = 0.08
@@ -515,7 +586,9 @@ class DeadBandCompensator(Hidden):
 
 @dataclass(frozen=True)
 class InrushWithResistance(Hidden):
-    """Cores driven into saturation, whose offset the current's own resistance drives back, fast at first."""
+    """Cores driven into saturation, whose offset the current's own resistance drives back, fast at
+    first.
+    """
 
     reference, largest, unit = 0.3, 10.0, "pu"
 
@@ -525,7 +598,9 @@ class InrushWithResistance(Hidden):
 
 @dataclass(frozen=True)
 class InrushByInstant(Hidden):
-    """Inrush whose offset is set by the instant at which the voltage returns, another in each event."""
+    """Inrush whose offset is set by the instant at which the voltage returns, another in each
+    event.
+    """
 
     reference, largest, unit = 0.3, 10.0, "pu"
     decay: float = 0.3
@@ -610,7 +685,8 @@ FAMILY = {
     "inrush_with_resistance": "transformer_inrush",
     "inrush_by_instant": "transformer_inrush",
 }
-MEMBERS_LAW = {  # hidden laws that members of families were built to tell: by other code, no longer by another law
+# hidden laws that members of families were built to tell: by other code, no longer by another law
+MEMBERS_LAW = {
     "static_part_trip": "static_trip",
     "motor_share_trip": "motor_trip",
     "trip_in_two_stages": "two_stage_trip",

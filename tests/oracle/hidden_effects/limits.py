@@ -1,7 +1,9 @@
-"""The size at which an effect can just be told from the base model, by the generator's own sensitivities.
+"""The size at which an effect can just be told from the base model, by the generator's own
+sensitivities.
 
-Source: Rao's score test with nuisance directions projected out; the non-centrality of an effect of size eta with the
-whitened, projected signature s is eta² |s|². Small effects, Gaussian noise: an approximation for large limits.
+Source: Rao's score test with nuisance directions projected out; the non-centrality of an effect of
+size eta with the whitened, projected signature s is eta² |s|². Small effects, Gaussian noise: an
+approximation for large limits.
 """
 
 from dataclasses import replace
@@ -21,20 +23,26 @@ MACHINE, STATIC = ("Xs", "Xm", "Rr", "Xr", "H"), ("p_v", "q_v")
 
 @lru_cache(maxsize=4096)
 def detection_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.05) -> float:
-    """Size of the case's one effect that a test of the whole catalogue finds with probability `power`.
+    """Size of the case's one effect that a test of the whole catalogue finds with probability
+    `power`.
 
-    `level` is the family-wise false alarm over the catalogue (Bonferroni). The parameters of the load, the static
-    load of each event, and skew, window and drift are projected out. Only the level and the color of the noise count,
-    and only P and Q: for effects on the voltage channel this is a rough guide.
+    `level` is the family-wise false alarm over the catalogue (Bonferroni). The parameters of the
+    load, the static load of each event, and skew, window and drift are projected out. Only the
+    level and the color of the noise count, and only P and Q: for effects on the voltage channel
+    this is a rough guide.
     """
     return float(needed(power, level) ** 0.5 / np.linalg.norm(projected(case, seed)))
 
 
-def joint_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.05) -> tuple[float, ...]:
-    """Sizes of the case's effects at which together they are seen beside the best single effect of the catalogue.
+def joint_limit(
+    case: Case, seed: int, power: float = 0.9, level: float = 0.05
+) -> tuple[float, ...]:
+    """Sizes of the case's effects at which together they are seen beside the best single effect of
+    the catalogue.
 
-    Each is the same multiple of its own `detection_limit`; what the one effect of the catalogue that could take most of
-    the sum takes is projected out, with its details as they are drawn here. Otherwise as there.
+    Each is the same multiple of its own `detection_limit`; what the one effect of the catalogue
+    that could take most of the sum takes is projected out, with its details as they are drawn here.
+    Otherwise as there.
     """
     case = replace(case, swing=case.needs("swing"), negative=case.needs("negative"))
     own = [replace(case, effect=name, size=1.0) for name, _ in case.hidden]
@@ -50,14 +58,17 @@ def joint_limit(case: Case, seed: int, power: float = 0.9, level: float = 0.05) 
 
 
 def needed(power: float, level: float) -> float:
-    """Non-centrality that a test of the whole catalogue (Bonferroni, two-sided) finds with this probability."""
+    """Non-centrality that a test of the whole catalogue (Bonferroni, two-sided) finds with this
+    probability.
+    """
     from scipy.stats import norm
 
     return float((norm.isf(level / (2 * len(CATALOG))) + norm.isf(1 - power)) ** 2)
 
 
 def projected(case: Case, seed: int) -> np.ndarray:
-    """The whitened signature of size 1 (rows,), what the base model and the nuisances could imitate taken out.
+    """The whitened signature of size 1 (rows,), what the base model and the nuisances could imitate
+    taken out.
 
     ValueError unless the case hides exactly one effect.
     """
@@ -69,15 +80,21 @@ def projected(case: Case, seed: int) -> np.ndarray:
 
 
 def misfit(case: Case, seed: int) -> float:
-    """What the case's imperfections leave of the response in S when the base model is fitted to them, linearly."""
+    """What the case's imperfections leave of the response in S when the base model is fitted to
+    them, linearly.
+    """
     made = scene(_exact(case), seed)
     rows, each = _rows(made), made.recorder.samples
     response = rows - np.repeat(rows[::each], each)
-    return float(np.linalg.norm(_own(replace(case, noise=Noise(1.0)), seed)) / np.linalg.norm(response))
+    return float(
+        np.linalg.norm(_own(replace(case, noise=Noise(1.0)), seed)) / np.linalg.norm(response)
+    )
 
 
 def size_of_error(case: Case, seed: int) -> float:
-    """Size at which the case's one effect leaves as much of the base model as the imperfections do; 0 without any."""
+    """Size at which the case's one effect leaves as much of the base model as the imperfections do;
+    0 without any.
+    """
     if not case.imperfections:
         return 0.0
     return float(np.linalg.norm(_own(case, seed)) / np.linalg.norm(projected(case, seed)))
@@ -90,16 +107,23 @@ def _exact(case: Case) -> Case:
 
 
 def _own(case: Case, seed: int) -> np.ndarray:
-    """The whitened signature (rows,) of the imperfections, what the base model and the nuisances could imitate taken
-    out."""
+    """The whitened signature (rows,) of the imperfections, what the base model and the nuisances
+    could imitate taken out.
+    """
     exact = _exact(case)
-    made, imperfect = scene(exact, seed), scene(replace(exact, imperfections=case.imperfections), seed)
+    made, imperfect = (
+        scene(exact, seed),
+        scene(replace(exact, imperfections=case.imperfections), seed),
+    )
     return _beyond(_rows(imperfect, _scale(made)) - _rows(made), case, seed, tuple(MEASUREMENT))
 
 
-def _beyond(signature: np.ndarray, case: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
-    """A signature (rows,), whitened, without what the base model and faults of the measurement can imitate, a weak
-    prior on those below."""
+def _beyond(
+    signature: np.ndarray, case: Case, seed: int, measurement: tuple[str, ...]
+) -> np.ndarray:
+    """A signature (rows,), whitened, without what the base model and faults of the measurement can
+    imitate, a weak prior on those below.
+    """
     tangent = _whitened(_tangent(_exact(case), seed, measurement), case)
     padded = np.concatenate([_whitened(signature, case), np.zeros(tangent.shape[1])])
     anchored = np.vstack([tangent, np.eye(tangent.shape[1]) / WEAK])
@@ -107,7 +131,9 @@ def _beyond(signature: np.ndarray, case: Case, seed: int, measurement: tuple[str
 
 
 def _whitened(rows: np.ndarray, case: Case) -> np.ndarray:
-    """Rows (rows, ...), of unit variance where they are the noise of the case; each record and channel by itself."""
+    """Rows (rows, ...), of unit variance where they are the noise of the case; each record and
+    channel by itself.
+    """
     phi, each = case.noise.phi, case.recorder.samples
     y = (rows / case.noise.level).reshape(-1, each, *rows.shape[1:])
     rest = (y[:, 1:] - phi * y[:, :-1]) / np.sqrt(1 - phi**2)
@@ -116,7 +142,9 @@ def _whitened(rows: np.ndarray, case: Case) -> np.ndarray:
 
 @lru_cache(maxsize=64)
 def _tangent(base: Case, seed: int, measurement: tuple[str, ...]) -> np.ndarray:
-    """Derivatives (rows, columns) by parameters of the load, levels of the events, and faults of the measurement."""
+    """Derivatives (rows, columns) by parameters of the load, levels of the events, and faults of
+    the measurement.
+    """
     made = scene(base, seed)
     loads = [replace(made, load=load) for load in _deviations(made.load)]
     powers = [
@@ -136,16 +164,24 @@ def _scale(made: Scene) -> list[float]:
 
 
 def _rows(made: Scene, scale: list[float] | None = None) -> np.ndarray:
-    """P and Q of all events over P0, end to end (rows,); `scale` where the P0 of `made` is not meant."""
+    """P and Q of all events over P0, end to end (rows,); `scale` where the P0 of `made` is not
+    meant.
+    """
     records = zip(made.records(), scale or _scale(made), strict=True)
-    return np.concatenate([record[channel] / P0 for record, P0 in records for channel in ("P", "Q")])
+    return np.concatenate(
+        [record[channel] / P0 for record, P0 in records for channel in ("P", "Q")]
+    )
 
 
 def _deviations(load: Load) -> list[Load]:
     """The load with each of its parameters larger by `STEP`, relative."""
     larger = 1 + STEP
-    machines = [replace(load.machine, **{name: larger * getattr(load.machine, name)}) for name in MACHINE]
-    statics = [replace(load.static, **{name: larger * getattr(load.static, name)}) for name in STATIC]
+    machines = [
+        replace(load.machine, **{name: larger * getattr(load.machine, name)}) for name in MACHINE
+    ]
+    statics = [
+        replace(load.static, **{name: larger * getattr(load.static, name)}) for name in STATIC
+    ]
     return [
         *(replace(load, machine=m) for m in machines),
         replace(load, rating=larger * load.rating),

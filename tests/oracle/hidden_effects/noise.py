@@ -1,4 +1,6 @@
-"""What a recorder adds to a clean record: colored, heavy-tailed, quantized noise, and the load's own restlessness."""
+"""What a recorder adds to a clean record: colored, heavy-tailed, quantized noise, and the load's
+own restlessness.
+"""
 
 from dataclasses import dataclass, fields
 
@@ -20,7 +22,9 @@ class Noise:
     def __post_init__(self) -> None:
         for item in fields(self):
             if not getattr(self, item.name) >= 0:
-                raise ValueError(f"noise {item.name} = {getattr(self, item.name)} must not be negative")
+                raise ValueError(
+                    f"noise {item.name} = {getattr(self, item.name)} must not be negative"
+                )
         if self.phi >= 1:
             raise ValueError(f"noise phi = {self.phi} must be below 1")
         if 0 < self.tails <= 2:
@@ -31,7 +35,9 @@ class Noise:
         step = float(clean["t"][1] - clean["t"][0])
         noisy, P0 = dict(clean), abs(float(clean["P"][0]))
         n = len(clean["t"])
-        fluctuation = self.wander * autoregressive(rng.standard_normal(n), np.exp(-step / self.wander_time))
+        fluctuation = self.wander * autoregressive(
+            rng.standard_normal(n), np.exp(-step / self.wander_time)
+        )
         for name in ("P", "Q"):
             meter = P0 * self.level * autoregressive(self.white(n, rng), self.phi)
             noisy[name] = clean[name] * (1 + fluctuation) + meter
@@ -48,7 +54,9 @@ class Noise:
 
 
 def autoregressive(white: np.ndarray, phi: float) -> np.ndarray:
-    """Stationary first-order autoregression (n,) of unit variance, driven by white noise (n,) of unit variance."""
+    """Stationary first-order autoregression (n,) of unit variance, driven by white noise (n,) of
+    unit variance.
+    """
     from scipy.signal import lfilter
 
     driven = np.sqrt(1 - phi**2) * white

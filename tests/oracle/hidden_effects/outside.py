@@ -1,4 +1,6 @@
-"""Effects that no catalogue entry describes: the right verdict on them is that nothing known explains the record."""
+"""Effects that no catalogue entry describes: the right verdict on them is that nothing known
+explains the record.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,7 +21,9 @@ def after(site: Site, delay: float) -> float:
 
 @dataclass(frozen=True)
 class RotorSkinEffect(Hidden):
-    """A second, outer cage takes over at high slip; `amount` is its admittance over the inner cage's."""
+    """A second, outer cage takes over at high slip; `amount` is its admittance over the inner
+    cage's.
+    """
 
     reference, largest, unit = 0.5, 4.0, "1"
 
@@ -29,14 +33,20 @@ class RotorSkinEffect(Hidden):
 
 @dataclass(frozen=True)
 class StatorTransients(Hidden):
-    """A share of the motors shows the stator's direct-current transient, with the small resistance that ends it."""
+    """A share of the motors shows the stator's direct-current transient, with the small resistance
+    that ends it.
+    """
 
     reference, largest, unit = 0.5, 1.0, "1"
     resistance: float = 0.008
 
     def apply(self, site: Site) -> Site:
         first = site.motors[0]
-        full = replace(first, machine=replace(first.machine, Rs=first.machine.Rs + self.resistance), stator=True)
+        full = replace(
+            first,
+            machine=replace(first.machine, Rs=first.machine.Rs + self.resistance),
+            stator=True,
+        )
         return split(site, self.amount, full)
 
 
@@ -59,7 +69,9 @@ class LoadStep(Hidden):
 
 @dataclass(frozen=True)
 class TwoLoadSteps(Hidden):
-    """One customer switches on, another off, at times of their own and with power factors of their own."""
+    """One customer switches on, another off, at times of their own and with power factors of their
+    own.
+    """
 
     reference, largest, unit = 0.02, 0.5, "1"
     delay: float = 0.3
@@ -73,7 +85,9 @@ class TwoLoadSteps(Hidden):
         on, off = after(site, self.delay), after(site, self.delay + self.pause)
         for S, t in ((self.amount * site.S.real, on), (-0.7j * self.amount * site.S.real, off)):
             profile = Profile.steps(0.0, (t, 1.0))
-            site = beside(replace(site, breaks=(*site.breaks, *profile.times)), Switched(S, profile))
+            site = beside(
+                replace(site, breaks=(*site.breaks, *profile.times)), Switched(S, profile)
+            )
         return site
 
 
@@ -117,7 +131,9 @@ class TapChangerStep(Hidden):
 
 @dataclass(frozen=True)
 class ArcLoad(Hidden):
-    """Arc furnaces, which go out in deep dips, in place of static load; `amount` is their share of the power."""
+    """Arc furnaces, which go out in deep dips, in place of static load; `amount` is their share of
+    the power.
+    """
 
     reference, largest, unit = 0.1, 0.6, "1"
     arc: float = 0.6
@@ -157,7 +173,9 @@ class HarmonicRipple(Hidden):
 
 @dataclass(frozen=True)
 class CurrentTransformerSaturation(Hidden):
-    """A current transformer loses a share of what the current has beyond its value before the event."""
+    """A current transformer loses a share of what the current has beyond its value before the
+    event.
+    """
 
     reference, largest, unit = 0.1, 0.9, "1"
 

@@ -1,4 +1,6 @@
-"""The measurement chain: instants, windows, delays and instrument transformers between the bus and the record."""
+"""The measurement chain: instants, windows, delays and instrument transformers between the bus and
+the record.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,21 +15,28 @@ CYCLE = 0.02  # s
 PMU_REACH = {"P": CYCLE, "M": 71 / 800}  # s on either side of a time stamp
 PASSED = 7.75  # Hz, the reference frequency of the M class at 50 phasors a second
 
-Bus = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]  # times (n,) -> voltage and current phasors (n,)
+# times (n,) -> voltage and current phasors (n,)
+Bus = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class Recorder:
-    """A recorder of `samples` every 1/`rate`; each further field is an imperfection, absent at 0."""
+    """A recorder of `samples` every 1/`rate`; each further field is an imperfection,
+    absent at 0.
+    """
 
     rate: float = 500.0  # Hz
     samples: int = 1000
     skew: float = 0.0  # s, power comes later than voltage
     window: float = 0.0  # s, over which a transducer averages power, centered
-    phasor_window: float = 0.0  # s, over which voltage and current phasors are both formed, centered
-    pmu: str = ""  # "P" or "M": phasors are formed by the reference filter of that class of measurement unit instead
+    # s, over which voltage and current phasors are both formed, centered
+    phasor_window: float = 0.0
+    # "P" or "M": phasors are formed by the reference filter of that class of measurement unit
+    # instead
+    pmu: str = ""
     gain_drift: float = 0.0  # 1/s, of the voltage channel
-    knee: float = 0.0  # share of current beyond its value before that a saturating current transformer loses
+    # share of current beyond its value before that a saturating current transformer loses
+    knee: float = 0.0
 
     @property
     def duration(self) -> float:
@@ -60,16 +69,23 @@ class Recorder:
             V, current = self.instrument(*bus(t))
         else:
             fine = spread(t, 2 * PMU_REACH[self.pmu] if self.pmu else self.phasor_window)
-            turn = np.exp(1j * (dip.phase(fine) - OMEGA * fine))  # a DFT turns with nominal frequency
+            # a DFT turns with nominal frequency
+            turn = np.exp(1j * (dip.phase(fine) - OMEGA * fine))
             V, current = (self.formed(fine, turn * y, t) for y in self.instrument(*bus(fine)))
         return np.abs(V), V * np.conj(current)
 
     def formed(self, fine: np.ndarray, y: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Phasors at times t of instantaneous ones y, given on a fine grid, by the window or the class."""
-        return weighed(fine, y, t, self.pmu) if self.pmu else averaged(fine, y, t, self.phasor_window)
+        """Phasors at times t of instantaneous ones y, given on a fine grid, by the window or the
+        class.
+        """
+        return (
+            weighed(fine, y, t, self.pmu) if self.pmu else averaged(fine, y, t, self.phasor_window)
+        )
 
     def instrument(self, V: np.ndarray, current: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Secondary phasors: the current transformer loses a share of what exceeds the current before, and leads."""
+        """Secondary phasors: the current transformer loses a share of what exceeds the current
+        before, and leads.
+        """
         if self.knee:
             excess = np.maximum(np.abs(current) / np.abs(current[0]) - 1, 0.0)
             current = current * (1 - self.knee * excess * (1 - 0.5j) / (1 + excess))
@@ -93,10 +109,12 @@ def averaged(fine: np.ndarray, y: np.ndarray, t: np.ndarray, window: float) -> n
 
 
 def weighed(fine: np.ndarray, y: np.ndarray, t: np.ndarray, pmu: str) -> np.ndarray:
-    """What a measurement unit's reference filter makes of y, given on a fine grid, at each of the times t.
+    """What a measurement unit's reference filter makes of y, given on a fine grid, at each of the
+    times t.
 
-    Source: IEC/IEEE 60255-118-1, annex D: a triangle over two cycles (P); a sinc under a Hamming window (M, at 50 Hz
-    and 50 phasors a second). Both are applied to the envelope, as functions of time, not at a device's own samples.
+    Source: IEC/IEEE 60255-118-1, annex D: a triangle over two cycles (P); a sinc under a Hamming
+    window (M, at 50 Hz and 50 phasors a second). Both are applied to the envelope, as functions of
+    time, not at a device's own samples.
     """
     from scipy.interpolate import PchipInterpolator
 

@@ -1,4 +1,6 @@
-"""The load as it stands on its feeder, and its answer to one dip: the network solved at every instant, SciPy DOP853."""
+"""The load as it stands on its feeder, and its answer to one dip: the network solved at every
+instant, SciPy DOP853.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -18,9 +20,11 @@ MOST = 100_000  # derivatives between two edges, twenty-five times what any law 
 
 @dataclass(frozen=True)
 class Site:
-    """Motors, static load and devices behind a feeder and a transformer, and the recorder at the bus.
+    """Motors, static load and devices behind a feeder and a transformer, and the recorder at the
+    bus.
 
-    The power `S` [pu] at the bus before the event is given: the static load is what the other parts leave of it.
+    The power `S` [pu] at the bus before the event is given: the static load is what the other parts
+    leave of it.
     """
 
     dip: Dip
@@ -30,20 +34,27 @@ class Site:
     recorder: Recorder
     devices: tuple[Device, ...] = ()
     feeder: complex = 0j  # pu, series impedance
-    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))  # V of load over bus, and I of bus over load
-    opened: Profile = field(default_factory=Profile)  # share of the whole load that relays hold open
-    static_opened: Profile = field(default_factory=Profile)  # share of the static load that is held open
+    # V of load over bus, and I of bus over load
+    tap: Profile = field(default_factory=lambda: Profile(values=(1.0,)))
+    # share of the whole load that relays hold open
+    opened: Profile = field(default_factory=Profile)
+    # share of the static load that is held open
+    static_opened: Profile = field(default_factory=Profile)
     motors_opened: Profile = field(default_factory=Profile)  # share of the motors
     angle: float = 0.0  # rad, how far the voltage's angle jumps with the dip
     breaks: tuple[float, ...] = ()  # s, further instants at which something jumps
 
     def response(self) -> "Response":
-        """The answer to the dip; raises `Stall` or `ValueError` when there is no steady state before it."""
+        """The answer to the dip; raises `Stall` or `ValueError` when there is no steady state
+        before it.
+        """
         return Response(self)
 
 
 class Response:
-    """The solved event. `at(t)` gives bus voltage and current phasors; `lowest_speed` tells of a stall."""
+    """The solved event. `at(t)` gives bus voltage and current phasors; `lowest_speed` tells of a
+    stall.
+    """
 
     def __init__(self, site: Site):
         self.site, self.supply = site, Supply(site.dip)
@@ -84,14 +95,17 @@ class Response:
         """The inverse of d(V + Z I(V))/dV before the event, as a r + b conj(r)."""
         now, Z, h = self.supply.at(-MARGIN), self.site.feeder, 1e-6
         along, across = (
-            Z * (self._parts(now, V + d, x)[0] - self._parts(now, V - d, x)[0]) / (2 * h) for d in (h, 1j * h)
+            Z * (self._parts(now, V + d, x)[0] - self._parts(now, V - d, x)[0]) / (2 * h)
+            for d in (h, 1j * h)
         )
         p, q = 1 + (along - 1j * across) / 2, (along + 1j * across) / 2  # Wirtinger derivatives
         scale = abs(p) ** 2 - abs(q) ** 2
         return p.conjugate() / scale, -q / scale
 
     def network(self, t: float, x: list[complex]) -> tuple[complex, complex, list[complex]]:
-        """Bus voltage, bus current and the derivative of the states x at time t, the feeder solved by iteration."""
+        """Bus voltage, bus current and the derivative of the states x at time t, the feeder solved
+        by iteration.
+        """
         now, site = self.supply.at(t), self.site
         bus = now.U + 0j
         if site.angle:
@@ -105,7 +119,8 @@ class Response:
             current, rates = self._parts(now, V, x)
             left = source - V - site.feeder * current
             if abs(left) < 1e-12:
-                return bus, current * ratio, rates  # an ideal transformer neither gives nor takes power
+                # an ideal transformer neither gives nor takes power
+                return bus, current * ratio, rates
             V += self.chord[0] * left + self.chord[1] * left.conjugate()
         raise ArithmeticError(f"the voltage behind the feeder collapses at t = {t:.4g} s")
 
@@ -119,23 +134,33 @@ class Response:
         self.edges = [first, *sorted(k for k in knots if first < k < last), last]
         self.pieces, x = [], begin
         for a, b in pairwise(self.edges):
-            solved = solve_ivp(self._between(a, b), (a, b), x, "DOP853", dense_output=True, rtol=1e-9, atol=1e-11)
+            solved = solve_ivp(
+                self._between(a, b), (a, b), x, "DOP853", dense_output=True, rtol=1e-9, atol=1e-11
+            )
             if not solved.success:
-                raise ArithmeticError(f"the simulation stopped at t = {solved.t[-1]:.4g} s: {solved.message}")
+                raise ArithmeticError(
+                    f"the simulation stopped at t = {solved.t[-1]:.4g} s: {solved.message}"
+                )
             self.pieces.append(solved.sol)
             x = solved.y[:, -1]
-        speeds = [piece(piece.ts)[own.start + 1].real for piece in self.pieces for own in self._motors()]
+        speeds = [
+            piece(piece.ts)[own.start + 1].real for piece in self.pieces for own in self._motors()
+        ]
         self.lowest_speed = float(min(map(np.min, speeds)))
 
     def _between(self, a: float, b: float) -> Callable[[float, np.ndarray], list[complex]]:
-        """The derivatives between two edges. `ArithmeticError` where a state chatters about a limit of a control."""
+        """The derivatives between two edges. `ArithmeticError` where a state chatters about a limit
+        of a control.
+        """
         calls = 0
 
         def derivative(t: float, x: np.ndarray) -> list[complex]:
             nonlocal calls
             calls += 1
             if calls > MOST:
-                raise ArithmeticError(f"the simulation chatters at t = {t:.4g} s: {MOST} derivatives do not suffice")
+                raise ArithmeticError(
+                    f"the simulation chatters at t = {t:.4g} s: {MOST} derivatives do not suffice"
+                )
             inside = min(max(t, a + 1e-10), b - 1e-10)  # a jump at an edge belongs to the neighbor
             return self.network(inside, x.tolist())[2]
 
@@ -153,7 +178,9 @@ class Response:
         return out
 
     def at(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Bus voltage and current (n,) [pu] at times t (n,) [s], phasors in the frame of the recorded frequency."""
+        """Bus voltage and current (n,) [pu] at times t (n,) [s], phasors in the frame of the
+        recorded frequency.
+        """
         states = self.states(t).T.tolist()
         pairs = [self.network(float(now), x)[:2] for now, x in zip(t, states, strict=True)]
         voltage, current = np.array(pairs).T

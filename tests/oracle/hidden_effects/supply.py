@@ -1,4 +1,6 @@
-"""What the network imposes on the load, at one instant: the scalar, fast twin of `independent.Dip`."""
+"""What the network imposes on the load, at one instant: the scalar, fast twin of
+`independent.Dip`.
+"""
 
 from bisect import bisect_right
 from dataclasses import dataclass, replace
@@ -36,7 +38,9 @@ class Supply:
         return [self.dip.start, self.dip.start + self.dip.fall, back, back + self.dip.rise]
 
     def at(self, t: float) -> Moment:
-        """The bus at time t [s]; the formulas of `independent.Dip`, with the rate in closed form."""
+        """The bus at time t [s]; the formulas of `independent.Dip`, with the rate in
+        closed form.
+        """
         d = self.dip
         x, back = t - d.start, t - d.start - d.duration
         fall, fall_rate = _edge(x, d.fall)
@@ -47,8 +51,20 @@ class Supply:
         missing, missing_rate = fall * left, fall_rate * left + fall * left_rate
         f = 1.0
         if d.swing and x > 0:
-            f += d.swing * sin(2 * pi * d.swing_rate * x) * exp(-x / d.swing_decay) / NOMINAL_FREQUENCY
-        return Moment(t, d.before - d.depth * missing, f, d.negative * missing, -d.depth * missing_rate, missing)
+            f += (
+                d.swing
+                * sin(2 * pi * d.swing_rate * x)
+                * exp(-x / d.swing_decay)
+                / NOMINAL_FREQUENCY
+            )
+        return Moment(
+            t,
+            d.before - d.depth * missing,
+            f,
+            d.negative * missing,
+            -d.depth * missing_rate,
+            missing,
+        )
 
 
 def _edge(x: float, length: float) -> tuple[float, float]:
@@ -60,7 +76,9 @@ def _edge(x: float, length: float) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class Profile:
-    """A quantity that follows straight lines between knots (t [s], value), constant outside them."""
+    """A quantity that follows straight lines between knots (t [s], value), constant
+    outside them.
+    """
 
     times: tuple[float, ...] = (0.0,)
     values: tuple[float, ...] = (0.0,)
@@ -91,8 +109,9 @@ class Profile:
 class Relay:
     """An undervoltage relay with two timers, and contactors that come back along a ramp.
 
-    It opens once the voltage has stayed below `level` (of the voltage before) for `delay`; once it has stayed above
-    `reset` for `wait`, what was opened returns within `ramp`. Each timer starts anew whenever its condition breaks.
+    It opens once the voltage has stayed below `level` (of the voltage before) for `delay`; once it
+    has stayed above `reset` for `wait`, what was opened returns within `ramp`. Each timer starts
+    anew whenever its condition breaks.
     """
 
     level: float

@@ -1,7 +1,9 @@
-"""Instantaneous currents of a load of several devices, integrated in the stationary frame by SciPy's DOP853.
+"""Instantaneous currents of a load of several devices, integrated in the stationary frame by
+SciPy's DOP853.
 
-Each device has states of its own (complex flux linkages, speed) and draws a space vector of current at the voltage's.
-Per unit of the record's base, peaks; the voltage is given, so devices do not feel each other.
+Each device has states of its own (complex flux linkages, speed) and draws a space vector of current
+at the voltage's. Per unit of the record's base, peaks; the voltage is given, so devices do not feel
+each other.
 """
 
 from dataclasses import dataclass, replace
@@ -19,7 +21,9 @@ SETTLED = 60  # of the repeated substitutions in a saturated air gap, at most
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What a device feels at times t (n,) [s]: space vector, its slope [1/s] and zero sequence (n,) of the voltage."""
+    """What a device feels at times t (n,) [s]: space vector, its slope [1/s] and zero sequence (n,)
+    of the voltage.
+    """
 
     t: np.ndarray
     v: np.ndarray
@@ -46,10 +50,11 @@ class Stateless:
 
 @dataclass(frozen=True)
 class Group:
-    """Induction motors of `rating` [pu] that drive `torque` [pu of the rating]; further fields are off at 0.
+    """Induction motors of `rating` [pu] that drive `torque` [pu of the rating]; further fields are
+    off at 0.
 
-    `fan` is the share of the torque that grows with the square of the speed, `saturation` the relative growth of the
-    magnetizing current per pu² of air-gap flux beyond that before the event.
+    `fan` is the share of the torque that grows with the square of the speed, `saturation` the
+    relative growth of the magnetizing current per pu² of air-gap flux beyond that before the event.
     """
 
     machine: Machine
@@ -61,7 +66,9 @@ class Group:
     flux: float = 1.0  # pu², square of the air gap's
 
     def settled(self, voltage: complex, frequency: float) -> tuple["Group", np.ndarray]:
-        """The group at rest on a voltage [pu] of a frequency over nominal, and its states; raises `Stall`."""
+        """The group at rest on a voltage [pu] of a frequency over nominal, and its states; raises
+        `Stall`.
+        """
         m, w = self.machine, frequency
         scaled = replace(m, Xs=m.Xs * w, Xm=m.Xm * w, Xr=m.Xr * w)
         stator, rotor, turning = scaled.steady_state(abs(voltage), self.torque * w)
@@ -107,10 +114,13 @@ class Group:
         """What the fifth-order model calls this group, on the record's base."""
         m = self.machine
         return {
-            "T_prime": m.X_prime / m.X * m.T0_prime, "X_prime": m.X_prime / self.rating,
-            "C": (m.X - m.X_prime) / m.X, "M": 2 * m.H * self.rating / OMEGA, "T_m": self.torque * self.rating,
+            "T_prime": m.X_prime / m.X * m.T0_prime,
+            "X_prime": m.X_prime / self.rating,
+            "C": (m.X - m.X_prime) / m.X,
+            "M": 2 * m.H * self.rating / OMEGA,
+            "T_m": self.torque * self.rating,
             "R_s": m.Rs / self.rating,
-        }  # fmt: skip
+        }
 
 
 @dataclass(frozen=True)
@@ -143,7 +153,9 @@ class Shunt(Stateless):
 
 @dataclass(frozen=True)
 class Core:
-    """A transformer's core without load: beyond `knee` [pu of flux] each limb draws by the air's reactance `X` [pu]."""
+    """A transformer's core without load: beyond `knee` [pu of flux] each limb draws by the air's
+    reactance `X` [pu].
+    """
 
     knee: float
     X: float
@@ -166,7 +178,9 @@ class Core:
 
 @dataclass(frozen=True)
 class Earthed:
-    """Resistance and reactance [pu] between neutral and earth as the zero sequence sees them; draws nothing else."""
+    """Resistance and reactance [pu] between neutral and earth as the zero sequence sees them; draws
+    nothing else.
+    """
 
     R: float
     X: float
@@ -206,7 +220,9 @@ class Across:
 
 @dataclass(frozen=True)
 class Held:
-    """A converter that draws `power` [pu] whatever the voltage, which it knows with the lag `lag` [s], up to `most`."""
+    """A converter that draws `power` [pu] whatever the voltage, which it knows with the lag `lag`
+    [s], up to `most`.
+    """
 
     power: complex
     lag: float = 0.004
@@ -219,7 +235,8 @@ class Held:
         return [(v - x[0]) / self.lag + 1j * OMEGA * x[0]]
 
     def current(self, x: np.ndarray, at: Scene) -> np.ndarray:
-        # The lag turns a voltage of nominal frequency by nothing; where the frequency is off, hardly.
+        # The lag turns a voltage of nominal frequency by nothing; where the frequency is off,
+        # hardly.
         wanted, most = np.conj(self.power / x[0]), self.most * abs(self.power)
         return wanted * np.minimum(1.0, most / np.abs(wanted))
 
@@ -253,7 +270,9 @@ class Rectifier(Stateless):
 
 @dataclass(frozen=True)
 class Relay:
-    """Off `after` [s] after the fault's start; back, along a `ramp` [s], `back` [s] after its end."""
+    """Off `after` [s] after the fault's start; back, along a `ramp` [s], `back` [s]
+    after its end.
+    """
 
     after: float
     back: float = np.inf
@@ -291,13 +310,17 @@ class Breaker(Stateless):
     shares: tuple[float, float, float]
     relay: Relay
 
-    def passed(self, current: np.ndarray, zero: np.ndarray, at: Scene) -> tuple[np.ndarray, np.ndarray]:
+    def passed(
+        self, current: np.ndarray, zero: np.ndarray, at: Scene
+    ) -> tuple[np.ndarray, np.ndarray]:
         """What is left of a space vector and a zero sequence (n,)."""
         phases = (current * np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]).real + zero
         return vector(phases * (1 - np.array(self.shares)[:, None] * self.relay.off(at)))
 
 
-Device = Group | Branch | Shunt | Core | Earthed | Across | Held | Arc | Rectifier | Switched | Breaker
+Device = (
+    Group | Branch | Shunt | Core | Earthed | Across | Held | Arc | Rectifier | Switched | Breaker
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -317,7 +340,9 @@ def drawn(devices: tuple[Device, ...], fault: Fault, t: np.ndarray) -> Instants:
 
     early = round(EARLY / (t[1] - t[0]))
     begin, w = t[0] - early * (t[1] - t[0]), fault.frequency / NOMINAL_FREQUENCY
-    made = [d.settled(fault.before * np.exp(2j * np.pi * fault.frequency * begin), w) for d in devices]
+    made = [
+        d.settled(fault.before * np.exp(2j * np.pi * fault.frequency * begin), w) for d in devices
+    ]
     devices = tuple(d for d, _ in made)
     ends = np.cumsum([0, *(len(states) for _, states in made)]).tolist()
     parts = list(zip(devices, ends[:-1], ends[1:], strict=True))
@@ -333,7 +358,9 @@ def drawn(devices: tuple[Device, ...], fault: Fault, t: np.ndarray) -> Instants:
     y = np.empty((0, len(t)))
     if len(start):
         # So short that no edge is passed over unseen.
-        solved = solve_ivp(slopes, (begin, t[-1]), start, "DOP853", t, rtol=1e-8, atol=1e-10, max_step=0.004)
+        solved = solve_ivp(
+            slopes, (begin, t[-1]), start, "DOP853", t, rtol=1e-8, atol=1e-10, max_step=0.004
+        )
         if not solved.success:
             raise RuntimeError(f"the simulation stopped: {solved.message}")
         y = solved.y
@@ -350,7 +377,9 @@ def drawn(devices: tuple[Device, ...], fault: Fault, t: np.ndarray) -> Instants:
 
 
 class Smooth:
-    """A cubic spline through values (n,) at uniform times (n,) [s], read one time after the other."""
+    """A cubic spline through values (n,) at uniform times (n,) [s], read one time
+    after the other.
+    """
 
     def __init__(self, t: np.ndarray, values: np.ndarray) -> None:
         from scipy.interpolate import CubicSpline

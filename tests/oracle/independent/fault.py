@@ -1,8 +1,9 @@
-"""A fault of the network as a load feels it: three phases of their own, through a transformer, sample by sample.
+"""A fault of the network as a load feels it: three phases of their own, through a transformer,
+sample by sample.
 
-During the fault each phase of the high-voltage side keeps a share of its voltage, turned by an angle; the phases are
-cleared one after the other, at successive zeros of the fault's current. A delta/star transformer mixes them and keeps
-the zero sequence out.
+During the fault each phase of the high-voltage side keeps a share of its voltage, turned by an
+angle; the phases are cleared one after the other, at successive zeros of the fault's current. A
+delta/star transformer mixes them and keeps the zero sequence out.
 """
 
 from dataclasses import dataclass
@@ -12,15 +13,18 @@ import numpy as np
 from independent.source import NOMINAL_FREQUENCY, smooth
 
 TURN = np.exp(2j * np.pi / 3)
-BUILT_UP = (0.3, 0.2)  # s: harmonics are led in so long, so long before the record, that they leave no offset behind
+# s: harmonics are led in so long, so long before the record, that they leave no offset behind
+BUILT_UP = (0.3, 0.2)
 
 
 @dataclass(frozen=True)
 class Fault:
-    """What is left of each phase's phasor, from `start` [s] for `duration` [s]; the source is stiff.
+    """What is left of each phase's phasor, from `start` [s] for `duration` [s]; the source is
+    stiff.
 
-    `edge` [s] is what a phase takes to fall and to come back; the share `sag` comes back with the time constant
-    `settle` [s]. `harmonics` are (order, peak [pu], angle [rad]) of the voltage, before, during and after alike.
+    `edge` [s] is what a phase takes to fall and to come back; the share `sag` comes back with the
+    time constant `settle` [s]. `harmonics` are (order, peak [pu], angle [rad]) of the voltage,
+    before, during and after alike.
     """
 
     left: tuple[complex, complex, complex]
@@ -44,20 +48,28 @@ class Fault:
         """Voltages (3, n) [pu of the peak] at times t (n,) [s]."""
         t = np.atleast_1d(t)
         angle = self.angle + 2 * np.pi * self.frequency * t
-        seen = np.stack([(self._kept(t, k) * TURN ** (-k) * np.exp(1j * angle)).real for k in range(3)])
+        seen = np.stack(
+            [(self._kept(t, k) * TURN ** (-k) * np.exp(1j * angle)).real for k in range(3)]
+        )
         if self.delta:
             seen = (seen - np.roll(seen, 1, axis=0)) / np.sqrt(3)
         seen *= self.voltage
         ramp = smooth((t - self.start + sum(BUILT_UP)) / BUILT_UP[0])
         for order, size, shift in self.harmonics:
-            seen += ramp * size * np.cos(order * (angle - 2 * np.pi / 3 * np.arange(3)[:, None]) + shift)
+            seen += (
+                ramp
+                * size
+                * np.cos(order * (angle - 2 * np.pi / 3 * np.arange(3)[:, None]) + shift)
+            )
         return seen
 
     def _kept(self, t: np.ndarray, phase: int) -> np.ndarray:
         """What is left of a phase's phasor."""
         cleared = t - self.start - self.duration - phase / (6 * self.frequency)
         soft = self.sag * np.exp(-np.maximum(cleared, 0.0) / self.settle)
-        gone = smooth((t - self.start) / self.edge) * ((1 - self.sag) * (1 - smooth(cleared / self.edge)) + soft)
+        gone = smooth((t - self.start) / self.edge) * (
+            (1 - self.sag) * (1 - smooth(cleared / self.edge)) + soft
+        )
         return 1 + (self.left[phase] - 1) * gone
 
     def at(self, t: np.ndarray | float) -> tuple[np.ndarray, np.ndarray]:

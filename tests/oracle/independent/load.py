@@ -1,4 +1,6 @@
-"""The load at the recorder's bus: a machine beside a static load, and the waveforms they produce."""
+"""The load at the recorder's bus: a machine beside a static load, and the waveforms
+they produce.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +12,9 @@ from independent.source import OMEGA, Dip
 
 @dataclass(frozen=True)
 class Static:
-    """Exponential static load: P (U/U0)^p_v + j Q (U/U0)^q_v, `P` and `Q` what it draws at U0 [pu]."""
+    """Exponential static load: P (U/U0)^p_v + j Q (U/U0)^q_v, `P` and `Q` what it
+    draws at U0 [pu].
+    """
 
     P: float
     Q: float
@@ -18,20 +22,25 @@ class Static:
     q_v: float
 
     def current(self, dip: Dip, t: np.ndarray) -> np.ndarray:
-        """Space vector of the current [pu]: an admittance that follows the positive-sequence magnitude at once.
+        """Space vector of the current [pu]: an admittance that follows the positive-sequence
+        magnitude at once.
 
-        The admittance acts as a quasi-stationary one on either sequence; it has no dynamics of its own, which is
-        what "static" means.
+        The admittance acts as a quasi-stationary one on either sequence; it has no dynamics of its
+        own, which is what "static" means.
         """
         positive, negative = dip.sequences(t)
         U = dip.magnitude(t)
-        admittance = (self.P * (U / dip.before) ** self.p_v - 1j * self.Q * (U / dip.before) ** self.q_v) / U**2
+        admittance = (
+            self.P * (U / dip.before) ** self.p_v - 1j * self.Q * (U / dip.before) ** self.q_v
+        ) / U**2
         return admittance * positive + np.conj(admittance) * negative
 
 
 @dataclass(frozen=True)
 class Load:
-    """A machine of `rating` [pu of the record's base] that drives `torque` [pu of its rating], and a static load."""
+    """A machine of `rating` [pu of the record's base] that drives `torque` [pu of its rating], and
+    a static load.
+    """
 
     machine: Machine
     rating: float
@@ -52,7 +61,9 @@ class Load:
         }
 
     def steady_power(self, voltage: float) -> complex:
-        """Power of the machine before the event [pu]: its P is `T_m` where the stator resistance is zero."""
+        """Power of the machine before the event [pu]: its P is `T_m` where the stator resistance is
+        zero.
+        """
         stator_flux, rotor_flux, _ = self.machine.steady_state(voltage, self.torque)
         current, _ = self.machine.currents(stator_flux, rotor_flux)
         return complex(self.rating * voltage * np.conj(current))
@@ -60,7 +71,9 @@ class Load:
 
 @dataclass(frozen=True, eq=False)
 class Waveforms:
-    """Instantaneous space vectors at the bus, stationary frame, and the machine's states behind them."""
+    """Instantaneous space vectors at the bus, stationary frame, and the machine's states behind
+    them.
+    """
 
     t: np.ndarray  # (n,) s
     voltage: np.ndarray  # (n,) complex, pu
@@ -69,7 +82,8 @@ class Waveforms:
 
 
 def simulate(load: Load, dip: Dip, t: np.ndarray) -> Waveforms:
-    """Waveforms at times t (n,) [s], increasing, the first before the dip; SciPy DOP853 from the steady state.
+    """Waveforms at times t (n,) [s], increasing, the first before the dip; SciPy DOP853 from the
+    steady state.
 
     Raises `Stall` when there is no steady state.
     """
@@ -80,8 +94,12 @@ def simulate(load: Load, dip: Dip, t: np.ndarray) -> Waveforms:
 
     begin = load.machine.steady_state(complex(dip.sequences(t[0])[0]), load.torque)
     # A quarter cycle at most, so that no step passes over an edge unseen.
-    solved = solve_ivp(derivative, (t[0], t[-1]), begin, "DOP853", t, rtol=1e-10, atol=1e-12, max_step=0.005)
+    solved = solve_ivp(
+        derivative, (t[0], t[-1]), begin, "DOP853", t, rtol=1e-10, atol=1e-12, max_step=0.005
+    )
     if not solved.success:
         raise RuntimeError(f"the simulation stopped: {solved.message}")
     motor, _ = load.machine.currents(solved.y[0], solved.y[1])
-    return Waveforms(t, sum(dip.sequences(t)), load.rating * motor + load.static.current(dip, t), solved.y)
+    return Waveforms(
+        t, sum(dip.sequences(t)), load.rating * motor + load.static.current(dip, t), solved.y
+    )

@@ -1,6 +1,8 @@
-"""The induction machine: stator and rotor flux linkages in the stationary frame, and the swing of the rotor.
+"""The induction machine: stator and rotor flux linkages in the stationary frame, and the swing of
+the rotor.
 
-Source: Krause, Wasynczuk and Sudhoff 2002, chapter 4 (per-unit flux-linkage form, stationary frame).
+Source: Krause, Wasynczuk and Sudhoff 2002, chapter 4 (per-unit flux-linkage form, stationary
+frame).
 """
 
 from dataclasses import dataclass
@@ -16,7 +18,9 @@ class Stall(ValueError):
 
 @dataclass(frozen=True)
 class Machine:
-    """A single-cage machine, per unit of its own rating; the reactances are those at nominal frequency."""
+    """A single-cage machine, per unit of its own rating; the reactances are those at nominal
+    frequency.
+    """
 
     Rs: float
     Xs: float
@@ -43,25 +47,33 @@ class Machine:
     def slip(self, voltage: float, torque: float) -> float:
         """Slip at which the equivalent circuit develops `torque`; raises `Stall` if none does.
 
-        With the Thevenin source V, R + jX seen by Rr/s = y: torque (y^2 + 2 R y + R^2 + X^2) = V^2 y, whose larger
-        root y is the stable one; written for the slip, so that no torque gives no slip.
+        With the Thevenin source V, R + jX seen by Rr/s = y: torque (y^2 + 2 R y + R^2 + X^2) = V^2
+        y, whose larger root y is the stable one; written for the slip, so that no torque gives no
+        slip.
         """
         source = 1j * self.Xm / (self.Rs + 1j * self.X)
         impedance = source * (self.Rs + 1j * self.Xs) + 1j * self.Xr
         half = abs(source * voltage) ** 2 / 2 - torque * impedance.real
         root = half**2 - (torque * abs(impedance)) ** 2
         if half <= 0 or root < 0:
-            raise Stall(f"a torque of {torque:g} pu exceeds the breakdown torque at a voltage of {voltage:g} pu")
+            raise Stall(
+                f"a torque of {torque:g} pu exceeds the breakdown torque at a voltage of"
+                f" {voltage:g} pu"
+            )
         return torque * self.Rr / (half + np.sqrt(root))
 
     def currents(self, stator: complex, rotor: complex) -> tuple[complex, complex]:
         """Stator and rotor current of the two flux linkages, scalars or arrays of one shape."""
         X_r = self.Xm + self.Xr
         determinant = self.X * X_r - self.Xm**2
-        return (X_r * stator - self.Xm * rotor) / determinant, (self.X * rotor - self.Xm * stator) / determinant
+        return (X_r * stator - self.Xm * rotor) / determinant, (
+            self.X * rotor - self.Xm * stator
+        ) / determinant
 
     def steady_state(self, voltage: complex, torque: float) -> np.ndarray:
-        """State (3,) complex: stator flux, rotor flux, speed, on a balanced voltage of nominal frequency."""
+        """State (3,) complex: stator flux, rotor flux, speed, on a balanced voltage of nominal
+        frequency.
+        """
         slip = self.slip(abs(voltage), torque)
         # The rotor's row is multiplied by the slip, so that a slip of 0 is allowed.
         circuit = np.array(

@@ -1,4 +1,6 @@
-"""The recorder's side of waveforms: current transformers, anti-alias filter, offsets, noise, quantization."""
+"""The recorder's side of waveforms: current transformers, anti-alias filter, offsets, noise,
+quantization.
+"""
 
 from dataclasses import dataclass
 
@@ -10,7 +12,8 @@ from independent.source import OMEGA
 
 @dataclass(frozen=True)
 class CurrentTransformer:
-    """A core that saturates at the flux `knee` [pu of what 1 pu of current needs at nominal frequency].
+    """A core that saturates at the flux `knee` [pu of what 1 pu of current needs at nominal
+    frequency].
 
     The burden is resistive; beyond the knee the excess of flux is not passed on.
     """
@@ -31,7 +34,9 @@ class CurrentTransformer:
 
 @dataclass(frozen=True)
 class Sampler:
-    """Six channels at `rate` [Hz]; noise is a standard deviation, offsets are of the peak, spans plus and minus."""
+    """Six channels at `rate` [Hz]; noise is a standard deviation, offsets are of the peak, spans
+    plus and minus.
+    """
 
     rate: float
     noise: float = 0.0  # of a channel's rms before the event
@@ -46,10 +51,14 @@ class Sampler:
     def instants(self, start: float, length: float) -> np.ndarray:
         """Times [s] at which waveforms are wanted, so that samples begin at `start`."""
         early = round(0.03 * self.rate) * self.finer  # in which the filter settles
-        return start + np.arange(-early, round(length * self.rate) * self.finer) / (self.rate * self.finer)
+        return start + np.arange(-early, round(length * self.rate) * self.finer) / (
+            self.rate * self.finer
+        )
 
     def read(self, made: Instants, start: float, rng: np.random.Generator) -> np.ndarray:
-        """Samples (6, n) [pu] of waveforms at `instants`: three voltages to ground, three currents."""
+        """Samples (6, n) [pu] of waveforms at `instants`: three voltages to ground,
+        three currents.
+        """
         turn = np.exp(-2j * np.pi / 3 * np.arange(3))[:, None]
         voltage = (made.voltage * turn).real + made.voltage_zero
         current = (made.current * turn).real + made.current_zero
@@ -59,7 +68,9 @@ class Sampler:
         first = round((start - made.t[0]) * self.rate * self.finer)
         seen = seen[:, first :: self.finer]
         before = seen[:, : round(0.04 * self.rate)]
-        seen = seen + self.noise * np.sqrt(np.mean(before**2, axis=1, keepdims=True)) * rng.standard_normal(seen.shape)
+        seen = seen + self.noise * np.sqrt(
+            np.mean(before**2, axis=1, keepdims=True)
+        ) * rng.standard_normal(seen.shape)
         seen += np.array(self.offsets)[:, None]
         if self.bits is None:
             return seen

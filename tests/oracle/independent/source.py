@@ -1,4 +1,6 @@
-"""The stiff source: a voltage that dips, optionally with a negative sequence and a swing in frequency."""
+"""The stiff source: a voltage that dips, optionally with a negative sequence and a swing in
+frequency.
+"""
 
 from dataclasses import dataclass
 
@@ -15,11 +17,13 @@ def smooth(x: np.ndarray | float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Dip:
-    """One voltage dip. Edges are raised cosines, because a real network and its protection take time.
+    """One voltage dip. Edges are raised cosines, because a real network and its protection take
+    time.
 
-    The share `sag` of the depth comes back with the time constant `settle`, as it does behind a weak network.
-    During the dip the negative-sequence voltage reaches `negative`; from its start the frequency swings by
-    `swing` sin(2 pi `swing_rate` x) exp(-x / `swing_decay`), x the time since then.
+    The share `sag` of the depth comes back with the time constant `settle`, as it does behind a
+    weak network. During the dip the negative-sequence voltage reaches `negative`; from its start
+    the frequency swings by `swing` sin(2 pi `swing_rate` x) exp(-x / `swing_decay`), x the time
+    since then.
     """
 
     depth: float  # pu
@@ -36,10 +40,14 @@ class Dip:
     swing_decay: float = 1.0  # s
 
     def shape(self, t: np.ndarray | float) -> np.ndarray:
-        """Share of the depth that is missing at times t [s]: 0 before, 1 at the bottom, back towards 0."""
+        """Share of the depth that is missing at times t [s]: 0 before, 1 at the bottom, back
+        towards 0.
+        """
         back = np.asarray(t) - self.start - self.duration
         soft = self.sag * np.exp(-np.maximum(back, 0.0) / self.settle)
-        return smooth((t - self.start) / self.fall) * ((1 - self.sag) * (1 - smooth(back / self.rise)) + soft)
+        return smooth((t - self.start) / self.fall) * (
+            (1 - self.sag) * (1 - smooth(back / self.rise)) + soft
+        )
 
     def magnitude(self, t: np.ndarray | float) -> np.ndarray:
         """Positive-sequence voltage [pu] at times t [s]."""
@@ -48,7 +56,9 @@ class Dip:
     def frequency(self, t: np.ndarray | float) -> np.ndarray:
         """Frequency [Hz] at times t [s]."""
         x = np.maximum(np.asarray(t) - self.start, 0.0)
-        return NOMINAL_FREQUENCY + self.swing * np.sin(2 * np.pi * self.swing_rate * x) * np.exp(-x / self.swing_decay)
+        return NOMINAL_FREQUENCY + self.swing * np.sin(2 * np.pi * self.swing_rate * x) * np.exp(
+            -x / self.swing_decay
+        )
 
     def phase(self, t: np.ndarray | float) -> np.ndarray:
         """Angle of the positive sequence [rad]: the integral of the frequency in closed form."""

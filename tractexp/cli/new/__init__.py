@@ -52,8 +52,12 @@ def new(arguments: list[str]) -> int:
     about = "Write a package with one plugin and its test into the current folder."
     parser = argparse.ArgumentParser(prog="tractexp new", description=about)
     parser.add_argument("kind", choices=KINDS)
-    parser.add_argument("name", metavar="NAME", help="such as motor_heating: what configurations call it")
-    parser.add_argument("--from", dest="source", type=Path, metavar="FILE", help="an effect proposed by tractexp")
+    parser.add_argument(
+        "name", metavar="NAME", help="such as motor_heating: what configurations call it"
+    )
+    parser.add_argument(
+        "--from", dest="source", type=Path, metavar="FILE", help="an effect proposed by tractexp"
+    )
     options = parser.parse_args(arguments)
     package = written(options.kind, options.name, Path(), options.source)
     put = "read it before you use it" if options.source else "put your equations into it"
@@ -72,23 +76,29 @@ def written(kind: str, name: str, folder: Path, source: Path | None = None) -> P
     group, _ = KINDS[kind]
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name) or keyword.iskeyword(name):
         raise UserError(
-            f"'{name}' cannot be the name of a plugin, which is that of its file; take lower-case letters, digits and"
+            f"'{name}' cannot be the name of a plugin, which is that of its file; take lower-case"
+            " letters, digits and"
             " underscores, such as motor_heating"
         )
     if taken := choices().get(group, {}).get(name):
         raise UserError(
-            f"the {group} '{name}' is there already ({taken.module or 'a configuration'}); take another name"
+            f"the {group} '{name}' is there already ({taken.module or 'a configuration'}); take"
+            " another name"
         )
     package = f"tractexp_{name}"
     place = folder / package
     if place.exists():
-        raise UserError(f"{place} is there already and is not overwritten; take another name, or another folder")
+        raise UserError(
+            f"{place} is there already and is not overwritten; take another name, or another folder"
+        )
     title = "".join(word.capitalize() for word in name.split("_"))
     code = _copy_proposal(source, title) if source else _copy_example(kind, name, title)
     contents = {
-        "pyproject.toml": PROJECT.format(package=package), f"test_{name}.py": TEST.format(package=package),
-        f"{package}/__init__.py": f'"""The plugin {name} for tractexp."""\n', f"{package}/{name}.py": code,
-    }  # fmt: skip
+        "pyproject.toml": PROJECT.format(package=package),
+        f"test_{name}.py": TEST.format(package=package),
+        f"{package}/__init__.py": f'"""The plugin {name} for tractexp."""\n',
+        f"{package}/{name}.py": code,
+    }
     for path, text in contents.items():
         files.write(place / path, text)
     return place
@@ -100,9 +110,14 @@ def _copy_example(kind: str, name: str, title: str) -> str:
 
 
 def _copy_proposal(source: Path, title: str) -> str:
-    """The text of a proposed term's plugin, its class named anew. Raises `UserError` for what is none."""
+    """The text of a proposed term's plugin, its class named anew. Raises `UserError` for what is
+    none.
+    """
     files.check_there(source)
     code = files.read(source).decode(errors="replace")
     if PROPOSED not in code:
-        raise UserError(f"{source} is no term that tractexp has proposed (task=discrepancy writes proposed_effect.py)")
+        raise UserError(
+            f"{source} is no term that tractexp has proposed (task=discrepancy writes"
+            " proposed_effect.py)"
+        )
     return code.replace(PROPOSED, f"class {title}(")

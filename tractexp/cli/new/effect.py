@@ -22,7 +22,9 @@ class Example(Effect):
     Departures: none.
     """
 
-    example_share = Parameter(0.0, (0.0, 1.0), "1", "share that follows the square", SOURCE, "k", null=0.0)
+    example_share = Parameter(
+        0.0, (0.0, 1.0), "1", "share that follows the square", SOURCE, "k", null=0.0
+    )
 
     places, kind = ("static P",), "law"
     relevant = {"example_share": 0.05}

@@ -29,7 +29,12 @@ class Example(Optimizer):
         best, value = x[f.argmin()], f.min()
         yield
         for t in range(self.iterations):
-            steps = 0.5 ** (t // 10) * 0.2 * box.width * rng.standard_normal((self.tries, box.dimension))
+            steps = (
+                0.5 ** (t // 10)
+                * 0.2
+                * box.width
+                * rng.standard_normal((self.tries, box.dimension))
+            )
             x, f = evaluate(best + steps)
             if f.min() < value:
                 best, value = x[f.argmin()], f.min()

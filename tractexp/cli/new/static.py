@@ -23,5 +23,7 @@ class Example(Static):
     example_slope_p = Parameter(1.0, (0.0, 3.0), "1", "slope of the active power", SOURCE, "a")
     example_slope_q = Parameter(2.0, (0.0, 6.0), "1", "slope of the reactive power", SOURCE, "b")
 
-    def law(self, u: "Symbol", example_slope_p: "Symbol", example_slope_q: "Symbol") -> "tuple[Expr, Expr]":
+    def law(
+        self, u: "Symbol", example_slope_p: "Symbol", example_slope_q: "Symbol"
+    ) -> "tuple[Expr, Expr]":
         return 1 + example_slope_p * (u - 1), 1 + example_slope_q * (u - 1)

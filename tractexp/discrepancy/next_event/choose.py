@@ -1,4 +1,6 @@
-"""The event to record next, chosen among those imagined: the mildest that is sure to leave one rival, or the surest."""
+"""The event to record next, chosen among those imagined: the mildest that is sure to leave one
+rival, or the surest.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -10,7 +12,14 @@ import numpy as np
 from tractexp.discrepancy.criteria import Criteria
 from tractexp.discrepancy.next_event.imagined import ImaginedDip, as_recorded, driven, imagine_dips
 from tractexp.discrepancy.next_event.same import Same, same
-from tractexp.discrepancy.next_event.separation import FEW, Chances, Separation, Side, linearize_side, seen
+from tractexp.discrepancy.next_event.separation import (
+    FEW,
+    Chances,
+    Separation,
+    Side,
+    linearize_side,
+    seen,
+)
 from tractexp.inference.context import Context
 from tractexp.inference.fitting import Refit, refit
 from tractexp.inference.noise_in_quiet import QuietNoise
@@ -18,7 +27,8 @@ from tractexp.inference.records import Records
 from tractexp.model.drive import Drive
 from tractexp.noise import Noise
 
-DECIDED = 0.95  # probability with which a recommended dip must tell tied sets apart: one miss in twenty
+# probability with which a recommended dip must tell tied sets apart: one miss in twenty
+DECIDED = 0.95
 CHECKED = 4  # events whose chances are reckoned again at refits, until one holds what it promised
 LEAST_CHANCE = 0.5  # chance below which no event is said to tell a pair apart
 WORTH = 0.1  # chance below which no refit is worth its time
@@ -32,16 +42,19 @@ class EventTrial:
 
     event: ImaginedDip
     chances: Chances
-    refitted: bool = False  # whether rivals were refitted to it, not only linearised about their fits
-    repeated: int | None = None  # how many such events are sure to, where one is not and so many are
+    # whether rivals were refitted to it, not only linearised about their fits
+    refitted: bool = False
+    # how many such events are sure to, where one is not and so many are
+    repeated: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class NextEvent:
-    """What to record next for `rivals`, and how surely it leaves one of them; `tried` are all events, as imagined.
+    """What to record next for `rivals`, and how surely it leaves one of them; `tried` are all
+    events, as imagined.
 
-    `same` are pairs that no voltage at all tells apart, by their places among the rivals, and `hopeless` others that
-    none of the events does.
+    `same` are pairs that no voltage at all tells apart, by their places among the rivals, and
+    `hopeless` others that none of the events does.
     """
 
     rivals: tuple[str, ...]
@@ -59,11 +72,13 @@ class NextEvent:
     def sentence(self) -> str:
         """What to record, or why nothing need be."""
         sentences = [
-            f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus: {proof.reason}"
+            f"{self.rivals[a]} and {self.rivals[b]} cannot be told apart by any dip at this bus:"
+            f" {proof.reason}"
             for a, b, proof in self.same
         ]
         sentences += [
-            f"none of the {len(self.tried)} events tried tells {self.rivals[a]} from {self.rivals[b]}, the surest with"
+            f"none of the {len(self.tried)} events tried tells {self.rivals[a]} from"
+            f" {self.rivals[b]}, the surest with"
             f" a probability of {p:.0%}"
             for a, b, p in self.hopeless
         ]
@@ -78,14 +93,21 @@ class NextEvent:
             "rivals": list(self.rivals),
             "recommended": self._row(self.best),
             "indistinguishable": [
-                {"pair": [self.rivals[a], self.rivals[b]], "rank": s.rank, "off": s.off, "reason": s.reason}
+                {
+                    "pair": [self.rivals[a], self.rivals[b]],
+                    "rank": s.rank,
+                    "off": s.off,
+                    "reason": s.reason,
+                }
                 for a, b, s in self.same
             ],
             "no_event_separates": [
-                {"pair": [self.rivals[a], self.rivals[b]], "probability": p} for a, b, p in self.hopeless
+                {"pair": [self.rivals[a], self.rivals[b]], "probability": p}
+                for a, b, p in self.hopeless
             ],
             "tried": [
-                {**t.event.to_dict(), "words": t.event.words, "probability": t.chances.least} for t in self.tried
+                {**t.event.to_dict(), "words": t.event.words, "probability": t.chances.least}
+                for t in self.tried
             ],
         }
 
@@ -101,12 +123,17 @@ class NextEvent:
 
     def _recommended(self) -> str:
         first, *others = self.rivals
-        them = f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
+        them = (
+            f"{first} from {others[0]}" if len(others) == 1 else f"these {len(self.rivals)} apart"
+        )
         what, p = self.best.event.words, self.probability
         if p >= DECIDED:
             return f"record {what}: it tells {them} with a probability of {p:.0%}"
         sure = f"no event that was tried is sure to tell {them}"
-        return f"{sure}; the surest, {what}, does so with a probability of {p:.0%}{_describe_joint_events(self.best)}"
+        return (
+            f"{sure}; the surest, {what}, does so with a probability of"
+            f" {p:.0%}{_describe_joint_events(self.best)}"
+        )
 
 
 def _describe_joint_events(tried: EventTrial) -> str:
@@ -115,7 +142,12 @@ def _describe_joint_events(tried: EventTrial) -> str:
 
 
 def next_event(
-    context: Context, noise: Noise, bare: Refit, rivals: Sequence[Refit], labels: Sequence[str], seed: int = 0
+    context: Context,
+    noise: Noise,
+    bare: Refit,
+    rivals: Sequence[Refit],
+    labels: Sequence[str],
+    seed: int = 0,
 ) -> NextEvent:
     """Choose what to record to tell two rivals or more apart.
 
@@ -124,15 +156,26 @@ def next_event(
     context.effort.say(f"choosing what to record next, to tell {len(rivals)} explanations apart")
     sides = [linearize_side(context, noise, fit) for fit in (bare, *rivals)]
     separation, truths = Separation(sides, context.criteria, FEW, seed), range(1, len(sides))
-    reads = {channel for fit in rivals for name in fit.names for channel in context.catalogue[name].effect.reads}
+    reads = {
+        channel
+        for fit in rivals
+        for name in fit.names
+        for channel in context.catalogue[name].effect.reads
+    }
     events, denied = [], []
     by_rate = sorted(imagine_dips(context, sorted(reads)), key=lambda e: e.rate)
-    for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):  # sampled alike
-        for event, views in zip(group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True):
+    # sampled alike
+    for group in (list(alike) for _, alike in itertools.groupby(by_rate, key=lambda e: e.rate)):
+        for event, views in zip(
+            group, zip(*(seen(context, noise, s, group) for s in sides), strict=True), strict=True
+        ):
             events.append(event)
             denied.append(np.stack([separation.denied(views, truth) for truth in truths]))
     most = np.max([d.mean(axis=2) for d in denied], axis=0)  # (a, a)
-    apart = [(a, b, float(min(most[a, b], most[b, a]))) for a, b in itertools.combinations(range(len(rivals)), 2)]
+    apart = [
+        (a, b, float(min(most[a, b], most[b, a])))
+        for a, b in itertools.combinations(range(len(rivals)), 2)
+    ]
     open_pairs = [pair for pair in apart if pair[2] < LEAST_CHANCE]
     ignored = np.zeros(most.shape, bool)
     if len(open_pairs) < len(apart):  # what can be told apart shall be
@@ -148,12 +191,21 @@ def next_event(
 
 def mildest(tried: Sequence[EventTrial], decided: float) -> EventTrial:
     """Of the events that are sure enough the one that asks for least, or else of the surest."""
-    enough = [t for t in tried if t.chances.least >= min(decided, max(t.chances.least for t in tried) - NEARLY)]
+    enough = [
+        t
+        for t in tried
+        if t.chances.least >= min(decided, max(t.chances.least for t in tried) - NEARLY)
+    ]
     return min(enough, key=lambda t: t.event.burden)
 
 
 def _choose_mildest_event(
-    context: Context, noise: Noise, sides: Sequence[Side], tried: Sequence[EventTrial], ignored: np.ndarray, seed: int
+    context: Context,
+    noise: Noise,
+    sides: Sequence[Side],
+    tried: Sequence[EventTrial],
+    ignored: np.ndarray,
+    seed: int,
 ) -> EventTrial:
     """The mildest event that is sure enough after refits, too."""
     left, checked = list(tried), []
@@ -163,26 +215,39 @@ def _choose_mildest_event(
         if checked and chance < min(LEAST_CHANCE, max(t.chances.least for t in checked)):
             break
         left.remove(best)
-        checked.append(_compute_refitted_chances(context, noise, sides, best, ignored, seed) if chance >= WORTH else best)
+        checked.append(
+            _compute_refitted_chances(context, noise, sides, best, ignored, seed)
+            if chance >= WORTH
+            else best
+        )
         if checked[-1].chances.least >= DECIDED:
             return checked[-1]
     return max(checked, key=lambda t: t.chances.least)
 
 
 def _compute_refitted_chances(
-    context: Context, noise: Noise, sides: Sequence[Side], best: EventTrial, ignored: np.ndarray, seed: int
+    context: Context,
+    noise: Noise,
+    sides: Sequence[Side],
+    best: EventTrial,
+    ignored: np.ndarray,
+    seed: int,
 ) -> EventTrial:
-    """The chances of one event with rivals linearised where they fit it best, each in turn the truth.
+    """The chances of one event with rivals linearised where they fit it best, each in turn the
+    truth.
 
-    Only of phasors without further channels or rates, which the context has no records of: others stay linearised about
-    their fits.
+    Only of phasors without further channels or rates, which the context has no records of: others
+    stay linearised about their fits.
     """
     event = best.event
     plain = context.domain.recordable and context.records.window is None and not event.burden[0]
     places = []
     for a in range(1, len(sides)):
         moved = _fitted_to(context, noise, sides, sides[a], event) if plain else []
-        there = [side if k == a or not moved else linearize_side(context, noise, moved[k]) for k, side in enumerate(sides)]
+        there = [
+            side if k == a or not moved else linearize_side(context, noise, moved[k])
+            for k, side in enumerate(sides)
+        ]
         views = [seen(context, noise, side, [event])[0] for side in there]
         places.append((Separation(there, context.criteria, seed=seed), views))
 
@@ -197,17 +262,22 @@ def _compute_refitted_chances(
     return replace(once, repeated=next(enough, None))
 
 
-def _fitted_to(context: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip) -> list[Refit]:
+def _fitted_to(
+    context: Context, noise: Noise, sides: Sequence[Side], truth: Side, event: ImaginedDip
+) -> list[Refit]:
     """Every side fitted to the records and one event more, in which `truth` holds exactly."""
     at = context.coordinates
     middle = at.without_faults(truth.fit.unit, ())
-    power = context.kernels.simulate(truth.fit.names, middle[None], Drive.of([driven(context, event)]))[0]
+    power = context.kernels.simulate(
+        truth.fit.names, middle[None], Drive.of([driven(context, event)])
+    )[0]
     whole = context.on(Records.of((*context.records.recorded, as_recorded(context, event, power))))
     wide = [whole.coordinates.widened(side.fit.unit) for side in sides]
     input_modes = None if noise.input_modes is None else QuietNoise.at(whole, wide[0]).input_modes
     both = noise.on(whole.problem.power, input_modes)
     fits_by_name = {
-        f.names: f for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])
+        f.names: f
+        for f in refit(whole, both, [(s.fit.names, u) for s, u in zip(sides, wide, strict=True)])
     }
     fits = [fits_by_name[s.fit.names] for s in sides]
     return [replace(f, unit=f.unit[: at.dimension]) for f in fits]

@@ -1,4 +1,6 @@
-"""Events that might be recorded next: dips, a tap or bank that is switched and back, other channels and rates."""
+"""Events that might be recorded next: dips, a tap or bank that is switched and back, other channels
+and rates.
+"""
 
 import itertools
 from collections.abc import Sequence
@@ -25,9 +27,11 @@ HIGHEST_PHASOR_RATE = 5000.0  # Hz, of phasors
 
 @dataclass(frozen=True)
 class ImaginedDip:
-    """An event from the voltage before it back to that voltage: the phase turns by `jump` [degrees] while it is low.
+    """An event from the voltage before it back to that voltage: the phase turns by `jump` [degrees]
+    while it is low.
 
-    `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence over its depth.
+    `rate` is how many times as fast as the records it is sampled, `unbalance` its negative sequence
+    over its depth.
     """
 
     depth: float
@@ -48,17 +52,23 @@ class ImaginedDip:
         """The event, as a sentence goes on after "record"."""
         if self.switched:
             sentence = (
-                f"the switching of a tap or a capacitor bank that lowers the voltage by {self.depth:.0%} for"
+                "the switching of a tap or a capacitor bank that lowers the voltage by"
+                f" {self.depth:.0%} for"
                 f" {self.duration:g} s"
             )
         else:
             sentence = f"a dip of {self.depth:.0%} or more lasting {1000 * self.duration:.0f} ms"
         more = []
         if self.jump:
-            more.append(f"in which the voltage's phase jumps by {self.jump:+.0f} degrees{self._channel('jump')}")
+            more.append(
+                f"in which the voltage's phase jumps by {self.jump:+.0f}"
+                f" degrees{self._channel('jump')}"
+            )
         if self.unbalance:
             channel = self._channel("unbalance")
-            more.append(f"unbalanced (negative sequence {self.unbalance:.0%} of the depth){channel}")
+            more.append(
+                f"unbalanced (negative sequence {self.unbalance:.0%} of the depth){channel}"
+            )
         if self.rate > 1:
             more.append(f"sampled {self.rate} times as fast")
         return ", ".join([sentence, *more])
@@ -70,24 +80,38 @@ class ImaginedDip:
 
     @property
     def burden(self) -> tuple[int, float]:
-        """How much it asks for: channels, rates and kinds beyond the records', then depth times duration."""
+        """How much it asks for: channels, rates and kinds beyond the records', then depth times
+        duration.
+        """
         return bool(self.jump) + bool(self.unbalance) + (self.rate > 1), self.depth * self.duration
 
 
 def imagine_dips(context: Context, reads: Sequence[str] = ()) -> list[ImaginedDip]:
-    """What is tried on this context; unbalanced dips that need the channel U2 where one of the rivals `reads` it."""
+    """What is tried on this context; unbalanced dips that need the channel U2 where one of the
+    rivals `reads` it.
+    """
     domain, durations = context.domain, context.domain.dips.durations
     if not domain.further:
         turned = itertools.product(DEPTHS, durations, (0.0, *JUMPS))
         unbalanced = itertools.product(DEPTHS[::2], durations[::2])
         dips = [ImaginedDip(*pair, jump=j, domain=domain) for *pair, j in turned]
-        return dips + [ImaginedDip(*pair, unbalance=UNBALANCED_SHARE, domain=domain) for pair in unbalanced]
+        return dips + [
+            ImaginedDip(*pair, unbalance=UNBALANCED_SHARE, domain=domain) for pair in unbalanced
+        ]
     dips = [ImaginedDip(*pair) for pair in itertools.product(DEPTHS, durations)]
     dips += [ImaginedDip(depth, LASTING, switched=True) for depth in SWITCHED]
-    dips += [ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)]
-    dips += [ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True) for j in (-TURNED_BY_BANK, TURNED_BY_BANK)]
+    dips += [
+        ImaginedDip(*p, jump=j) for *p, j in itertools.product(DEPTHS[::2], durations[::2], JUMPS)
+    ]
+    dips += [
+        ImaginedDip(SWITCHED[1], LASTING, jump=j, switched=True)
+        for j in (-TURNED_BY_BANK, TURNED_BY_BANK)
+    ]
     if "U2" in reads:
-        dips += [ImaginedDip(*pair, unbalance=UNBALANCED_SHARE) for pair in itertools.product(DEPTHS[::2], durations[::2])]
+        dips += [
+            ImaginedDip(*pair, unbalance=UNBALANCED_SHARE)
+            for pair in itertools.product(DEPTHS[::2], durations[::2])
+        ]
     if FASTER / context.events[0].record.step <= HIGHEST_PHASOR_RATE:
         dips += [ImaginedDip(depth, durations[1], rate=FASTER) for depth in DEPTHS[2::2]]
     return dips
@@ -108,14 +132,18 @@ def _course(since: np.ndarray, duration: float, edge: float) -> np.ndarray:
 
 
 def noise_of(noise: Noise, drive: Drive, rate: int, step: float) -> Noise:
-    """The records' noise on an imagined event; at another rate as loud, and forgotten in the same time."""
+    """The records' noise on an imagined event; at another rate as loud, and forgotten in the same
+    time.
+    """
     if rate == 1:
         steady = np.repeat(drive.before.T, np.diff(drive.first), axis=1)
         return noise.on(Load.of(steady, drive.before, drive.first))
     memory = noise.memory(step)
     a = float(np.exp(-step / rate / memory)) if memory > 0 else 0.0
     color, shock = np.array([[0.0], [a]]), float(np.sqrt(1 - a * a))
-    return Noise((tuple(Autoregression(color, level * np.array([1.0, shock])) for level in noise.levels),))
+    return Noise(
+        (tuple(Autoregression(color, level * np.array([1.0, shock])) for level in noise.levels),)
+    )
 
 
 def as_recorded(context: Context, event: ImaginedDip, power: np.ndarray) -> Event:
@@ -123,12 +151,20 @@ def as_recorded(context: Context, event: ImaginedDip, power: np.ndarray) -> Even
     like, dips, drive = context.events[0], context.domain.dips, driven(context, event)
     assert isinstance(drive, Excitation)
     t = np.arange(len(drive.U)) * drive.step
-    start, end = (int(np.searchsorted(t, s)) for s in (dips.lead, dips.lead + event.duration + dips.edge))
+    start, end = (
+        int(np.searchsorted(t, s)) for s in (dips.lead, dips.lead + event.duration + dips.edge)
+    )
     channels = {} if like.record.U2 is None else {"U2": drive.U2}
     if like.record.f is not None:
         channels["f"] = np.full(len(t), like.record.base.frequency)
     record = Record(event.words, t, drive.U, *power, base=like.record.base, **channels)
     return replace(
-        like, record=record, start=start, end=end, depth=event.depth, f0=like.record.base.frequency,
-        steady=slice(0, start), dips=1,
-    )  # fmt: skip
+        like,
+        record=record,
+        start=start,
+        end=end,
+        depth=event.depth,
+        f0=like.record.base.frequency,
+        steady=slice(0, start),
+        dips=1,
+    )

@@ -1,4 +1,6 @@
-"""Rivals that somebody names, fitted to records: what to record next for them, without a whole investigation."""
+"""Rivals that somebody names, fitted to records: what to record next for them, without a whole
+investigation.
+"""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -20,19 +22,28 @@ from tractexp.wording import join_words
 
 
 def event_for(
-    model: Model, events: Sequence[Event], rivals: Sequence[Sequence[str]], bounds: Mapping[str, Sequence[float]],
-    fixed: Mapping[str, float], *, substeps: int | None = None, criteria: Criteria | None = None, seed: int = 0,
+    model: Model,
+    events: Sequence[Event],
+    rivals: Sequence[Sequence[str]],
+    bounds: Mapping[str, Sequence[float]],
+    fixed: Mapping[str, float],
+    *,
+    substeps: int | None = None,
+    criteria: Criteria | None = None,
+    seed: int = 0,
     tell: Callable[[str], None] = lambda line: None,
-) -> NextEvent:  # fmt: skip
+) -> NextEvent:
     """Fit sets of effects to all events and choose the event that tells them apart.
 
-    Raises `UserError` for fewer than two sets, and for effects that cannot be told on these events or are no load's.
+    Raises `UserError` for fewer than two sets, and for effects that cannot be told on these events
+    or are no load's.
     """
     criteria = criteria or Criteria()
     sets = list(dict.fromkeys(tuple(sorted(names)) for names in rivals))
     if len(sets) < 2:
         raise UserError(
-            f"{TASK.rivals}={[list(s) for s in sets]}: an event is planned to tell two explanations or more apart; name"
+            f"{TASK.rivals}={[list(s) for s in sets]}: an event is planned to tell two explanations"
+            " or more apart; name"
             f" another one, such as '{TASK.rivals}=[stator_resistance,feeder_impedance]'"
         )
     events = domain_of(model).events(events)
@@ -41,32 +52,49 @@ def event_for(
     missing = catalogue(model, events, named)
     _check(missing, named)
     with Effort(tell).audible() as effort:
-        context = Context.of(model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps)
+        context = Context.of(
+            model, missing, Records.of(events), bounds, fixed, criteria, effort, substeps
+        )
         base = base_fit(context)
         effort.say(f"fitting {len(sets)} explanations")
-        noise, begin = base.noise, [start for names in sets for start in _starts(context, base.fit.unit, names)]
+        noise, begin = (
+            base.noise,
+            [start for names in sets for start in _starts(context, base.fit.unit, names)],
+        )
         for _ in range(2):  # the second time under the noise that the best of them leaves
             fits = refit(context, noise, begin)
             noise = base.quiet.of_fit(fits[0].unit, fits[0].names)
             begin = [(fit.names, fit.unit) for fit in fits]
-        bare, *fits = sorted(refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names))
-        return next_event(context, noise, bare, fits, [join_words(list(fit.names)) for fit in fits], seed)
+        bare, *fits = sorted(
+            refit(context, noise, [((), base.fit.unit), *begin]), key=lambda fit: bool(fit.names)
+        )
+        return next_event(
+            context, noise, bare, fits, [join_words(list(fit.names)) for fit in fits], seed
+        )
 
 
 def _check(missing: Catalogue, named: Sequence[str]) -> None:
-    """Raise `UserError` for a name that is no effect of the load, or one that the events do not show."""
+    """Raise `UserError` for a name that is no effect of the load, or one that the events do not
+    show.
+    """
     for name in named:
         if name in missing.untestable:
-            raise UserError(f"{TASK.rivals} names '{name}', which cannot be tested here: {missing.untestable[name]}")
+            raise UserError(
+                f"{TASK.rivals} names '{name}', which cannot be tested here:"
+                f" {missing.untestable[name]}"
+            )
         if name not in missing.of_load:
             raise UserError(
-                f"{TASK.rivals} names '{name}', which is in the model already, a fault of the measurement, or of "
+                f"{TASK.rivals} names '{name}', which is in the model already, a fault of the"
+                " measurement, or of "
                 "another law or place; give effects that the model lacks, by the catalogue's names"
             )
 
 
 def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
-    """The base fit with every setting of each effect and its sizes at what matters least, either way."""
+    """The base fit with every setting of each effect and its sizes at what matters least, either
+    way.
+    """
     at, result = context.coordinates, []
     for name in names:
         candidate = context.catalogue[name]
@@ -75,7 +103,9 @@ def _starts(context: Context, unit: np.ndarray, names: Names) -> list[Start]:
                 point = at.placed(unit, setting)
                 for p in context.catalogue.sizes(names):
                     step = candidate.relevant(p) * (candidate.sign(p) or sign)
-                    point[at.column[p.name]] = np.clip(at.to_unit(p.name, p.absent + step), 0.0, 1.0)
+                    point[at.column[p.name]] = np.clip(
+                        at.to_unit(p.name, p.absent + step), 0.0, 1.0
+                    )
                 result.append((names, point))
                 if all(candidate.sign(p) for p in candidate.sizes):
                     break

@@ -1,8 +1,10 @@
-"""Whether two explanations are one function of the voltage: then no event at this bus tells them apart.
+"""Whether two explanations are one function of the voltage: then no event at this bus tells them
+apart.
 
-Two conditions, both numerical, over voltages richer than any record's: at the point where one follows the other, the
-changes that the parameters of either make span the same space (the joint Jacobian has the rank of each); and refitted
-without noise each follows the other, at its fit and at half its size, to what the integration leaves.
+Two conditions, both numerical, over voltages richer than any record's: at the point where one
+follows the other, the changes that the parameters of either make span the same space (the joint
+Jacobian has the rank of each); and refitted without noise each follows the other, at its fit and at
+half its size, to what the integration leaves.
 """
 
 import itertools
@@ -18,7 +20,9 @@ from tractexp.inference.fitting import Refit
 from tractexp.model.drive import Drive
 
 LARGEST_FOLLOWED_DISTANCE = 1e-6  # pu: how near one comes to the other
-DONE = 1e-8  # of the sum of squares: a descent that gains less ends; where one follows, each step gains nearly all
+# of the sum of squares: a descent that gains less ends; where one follows, each step gains nearly
+# all
+DONE = 1e-8
 SETTLED = 0.1  # of the power before: an event that a load has survived by its end
 DIRECTION = 1e-4  # of the largest singular value of normalized columns: a direction of its own
 RICH = (0.1, 0.3, 0.5, 0.7)  # depths
@@ -27,7 +31,9 @@ TURNED = (0.0, 20.0, -30.0)  # degrees
 
 @dataclass(frozen=True)
 class Same:
-    """Two explanations that are one: the rank of their joint Jacobian and how near each follows the other [pu]."""
+    """Two explanations that are one: the rank of their joint Jacobian and how near each follows the
+    other [pu].
+    """
 
     rank: int
     events: int
@@ -36,14 +42,21 @@ class Same:
     @property
     def reason(self) -> str:
         return (
-            f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the parameters of"
-            f" either make span the same {self.rank} directions, and each follows the other within {LARGEST_FOLLOWED_DISTANCE:.0e} pu"
+            f"over {self.events} voltages, dips and phase jumps of many sizes, the changes that the"
+            " parameters of"
+            f" either make span the same {self.rank} directions, and each follows the other within"
+            f" {LARGEST_FOLLOWED_DISTANCE:.0e} pu"
         )
 
 
 def same(context: Context, one: Refit, other: Refit) -> Same | None:
-    """The proof that two explanations are the same function of the voltage, None where they are not."""
-    events = [ImaginedDip(*shape) for shape in itertools.product(RICH, context.domain.dips.durations[::2], TURNED)]
+    """The proof that two explanations are the same function of the voltage, None where they are
+    not.
+    """
+    events = [
+        ImaginedDip(*shape)
+        for shape in itertools.product(RICH, context.domain.dips.durations[::2], TURNED)
+    ]
     drive = Drive.of([driven(context, event) for event in events])
     pairs = []
     for truth, rival in ((one, other), (other, one)):
@@ -56,7 +69,9 @@ def same(context: Context, one: Refit, other: Refit) -> Same | None:
 
 
 def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
-    """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the measurement."""
+    """Coordinates (D,) of a fit with the sizes of its effects at this share, without faults of the
+    measurement.
+    """
     at = context.coordinates
     unit, sizes = at.without_faults(fit.unit, ()), at.sizes(fit.names)
     unit[sizes] = at.null[sizes] + size * (unit[sizes] - at.null[sizes])
@@ -65,8 +80,10 @@ def _shrunk(context: Context, fit: Refit, size: float) -> np.ndarray:
 
 def _follow_truth(
     context: Context, drive: Drive, point: np.ndarray, names: Sequence[str], rival: Refit
-) -> tuple[int, float] | None:  # fmt: skip
-    """Rank and distance where the rival follows the truth at coordinates (D,); None where it does not."""
+) -> tuple[int, float] | None:
+    """Rank and distance where the rival follows the truth at coordinates (D,); None where it does
+    not.
+    """
     answer = context.kernels.simulate(names, point[None], drive)[0]
     valid = (drive.weights > 0) & _find_recovering_samples(answer, drive)
     truth = answer[valid]
@@ -93,10 +110,15 @@ def _follow_truth(
         from scipy.optimize import least_squares
 
         return least_squares(
-            lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows], np.clip(x, 1e-3, 1 - 1e-3),
+            lambda x: (drawn(whole(x)[None], rival.names)[0] - truth)[rows],
+            np.clip(x, 1e-3, 1 - 1e-3),
             lambda x: moved(whole(x), rival.names, columns)[:, rows].T,  # pyright: ignore[reportArgumentType]
-            bounds=(0.0, 1.0), xtol=1e-14, ftol=DONE, gtol=1e-14, max_nfev=60,
-        )  # fmt: skip
+            bounds=(0.0, 1.0),
+            xtol=1e-14,
+            ftol=DONE,
+            gtol=1e-14,
+            max_nfev=60,
+        )
 
     mild = np.zeros(valid.shape, bool)  # first: near a stall a descent from afar goes astray
     mild[:, : drive.first[drive.events // 2]] = True
@@ -108,18 +130,25 @@ def _follow_truth(
         nearest_point, off = ended.x, float(np.abs(ended.fun).max())
         if off > LARGEST_FOLLOWED_DISTANCE:
             return None
-    own = moved(point, names, _of_load(context, names)), moved(whole(nearest_point), rival.names, columns)
+    own = (
+        moved(point, names, _of_load(context, names)),
+        moved(whole(nearest_point), rival.names, columns),
+    )
     ranks = [_rank(rows) for rows in (*own, np.concatenate(own))]
     return (ranks[2], off) if len(set(ranks)) == 1 else None
 
 
 def _find_recovering_samples(answer: np.ndarray, drive: Drive) -> np.ndarray:
-    """Which samples (C, N) are of events that the load survives: a motor that stalls amplifies what rounding does."""
+    """Which samples (C, N) are of events that the load survives: a motor that stalls amplifies what
+    rounding does.
+    """
     alive = np.zeros(answer.shape, bool)
     for e in range(drive.events):
         own = answer[:, drive.part(e)]
         first, last = own[:, :20].mean(axis=1), own[:, -20:].mean(axis=1)
-        alive[:, drive.part(e)] = np.isfinite(own).all() and np.abs(last - first).max() < SETTLED * np.abs(first).max()
+        alive[:, drive.part(e)] = (
+            np.isfinite(own).all() and np.abs(last - first).max() < SETTLED * np.abs(first).max()
+        )
     return alive
 
 

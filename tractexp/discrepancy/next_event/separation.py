@@ -1,9 +1,11 @@
-"""How surely one more event tells rivals apart: each in turn the truth, all others refitted, by the product's own rule.
+"""How surely one more event tells rivals apart: each in turn the truth, all others refitted, by the
+product's own rule.
 
-Every rival is linearised about its fit: r + J d on the events recorded, f + K d on the new one, whitened. With A the
-truth the new event shows y = f_A + K_A h + e, with h as uncertain as the records leave A's parameters and e noise.
-All rivals are fitted to both, in closed form, and judged as the product judges them (`Criteria.rejects`). Only the
-space that all r, J, f and K span matters, so that thousands of draws cost little.
+Every rival is linearised about its fit: r + J d on the events recorded, f + K d on the new one,
+whitened. With A the truth the new event shows y = f_A + K_A h + e, with h as uncertain as the
+records leave A's parameters and e noise. All rivals are fitted to both, in closed form, and judged
+as the product judges them (`Criteria.rejects`). Only the space that all r, J, f and K span matters,
+so that thousands of draws cost little.
 """
 
 from collections.abc import Sequence
@@ -27,10 +29,11 @@ POWER_DIFFERENCE = 1e-3  # of P0 and Q0, for their differences [pu]
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One explanation on the recorded events: k parameters of the model and its effects, and P0 and Q0 of each event.
+    """One explanation on the recorded events: k parameters of the model and its effects, and P0 and
+    Q0 of each event.
 
-    `r` (R,) and `J` (k, R) are whitened, faults of the measurement with their priors; `own` (k, m) and `s` (m,) are
-    priors of the explanation's own. Rows of parameters on a wall are 0.
+    `r` (R,) and `J` (k, R) are whitened, faults of the measurement with their priors; `own` (k, m)
+    and `s` (m,) are priors of the explanation's own. Rows of parameters on a wall are 0.
     """
 
     fit: Refit
@@ -50,7 +53,8 @@ class Side:
 
 @dataclass(frozen=True, eq=False)
 class EventView:
-    """An explanation on one new event: whitened prediction f (n,) and its differences K (k + 2, n), P0, Q0 at last.
+    """An explanation on one new event: whitened prediction f (n,) and its differences K (k + 2, n),
+    P0, Q0 at last.
 
     nan where the model does not survive it.
     """
@@ -65,14 +69,18 @@ class EventView:
 
 @dataclass(frozen=True, eq=False)
 class Chances:
-    """By which probability an event leaves each rival alone where it is the truth (a,), and denies others (a, a)."""
+    """By which probability an event leaves each rival alone where it is the truth (a,), and denies
+    others (a, a).
+    """
 
     alone: np.ndarray
     pairs: np.ndarray
 
     @classmethod
     def of(cls, denied: np.ndarray, ignored: np.ndarray) -> "Chances":
-        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need not be told apart."""
+        """Of draws (a, a, b) that deny rivals, by the truth; pairs that are `ignored` (a, a) need
+        not be told apart.
+        """
         return cls((denied | ignored[:, :, None]).all(axis=1).mean(axis=1), denied.mean(axis=2))
 
     @property
@@ -91,11 +99,16 @@ def linearize_side(context: Context, noise: Noise, fit: Refit) -> Side:
     free = ~find_active_bounds(context, fit.unit, columns, rows[1:] @ rows[0])
     J = rows[1:, :shared] * free[:, None]
     box = np.where(np.isin(columns, faults), 0.0, BOX)
-    return Side(fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box)
+    return Side(
+        fit, tuple(columns), free, rows[0, :shared], J, rows[1:, shared:], rows[0, shared:], box
+    )
 
 
-def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]) -> list[EventView]:
-    """What an explanation predicts of events that are sampled alike, with the faults of the measurement at their null.
+def seen(
+    context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDip]
+) -> list[EventView]:
+    """What an explanation predicts of events that are sampled alike, with the faults of the
+    measurement at their null.
 
     What the recorder did to earlier events says nothing of the load, but it may go on.
     """
@@ -104,9 +117,15 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     inside = list(side.columns[: len(side.columns) - len(at.before)])
     middle = at.without_faults(side.fit.unit, ())
     points, width = two_sided(middle, inside)
-    moved = _simulate_drives(context, names, np.concatenate([middle[None], points]), drives)  # (E, n, C, N)
+    # (E, n, C, N)
+    moved = _simulate_drives(context, names, np.concatenate([middle[None], points]), drives)
     before = [
-        _simulate_drives(context, names, middle[None], [_raise_initial_power(d, channel, sign * POWER_DIFFERENCE) for d in drives])
+        _simulate_drives(
+            context,
+            names,
+            middle[None],
+            [_raise_initial_power(d, channel, sign * POWER_DIFFERENCE) for d in drives],
+        )
         for channel in ("P0", "Q0")
         for sign in (1, -1)
     ]
@@ -123,7 +142,9 @@ def seen(context: Context, noise: Noise, side: Side, events: Sequence[ImaginedDi
     return chances
 
 
-def _simulate_drives(context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence) -> np.ndarray:
+def _simulate_drives(
+    context: Context, names: Sequence[str], points: np.ndarray, drives: Sequence
+) -> np.ndarray:
     """What is compared (E, n, C, N) of drives of equal length."""
     power = context.kernels.simulate(names, points, Drive.of(drives))
     context.effort.spend(len(points))
@@ -136,16 +157,21 @@ def _raise_initial_power(drive, channel: str, more: float):
 
 
 class Separation:
-    """Rivals on the recorded events, reduced to what they span; the first of `sides` is the base model."""
+    """Rivals on the recorded events, reduced to what they span; the first of `sides` is the base
+    model.
+    """
 
-    def __init__(self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0):
+    def __init__(
+        self, sides: Sequence[Side], criteria: Criteria, draws: int = DRAWS, seed: int = 0
+    ):
         self.sides, self.criteria, self.draws, self.seed = sides, criteria, draws, seed
         rows = _reduce_blocks([np.vstack([x.r, x.J]) for x in sides])
         self.r, self.J = [x[0] for x in rows], [x[1:] for x in rows]
         self.precision = [x.precision for x in sides]
 
     def denied(self, seen: Sequence[EventView], truth: int, times: int = 1) -> np.ndarray:
-        """Which rivals (a, b) each of b draws denies by one new event, or `times` its like, with `truth` the truth.
+        """Which rivals (a, b) each of b draws denies by one new event, or `times` its like, with
+        `truth` the truth.
 
         None is denied where a side does not survive, the truth itself always where all do.
         """
@@ -156,11 +182,16 @@ class Separation:
         rng = np.random.default_rng([self.seed, truth])
         side = self.sides[truth]
         k, here = len(side.columns), side.fit.unit[list(side.columns)]
-        h = rng.standard_normal((self.draws, k)) @ np.linalg.cholesky(np.linalg.inv(self.precision[truth])).T
+        h = (
+            rng.standard_normal((self.draws, k))
+            @ np.linalg.cholesky(np.linalg.inv(self.precision[truth])).T
+        )
         h = np.clip(h, -here, 1 - here)
         y = f[truth] + h @ K[truth][:k] + rng.standard_normal((self.draws, len(f[truth])))
         rivals = range(1, len(self.sides))
-        cost = np.array([self._deviance(x, f[x] - y, K[x]) + 2 * self.sides[x].fit.parameters for x in rivals])
+        cost = np.array(
+            [self._deviance(x, f[x] - y, K[x]) + 2 * self.sides[x].fit.parameters for x in rivals]
+        )
         return self.criteria.rejects(cost - cost[truth - 1]) | (np.array(rivals) == truth)[:, None]
 
     def _deviance(self, x: int, off: np.ndarray, K: np.ndarray) -> np.ndarray:
@@ -179,7 +210,11 @@ class Separation:
 
 
 def _reduce_blocks(blocks: Sequence[np.ndarray]) -> list[np.ndarray]:
-    """Blocks of rows (m_i, n) as rows (m_i, m) of the same inner products, m their number in all."""
+    """Blocks of rows (m_i, n) as rows (m_i, m) of the same inner products, m their
+    number in all.
+    """
     rows = np.concatenate(blocks)
     squares, vectors = np.linalg.eigh(rows @ rows.T)
-    return np.split(vectors * np.sqrt(np.maximum(squares, 0.0)), np.cumsum([len(b) for b in blocks])[:-1])
+    return np.split(
+        vectors * np.sqrt(np.maximum(squares, 0.0)), np.cumsum([len(b) for b in blocks])[:-1]
+    )

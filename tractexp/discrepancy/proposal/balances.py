@@ -1,4 +1,5 @@
-"""Where a term may act, as edits of the equations: each function is copied as it stands into a proposal's plugin file.
+"""Where a term may act, as edits of the equations: each function is copied as it stands into a
+proposal's plugin file.
 
 Every function takes the equations, the signal g (real, 0 before the event) and its sizes by name.
 """

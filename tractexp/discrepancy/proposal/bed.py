@@ -1,6 +1,8 @@
-"""A context in which terms are simulated and fitted: the investigation's, with the library in place of the catalogue.
+"""A context in which terms are simulated and fitted: the investigation's, with the library in place
+of the catalogue.
 
-A term is a candidate like any other. All of a kind share one kernel, in which parameters choose what acts.
+A term is a candidate like any other. All of a kind share one kernel, in which parameters choose
+what acts.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -9,7 +11,15 @@ from dataclasses import replace
 import numpy as np
 
 from tractexp.discrepancy.proposal.effect import Library
-from tractexp.discrepancy.proposal.library import ANSWER, TIMED, Size, Term, pick_of, shape_of, size_of
+from tractexp.discrepancy.proposal.library import (
+    ANSWER,
+    TIMED,
+    Size,
+    Term,
+    pick_of,
+    shape_of,
+    size_of,
+)
 from tractexp.inference.catalogue import Candidate, Catalogue
 from tractexp.inference.context import Context
 from tractexp.inference.free_set import FreeSet
@@ -23,7 +33,9 @@ Setting = Mapping[str, float]  # the parameters of a signal by their own names
 
 
 class Terms(Family):
-    """A base model with the library: terms, named `kind:balance:signal[:clock]`, by the kernel of their kind."""
+    """A base model with the library: terms, named `kind:balance:signal[:clock]`, by the kernel of
+    their kind.
+    """
 
     def with_effects(self, names: Iterable[str]) -> Model:
         return super().with_effects({kind_of(n) for n in names})
@@ -40,7 +52,9 @@ def kind_of(name: str) -> str:
 
 def sizes_of(chosen: Term) -> list[tuple[Size, str]]:
     """The sizes of a term, and what the library calls each."""
-    return [(size, size_of(chosen.signal.kind, chosen.balance, size)) for size in chosen.balance.sizes]
+    return [
+        (size, size_of(chosen.signal.kind, chosen.balance, size)) for size in chosen.balance.sizes
+    ]
 
 
 def shapes_of(chosen: Term) -> dict[str, str]:
@@ -51,21 +65,33 @@ def shapes_of(chosen: Term) -> dict[str, str]:
 def context_of_terms(original: Context) -> Context:
     """The same events, base model and faults of the measurement with the library."""
     faults = tuple(c for c in original.catalogue.candidates if c.measurement)
-    whole = tuple(Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS))
+    whole = tuple(
+        Candidate(kind, effect, (), ({},)) for kind, effect in ((k, Library(k)) for k in KINDS)
+    )
     kernels = original.kernels
     return Context.of(
-        original.load, Catalogue((*faults, *whole), {}), original.records, kernels.bounds, kernels.fixed,
+        original.load,
+        Catalogue((*faults, *whole), {}),
+        original.records,
+        kernels.bounds,
+        kernels.fixed,
         original.criteria,
-        original.effort, kernels.substeps, Terms,
-    )  # fmt: skip
+        original.effort,
+        kernels.substeps,
+        Terms,
+    )
 
 
 def with_terms(context: Context, chosen: Sequence[Term]) -> Context:
-    """A context of the library on which these terms are candidates, each with its own parameters free."""
+    """A context of the library on which these terms are candidates, each with its own parameters
+    free.
+    """
     there = {c.name for c in context.catalogue.candidates}
     more = tuple(_candidate(context, t) for t in dict.fromkeys(chosen) if t.name not in there)
     catalogue = replace(context.catalogue, candidates=(*context.catalogue.candidates, *more))
-    return replace(context, catalogue=catalogue, coordinates=replace(context.coordinates, catalogue=catalogue))
+    return replace(
+        context, catalogue=catalogue, coordinates=replace(context.coordinates, catalogue=catalogue)
+    )
 
 
 def _candidate(context: Context, chosen: Term) -> Candidate:
@@ -86,7 +112,9 @@ class _Part(Effect):
         """The library's kernel has it."""
 
 
-def place(at: FreeSet, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]) -> np.ndarray:
+def place(
+    at: FreeSet, unit: np.ndarray, chosen: Term, setting: Setting, sizes: Sequence[float]
+) -> np.ndarray:
     """Coordinates (D,) with a term of these sizes and this setting."""
     moved = unit.copy()
     for picked in (chosen.signal, chosen.clock) if chosen.clock else (chosen.signal,):
@@ -106,7 +134,9 @@ def values_of(at: FreeSet, unit: np.ndarray, chosen: Term) -> dict[str, float]:
 
 
 def carried_over(other: Context, original: Context, unit: np.ndarray) -> np.ndarray:
-    """Coordinates (D',) of the context of terms with base model, faults and power before as at coordinates (D,)."""
+    """Coordinates (D',) of the context of terms with base model, faults and power before as at
+    coordinates (D,).
+    """
     to, old = other.coordinates, original.coordinates
     moved = to.null.copy()
     faults = to.catalogue.parameters(to.catalogue.of_measurement)

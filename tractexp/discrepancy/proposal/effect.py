@@ -1,4 +1,5 @@
-"""The whole library as two effects, each one kernel: parameters choose which signal acts, and how much in each balance.
+"""The whole library as two effects, each one kernel: parameters choose which signal acts, and how
+much in each balance.
 
 So a shortlist of any terms is simulated side by side, and nothing is compiled for a data set.
 """
@@ -42,7 +43,9 @@ class Library(Effect):
                 yield size.parameter(size_of(self.name, balance, size), f"size in {balance.words}")
         for chosen in (*self.signals, *self.clocks):
             name = pick_of(self.name, chosen.name)
-            yield Parameter(0.0, (0.0, 1.0), "1", f"whether it is {chosen.words}", SOURCE, name=name)
+            yield Parameter(
+                0.0, (0.0, 1.0), "1", f"whether it is {chosen.words}", SOURCE, name=name
+            )
         for signal in self.signals:
             for shape in signal.shapes:
                 yield shape.parameter(shape_of(signal, shape))
@@ -53,7 +56,9 @@ class Library(Effect):
         for signal in self.signals:
             own = {s.name: parameters[shape_of(signal, s)] for s in signal.shapes}
             if present(eq, signal):
-                total += parameters[pick_of(self.name, signal.name)] * signal.build(eq, **clock, **own)
+                total += parameters[pick_of(self.name, signal.name)] * signal.build(
+                    eq, **clock, **own
+                )
         g = eq.define(f"{self.name}_signal", total, "g")
         for balance in self.balances:
             if all(site in eq for site in balance.places_in(eq)):

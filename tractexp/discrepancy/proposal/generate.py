@@ -1,6 +1,7 @@
 """A term as a plugin: an effect of its own, with the functions of the library copied into its file.
 
-The file needs nothing of the library. Its parameters start at what was fitted; the size has the null 0.
+The file needs nothing of the library. Its parameters start at what was fitted; the size has the
+null 0.
 """
 
 import inspect
@@ -43,7 +44,9 @@ class ProposedEffect(Effect):
     def edit(self, eq, {arguments}):
 {body}
 '''
-TIME = "It is a function of time, not of the voltage: it holds for events that it happens in.\n\n    "
+TIME = (
+    "It is a function of time, not of the voltage: it holds for events that it happens in.\n\n    "
+)
 
 
 def parameters_of(term: Term) -> dict[str, str]:
@@ -54,33 +57,53 @@ def parameters_of(term: Term) -> dict[str, str]:
 
 def source(term: Term, values: Mapping[str, float], records: str) -> str:
     """The text of a plugin file for a term with these sizes and this setting."""
-    functions = [_copy_source(term.signal.build, "signal"), _copy_source(term.balance.build, "balance")]
+    functions = [
+        _copy_source(term.signal.build, "signal"),
+        _copy_source(term.balance.build, "balance"),
+    ]
     if term.clock is not None:
         functions.insert(0, _copy_source(term.clock.build, "clock"))
-    helpers = [inspect.getsource(getattr(shapes, h)) for h in HELPERS if any(f"{h}(" in f for f in functions)]
+    helpers = [
+        inspect.getsource(getattr(shapes, h))
+        for h in HELPERS
+        if any(f"{h}(" in f for f in functions)
+    ]
     functions = [*helpers, *functions]
     constants = [
-        f"{c} = {getattr(shapes, c):g}" for c in CONSTANTS if any(re.search(rf"\b{c}\b", f) for f in functions)
+        f"{c} = {getattr(shapes, c):g}"
+        for c in CONSTANTS
+        if any(re.search(rf"\b{c}\b", f) for f in functions)
     ]
     relevant = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
     sites = ", sites" * any("sites." in f for f in functions)
     headline = quoting.python(f"{term.words[:1].upper()}{term.words[1:]}")
     text = HEAD.format(
-        headline=headline, constants="\n".join(constants),
+        headline=headline,
+        constants="\n".join(constants),
         imports=f"from tractexp.extend import Effect, Parameter, plugin{sites}",
-    )  # fmt: skip
+    )
     text += "".join(f"\n\n{f}" for f in functions)
-    return text.replace("\n\n\n\n", "\n\n\n") + "\n" + CLASS.format(
-        headline=headline, latex=quoting.python(term.latex), time=TIME * term.exogenous,
-        records=quoting.python(records),
-        parameters="\n".join(_declare_parameters(term, values)), relevant=f"{{{relevant}}}",
-        arguments=", ".join(parameters_of(term)), body="\n".join(_body(term)),
-    )  # fmt: skip
+    return (
+        text.replace("\n\n\n\n", "\n\n\n")
+        + "\n"
+        + CLASS.format(
+            headline=headline,
+            latex=quoting.python(term.latex),
+            time=TIME * term.exogenous,
+            records=quoting.python(records),
+            parameters="\n".join(_declare_parameters(term, values)),
+            relevant=f"{{{relevant}}}",
+            arguments=", ".join(parameters_of(term)),
+            body="\n".join(_body(term)),
+        )
+    )
 
 
 def _copy_source(function: Callable[..., object], name: str) -> str:
     """The text of a function under another name."""
-    return re.sub(r"^def \w+", f"def {name}", inspect.getsource(function)).replace("  # noqa: N802", "")
+    return re.sub(r"^def \w+", f"def {name}", inspect.getsource(function)).replace(
+        "  # noqa: N802", ""
+    )
 
 
 def _declare_parameters(term: Term, values: Mapping[str, float]) -> list[str]:
@@ -99,6 +122,7 @@ def _body(term: Term) -> list[str]:
     clock = ["clock=clock(eq)"] if term.clock else []
     sized = [f"{s.name}={PREFIX}{s.name}" for s in term.balance.sizes]
     return [
-        f'        g = eq.define("{PREFIX}signal", signal({", ".join(["eq", *clock, *shaped])}), "g")',
+        f'        g = eq.define("{PREFIX}signal", signal({", ".join(["eq", *clock, *shaped])}),'
+        ' "g")',
         f"        balance({', '.join(['eq', 'g', *sized])})",
     ]

@@ -1,8 +1,8 @@
 """Whether a fitted term is proposed: held-out events and chance decide, not how well it fits.
 
-The share explained is that of names, with what the other terms, or itself in another size, would gain beside it among
-the rest. The deviance in excess of the noise is no measure of it: its level is estimated, and that and chance move it
-by more than what is missing may do.
+The share explained is that of names, with what the other terms, or itself in another size, would
+gain beside it among the rest. The deviance in excess of the noise is no measure of it: its level is
+estimated, and that and chance move it by more than what is missing may do.
 """
 
 from collections.abc import Sequence
@@ -21,14 +21,16 @@ from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
 
-# How often noise may give the best term of the whole library as much: a guard against the library's size alone, since
-# held-out events do the rest.
+# How often noise may give the best term of the whole library as much: a guard against the library's
+# size alone, since held-out events do the rest.
 PROPOSED_P = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class TermAssessment:
-    """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the best of all as much."""
+    """A fitted term on the fitted and on the held-out events; `p` is how often noise gives the best
+    of all as much.
+    """
 
     fit: Refit
     train: GapTest
@@ -44,7 +46,8 @@ class TermAssessment:
         gap = self.validate
         least = share_gone(criteria.ahead)
         little = (
-            f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events, less than {least:.0%}"
+            f"it explains {gap.explained:.0%} of what exceeds the noise on the held-out events,"
+            f" less than {least:.0%}"
         )
         enough = gap.explained >= least
         rows = {
@@ -67,7 +70,13 @@ def term_assessments(
     bare, held = units[0], list(reversed(units[1:]))
     fitted = [*result.context.coordinates.base, *result.context.coordinates.before]
     train = _assess_models(
-        original, result.context, result.noise, fitted, result.bare.unit, fits, [fit.unit for fit in fits]
+        original,
+        result.context,
+        result.noise,
+        fitted,
+        result.bare.unit,
+        fits,
+        [fit.unit for fit in fits],
     )
     there = original.on(Records.of(events, original.records.window))
     validate = _assess_models(there, other, noise, [*other.coordinates.before], bare, fits, held)
@@ -75,10 +84,16 @@ def term_assessments(
 
 
 def _assess_models(
-    original: Context, context: Context, noise: Noise, fitted: Sequence[int], bare: np.ndarray, fits: Sequence[Refit],
+    original: Context,
+    context: Context,
+    noise: Noise,
+    fitted: Sequence[int],
+    bare: np.ndarray,
+    fits: Sequence[Refit],
     units: Sequence[np.ndarray],
-) -> list[GapTest]:  # fmt: skip
-    """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the events of `context`.
+) -> list[GapTest]:
+    """Models with a term, at coordinates `units` (D,), beside the base model at `bare` (D,) on the
+    events of `context`.
 
     `original` has the same events; coordinates `fitted` were fitted to them.
     """
@@ -90,14 +105,22 @@ def _assess_models(
     terms = context.whiten(noise, np.array(apart))
 
     def assessed(fit: Refit, unit: np.ndarray) -> GapTest:
-        perturbations = compute_pushed_changes(original, carried_over(original, context, unit), (), noise)
+        perturbations = compute_pushed_changes(
+            original, carried_over(original, context, unit), (), noise
+        )
         changes = np.nan_to_num(np.concatenate([terms, perturbations]))
         return gap(context, bare, unit, fit.names, noise, fitted, changes=changes)
 
     return [assessed(fit, unit) for fit, unit in zip(fits, units, strict=True)]
 
 
-def list_tied_terms(result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]) -> list[TermAssessment]:
+def list_tied_terms(
+    result: TermFits, chosen: TermAssessment, others: Sequence[TermAssessment]
+) -> list[TermAssessment]:
     """Those that neither held-out events nor, by its better fit, the chosen one denies."""
     criteria = result.context.criteria
-    return [o for o in others if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)]
+    return [
+        o
+        for o in others
+        if o.stands(criteria) and not criteria.rejects(o.fit.cost - chosen.fit.cost)
+    ]

@@ -1,6 +1,8 @@
-"""The library of terms: what may act (a signal) where (a balance), declared once for the screen and for the plugin.
+"""The library of terms: what may act (a signal) where (a balance), declared once for the screen and
+for the plugin.
 
-Instants, levels, times and frequencies stand on grids that know nothing of any record; a shortlisted term's are freed.
+Instants, levels, times and frequencies stand on grids that know nothing of any record; a
+shortlisted term's are freed.
 """
 
 import functools
@@ -15,14 +17,17 @@ from tractexp.model.equations import Equations
 from tractexp.parameter import Parameter
 
 SOURCE = "a term proposed by the data; see docs/missing-effects.md"
-ANSWER, TIMED = "answer", "timed"  # kinds of signals: functions of voltage and states, and functions of time
+# kinds of signals: functions of voltage and states, and functions of time
+ANSWER, TIMED = "answer", "timed"
 
 Grid = tuple[float, ...]
 
 
 @dataclass(frozen=True)
 class Shape:
-    """A parameter of a signal: its values on the grid of the screen, its bounds, unit and symbol."""
+    """A parameter of a signal: its values on the grid of the screen, its bounds,
+    unit and symbol.
+    """
 
     name: str
     grid: Grid
@@ -39,7 +44,9 @@ class Shape:
 
 @dataclass(frozen=True)
 class Signal:
-    """What a term follows. `shape` is the function of `shapes`; `latex` formats its parameters' symbols by name."""
+    """What a term follows. `shape` is the function of `shapes`; `latex` formats its parameters'
+    symbols by name.
+    """
 
     name: str
     kind: str
@@ -54,8 +61,12 @@ class Signal:
 
     @property
     def settings(self) -> list[dict[str, float]]:
-        """Every combination of grid values; of phases the first, for two of them make one block of a screen."""
-        values = itertools.product(*(s.grid[:1] if s.name == "phase" else s.grid for s in self.shapes))
+        """Every combination of grid values; of phases the first, for two of them make one block of
+        a screen.
+        """
+        values = itertools.product(
+            *(s.grid[:1] if s.name == "phase" else s.grid for s in self.shapes)
+        )
         return [dict(zip((s.name for s in self.shapes), chosen, strict=True)) for chosen in values]
 
 
@@ -73,7 +84,8 @@ class Clock:
 
 @dataclass(frozen=True)
 class Size:
-    """How large a term is: `relevant` is what a linear step uses as its unit, `where` it acts if not in all.
+    """How large a term is: `relevant` is what a linear step uses as its unit, `where` it acts if
+    not in all.
 
     Signals are shares, so that `power_exponent` is that of what the size is added to.
     """
@@ -90,9 +102,16 @@ class Size:
         """As a parameter of an effect."""
         bounds = (-self.bound, self.bound)
         return Parameter(
-            default, bounds, self.unit, about, SOURCE, self.latex, null=0.0, power_exponent=self.power_exponent,
+            default,
+            bounds,
+            self.unit,
+            about,
+            SOURCE,
+            self.latex,
+            null=0.0,
+            power_exponent=self.power_exponent,
             name=name,
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -106,7 +125,8 @@ class Balance:
     places: tuple[sites.Site, ...] = ()
     in_waves: tuple[sites.Site, ...] | None = None  # where they are others
     kinds: tuple[str, ...] = (ANSWER,)
-    without: tuple[str, ...] = ("constant", "relay", "below")  # signals that make no sense here: a flux is not switched
+    # signals that make no sense here: a flux is not switched
+    without: tuple[str, ...] = ("constant", "relay", "below")
 
     @property
     def build(self) -> Callable[..., Any]:
@@ -128,14 +148,20 @@ class Term:
     @property
     def name(self) -> str:
         return ":".join(
-            (self.signal.kind, self.balance.name, self.signal.name, *([self.clock.name] if self.clock else []))
+            (
+                self.signal.kind,
+                self.balance.name,
+                self.signal.name,
+                *([self.clock.name] if self.clock else []),
+            )
         )
 
     def parameters(self, values: Mapping[str, float], prefix: str = "") -> list[Parameter]:
         """Its sizes and those of its signal, with these defaults; names begin with `prefix`."""
         where = self.balance.words
         sizes = [
-            s.parameter(prefix + s.name, f"size in {s.where or where}", values[s.name]) for s in self.balance.sizes
+            s.parameter(prefix + s.name, f"size in {s.where or where}", values[s.name])
+            for s in self.balance.sizes
         ]
         return sizes + [s.parameter(prefix + s.name, values[s.name]) for s in self.signal.shapes]
 
@@ -156,7 +182,9 @@ class Term:
 
 
 def size_of(kind: str, balance: Balance, size: Size) -> str:
-    """What the library's effect of a kind calls a size: of several, each is that of a balance of its own."""
+    """What the library's effect of a kind calls a size: of several, each is that of a balance of
+    its own.
+    """
     part = size.name.removeprefix("size")
     return f"{kind}_{balance.name}{part}_size"
 
@@ -196,22 +224,28 @@ _DELAYS = (0.0, 0.02, 0.05, 0.1, 0.2, 0.3)
 
 SIGNALS = (
     Signal("power", ANSWER, "a power of the voltage", r"(u^{a} - 1)",
-           (Shape("exponent", (-2.0, -1.0, 0.5, 1.0, 2.0, 3.0), (-4.0, 8.0), "1", "exponent", "a"),)),
-    Signal("knee", ANSWER, "what the voltage lacks to a level", r"[u_1 - u]_+", (_level(0.2, 0.99, _LEVELS, "u_1"),)),
+           (Shape("exponent", (-2.0, -1.0, 0.5, 1.0, 2.0, 3.0), (-4.0, 8.0), "1", "exponent",
+                  "a"),)),
+    Signal("knee", ANSWER, "what the voltage lacks to a level", r"[u_1 - u]_+",
+           (_level(0.2, 0.99, _LEVELS, "u_1"),)),
     Signal("knee_squared", ANSWER, "what the voltage lacks to a level, squared", r"[u_1 - u]_+^2",
            (_level(0.2, 0.99, _LEVELS, "u_1"),)),
     Signal("below", ANSWER, "a switch while the voltage is below a level", r"1_{u < u_1}",
            (_level(0.2, 0.985, _LEVELS, "u_1"),)),
     Signal("rate", ANSWER, "the slope of the voltage", r"\dot u"),
-    Signal("lag", ANSWER, "the voltage as a lag sees it", r"(x - 1),\quad T\,\dot x = u - x", (_time(_LAGS),)),
-    Signal("washout", ANSWER, "the voltage less what a lag sees of it", r"(u - x),\quad T\,\dot x = u - x",
+    Signal("lag", ANSWER, "the voltage as a lag sees it", r"(x - 1),\quad T\,\dot x = u - x",
            (_time(_LAGS),)),
-    Signal("relay", ANSWER, "a relay that trips below a level and returns", r"g,\quad g \in \{0, 1\}", (
+    Signal("washout", ANSWER, "the voltage less what a lag sees of it", r"(u - x),\quad T\,\dot x ="
+        r" u - x",
+           (_time(_LAGS),)),
+    Signal("relay", ANSWER, "a relay that trips below a level and returns", r"g,\quad g \in \{0,"
+        r" 1\}", (
         _level(0.3, 0.97, (0.55, 0.7, 0.8, 0.9), "u_1"),
-        Shape("margin", (0.03, 0.1), (0.005, 0.4), "1", "recovered is this much above the level", "h"),
+        Shape("margin", (0.03, 0.1), (0.005, 0.4), "1", "recovered is this much above the level",
+              "h"),
         Shape("delay", _DELAYS, (0.0, 1.0), "s", "time below the level before it trips", "T_1"),
-        Shape("wait", (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 5.0), (0.0, 10.0), "s",
-              "time back before it returns", "T_2"),
+        Shape("wait", (0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.7, 5.0),
+              (0.0, 10.0), "s", "time back before it returns", "T_2"),
         Shape("ramp", (0.03,), (0.0, 2.0), "s", "time in which it returns", "T_3"),
     )),
     Signal("field", ANSWER, "the square of the flux", rf"({_SQUARE} - 1)", needs="E"),
@@ -220,12 +254,15 @@ SIGNALS = (
            (_level(0.1, 0.99, (0.4, 0.5, 0.6, 0.7, 0.8, 0.9), "e_1"),), needs="E"),
     Signal("slip", ANSWER, "the slip", r"(s - s_0)", needs="omega"),
     Signal("slip_squared", ANSWER, "the square of the slip", r"(s^2 - s_0^2)", needs="omega"),
-    Signal("current", ANSWER, "the motor's current", r"(\frac{|I|}{|I_0|} - 1)", needs="stator_current"),
-    Signal("current_squared", ANSWER, "the square of the motor's current", r"(\frac{|I|^2}{|I_0|^2} - 1)",
+    Signal("current", ANSWER, "the motor's current", r"(\frac{|I|}{|I_0|} - 1)",
+           needs="stator_current"),
+    Signal("current_squared", ANSWER, "the square of the motor's current", r"(\frac{|I|^2}{|I_0|^2}"
+        r" - 1)",
            needs="stator_current"),
     Signal("constant", ANSWER, "a constant", ""),
     Signal("step", TIMED, "a step", r"1_{t \geq t_1}", (_instant(_spread(0.0, 1.8, 0.01)),)),
-    Signal("ramp", TIMED, "a straight line that begins", r"[t - t_1]_+", (_instant(_spread(0.0, 1.8, 0.04)),)),
+    Signal("ramp", TIMED, "a straight line that begins", r"[t - t_1]_+",
+           (_instant(_spread(0.0, 1.8, 0.04)),)),
     Signal("decay", TIMED, "a step that decays", r"1_{t \geq t_1}\,e^{-(t - t_1)/T}",
            (_instant(_spread(0.0, 0.9, 0.03)), _time((0.03, 0.1, 0.3)))),
     Signal("ring", TIMED, "an oscillation that begins and decays",
@@ -249,40 +286,132 @@ _Z = sites.stator_impedance
 _OWN_CURRENT = ("current", "current_squared", "relay", "below")
 _SWITCHED = ("constant",)
 BALANCES = (
-    Balance("power_P", "the active power", r"P \rightarrow P + k\,{g}", (_PU,), kinds=_ANY, without=_SWITCHED),
-    Balance("power_Q", "the reactive power", r"Q \rightarrow Q + k\,{g}", (_PU,), kinds=_ANY, without=_SWITCHED),
-    Balance("power", "active and reactive power", r"P + \mathrm{j} Q \rightarrow P + \mathrm{j} Q"
-            r" + (k_P + \mathrm{j} k_Q)\,{g}", _BOTH, kinds=_ANY, without=_SWITCHED),
-    Balance("whole", "the whole load by one share", r"P + \mathrm{j} Q \rightarrow (P + \mathrm{j} Q)(1 + k\,{g})",
-            (_SHARE,), without=_SWITCHED),
-    Balance("static", "the static load by one share",
-            r"P_s + \mathrm{j} Q_s \rightarrow (P_s + \mathrm{j} Q_s)(1 + k\,{g})", (_SHARE,),
-            (sites.P_static, sites.Q_static), without=_SWITCHED),
-    Balance("static_P", "the static load's active power", r"P_s \rightarrow P_s (1 + k\,{g})", (_SHARE,),
-            (sites.P_static,), without=_SWITCHED),
-    Balance("static_Q", "the static load's reactive power", r"Q_s \rightarrow Q_s (1 + k\,{g})", (_SHARE,),
-            (sites.Q_static,), without=_SWITCHED),
-    Balance("motor", "the motors' power by one share",
-            r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})", (_SHARE,),
-            (sites.P_motor, sites.Q_motor), (sites.motor_current,), without=_SWITCHED),
-    Balance("torque", "the load torque", r"T_L \rightarrow T_L + k\,{g}",
-            (Size("size", 20.0, "pu", 0.05, power_exponent=1),), (sites.load_torque,), without=_SWITCHED),
-    Balance("coupling", "the coupling of rotor and stator", r"c \rightarrow c\,(1 + k\,{g})",
-            (Size("size", 3.0, "1", 0.02),), (sites.coupling,)),
-    Balance("decay", "the decay of the rotor's flux", r"\frac{1}{\tau'} \rightarrow \frac{1}{\tau'}\,(1 + k\,{g})",
-            (Size("size", 60.0, "1", 0.05),), (sites.time_constant,)),
-    Balance("magnetizing", "the magnetizing reactance",
-            r"c \rightarrow c/(1 + k\,{g}),\quad \tau' \rightarrow \tau'/(1 + k\,{g})",
-            (Size("size", 10.0, "1", 0.05),), (sites.coupling, sites.time_constant)),
-    Balance("resistance", "the stator's resistance", r"Z' \rightarrow Z' + k\,{g}",
-            (Size("size", 0.5, "pu", 0.005, power_exponent=-1),), (_Z,), without=_OWN_CURRENT),
-    Balance("reactance", "the stator's reactance", r"Z' \rightarrow Z' + \mathrm{j} k\,{g}",
-            (Size("size", 0.5, "pu", 0.005, power_exponent=-1),), (_Z,), without=(*_OWN_CURRENT, "constant")),
-    Balance("angle", "the angle of the voltage", r"V \rightarrow V (1 + \mathrm{j} k\,{g})",
-            (Size("size", 2.0, "rad", 0.02),), (sites.motor_voltage,)),
-    Balance("voltage", "the voltage that the load sees", r"V \rightarrow V (1 + k\,{g})",
-            (Size("size", 0.5, "1", 0.005),), (sites.motor_voltage, sites.static_voltage), kinds=(TIMED,)),
-)  # fmt: skip
+    Balance(
+        "power_P",
+        "the active power",
+        r"P \rightarrow P + k\,{g}",
+        (_PU,),
+        kinds=_ANY,
+        without=_SWITCHED,
+    ),
+    Balance(
+        "power_Q",
+        "the reactive power",
+        r"Q \rightarrow Q + k\,{g}",
+        (_PU,),
+        kinds=_ANY,
+        without=_SWITCHED,
+    ),
+    Balance(
+        "power",
+        "active and reactive power",
+        r"P + \mathrm{j} Q \rightarrow P + \mathrm{j} Q"
+        r" + (k_P + \mathrm{j} k_Q)\,{g}",
+        _BOTH,
+        kinds=_ANY,
+        without=_SWITCHED,
+    ),
+    Balance(
+        "whole",
+        "the whole load by one share",
+        r"P + \mathrm{j} Q \rightarrow (P + \mathrm{j} Q)(1 + k\,{g})",
+        (_SHARE,),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "static",
+        "the static load by one share",
+        r"P_s + \mathrm{j} Q_s \rightarrow (P_s + \mathrm{j} Q_s)(1 + k\,{g})",
+        (_SHARE,),
+        (sites.P_static, sites.Q_static),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "static_P",
+        "the static load's active power",
+        r"P_s \rightarrow P_s (1 + k\,{g})",
+        (_SHARE,),
+        (sites.P_static,),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "static_Q",
+        "the static load's reactive power",
+        r"Q_s \rightarrow Q_s (1 + k\,{g})",
+        (_SHARE,),
+        (sites.Q_static,),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "motor",
+        "the motors' power by one share",
+        r"P_d + \mathrm{j} Q_d \rightarrow (P_d + \mathrm{j} Q_d)(1 + k\,{g})",
+        (_SHARE,),
+        (sites.P_motor, sites.Q_motor),
+        (sites.motor_current,),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "torque",
+        "the load torque",
+        r"T_L \rightarrow T_L + k\,{g}",
+        (Size("size", 20.0, "pu", 0.05, power_exponent=1),),
+        (sites.load_torque,),
+        without=_SWITCHED,
+    ),
+    Balance(
+        "coupling",
+        "the coupling of rotor and stator",
+        r"c \rightarrow c\,(1 + k\,{g})",
+        (Size("size", 3.0, "1", 0.02),),
+        (sites.coupling,),
+    ),
+    Balance(
+        "decay",
+        "the decay of the rotor's flux",
+        r"\frac{1}{\tau'} \rightarrow \frac{1}{\tau'}\,(1 + k\,{g})",
+        (Size("size", 60.0, "1", 0.05),),
+        (sites.time_constant,),
+    ),
+    Balance(
+        "magnetizing",
+        "the magnetizing reactance",
+        r"c \rightarrow c/(1 + k\,{g}),\quad \tau' \rightarrow \tau'/(1 + k\,{g})",
+        (Size("size", 10.0, "1", 0.05),),
+        (sites.coupling, sites.time_constant),
+    ),
+    Balance(
+        "resistance",
+        "the stator's resistance",
+        r"Z' \rightarrow Z' + k\,{g}",
+        (Size("size", 0.5, "pu", 0.005, power_exponent=-1),),
+        (_Z,),
+        without=_OWN_CURRENT,
+    ),
+    Balance(
+        "reactance",
+        "the stator's reactance",
+        r"Z' \rightarrow Z' + \mathrm{j} k\,{g}",
+        (Size("size", 0.5, "pu", 0.005, power_exponent=-1),),
+        (_Z,),
+        without=(*_OWN_CURRENT, "constant"),
+    ),
+    Balance(
+        "angle",
+        "the angle of the voltage",
+        r"V \rightarrow V (1 + \mathrm{j} k\,{g})",
+        (Size("size", 2.0, "rad", 0.02),),
+        (sites.motor_voltage,),
+    ),
+    Balance(
+        "voltage",
+        "the voltage that the load sees",
+        r"V \rightarrow V (1 + k\,{g})",
+        (Size("size", 0.5, "1", 0.005),),
+        (sites.motor_voltage, sites.static_voltage),
+        kinds=(TIMED,),
+    ),
+)
 
 
 @functools.cache

@@ -1,4 +1,6 @@
-"""The story of a proposal: screen the library at the base fit, refit the best, let held-out events and chance judge."""
+"""The story of a proposal: screen the library at the base fit, refit the best, let held-out events
+and chance judge.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -28,7 +30,9 @@ LOOKS_LIKE = 0.5  # of a term's change that a textbook effect could have made
 
 @dataclass(frozen=True)
 class Acting:
-    """When a term acts in one event: the times of the record [s] between which it changes the load, and how much."""
+    """When a term acts in one event: the times of the record [s] between which it changes the load,
+    and how much.
+    """
 
     event: str
     start: float
@@ -47,8 +51,10 @@ class Proposal:
     validate: GapTest
     p: float
     acting: tuple[Acting, ...]
-    ties: tuple[tuple[Term, float, float], ...]  # with the shares they explain on fitted and on held-out events
-    alike: tuple[tuple[str, float], ...]  # textbook effects, and the share of its change that each could have made
+    # with the shares they explain on fitted and on held-out events
+    ties: tuple[tuple[Term, float, float], ...]
+    # textbook effects, and the share of its change that each could have made
+    alike: tuple[tuple[str, float], ...]
     source: str  # of a plugin file
     next_event: NextEvent | None  # that would tell the terms apart
 
@@ -67,22 +73,32 @@ class ProposalResult:
 
 
 def propose(
-    base: BaseFit, first: Disagreement, bare: Refit, noise: Noise, validate: Sequence[Event], seed: int,
+    base: BaseFit,
+    first: Disagreement,
+    bare: Refit,
+    noise: Noise,
+    validate: Sequence[Event],
+    seed: int,
     among: Sequence[Term] = (),
-) -> ProposalResult:  # fmt: skip
-    """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the last tests.
+) -> ProposalResult:
+    """Search a term for what the model lacks; `bare` is the base model's fit, `noise` that of the
+    last tests.
 
     `among` are the terms that are tried, by default the whole library.
     """
     context = base.context
     if not validate:
-        return ProposalResult(why="a term is proposed only where a held-out event confirms it, and none was held out")
+        return ProposalResult(
+            why="a term is proposed only where a held-out event confirms it, and none was held out"
+        )
     under = context_of_terms(context)
     ground = Ground.at(under, carried_over(under, context, bare.unit), noise)
     context.effort.say("screening a library of terms")
     screened = screen(ground, among or terms(), seed, LIBRARY_DRAWS)
     context.effort.say("refitting the most promising terms")
-    result = term_fits(screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]])
+    result = term_fits(
+        screened, [carried_over(under, context, v) for v in base.minima_but(bare.unit)[:1]]
+    )
     context.effort.say("judging terms on the held-out events")
     lowered = [result.bare.deviance - fit.deviance for fit in result.fits]
     ranked = term_assessments(context, result, validate, [screened.p(drop) for drop in lowered])
@@ -91,38 +107,54 @@ def propose(
     if not standing:
         objections = join_words(ranked[0].objections(context.criteria))
         return ProposalResult(
-            None, f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}", tried
+            None,
+            f"of the terms tried the best is {result.term(ranked[0].fit).words}, but {objections}",
+            tried,
         )
     return ProposalResult(_proposal(result, first, standing, screened.ground), "", tried)
 
 
-def _proposal(result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], ground: Ground) -> Proposal:
+def _proposal(
+    result: TermFits, first: Disagreement, standing: Sequence[TermAssessment], ground: Ground
+) -> Proposal:
     chosen, *others = standing
     term, values = result.term(chosen.fit), result.values(chosen.fit)
     errors = standard_errors(result, chosen.fit)
-    estimates = tuple(ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values))
+    estimates = tuple(
+        ParameterEstimate(p, values[p.name], errors[p.name]) for p in term.parameters(values)
+    )
     records = join_words([e.record.name for e in result.context.events])
     alternatives = list_tied_terms(result, chosen, others)
     return Proposal(
-        term=term, estimates=estimates, train=chosen.train, validate=chosen.validate, p=chosen.p,
+        term=term,
+        estimates=estimates,
+        train=chosen.train,
+        validate=chosen.validate,
+        p=chosen.p,
         acting=tuple(_find_acting_places(result, chosen.fit)),
-        ties=tuple((result.term(o.fit), o.train.explained, o.validate.explained) for o in alternatives),
+        ties=tuple(
+            (result.term(o.fit), o.train.explained, o.validate.explained) for o in alternatives
+        ),
         alike=tuple(alike(result, chosen.fit, first)),
         source=generate.source(term, values, records),
         next_event=_next_event(result, [chosen.fit, *(o.fit for o in alternatives)]),
-    )  # fmt: skip
+    )
 
 
 def _next_event(result: TermFits, fits: Sequence[Refit]) -> NextEvent | None:
     """What to record to tell a term from its near-synonyms."""
     if len(fits) == 1:
         return None
-    return next_event(result.context, result.noise, result.bare, fits, [result.term(fit).words for fit in fits])
+    return next_event(
+        result.context, result.noise, result.bare, fits, [result.term(fit).words for fit in fits]
+    )
 
 
 def change(result: TermFits, fit: Refit) -> np.ndarray:
     """What a term adds to what is calculated (C, N) [pu], all else as it was fitted with it."""
-    without = result.context.coordinates.placed(fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))})
+    without = result.context.coordinates.placed(
+        fit.unit, {label: 0.0 for _, label in sizes_of(result.term(fit))}
+    )
     with_it, alone = result.context.residuals(np.array([fit.unit, without]), fit.names)
     return with_it - alone
 
@@ -138,13 +170,21 @@ def _find_acting_places(result: TermFits, fit: Refit) -> list[Acting]:
             t = event.record.t[event.record.samples - own.shape[1] :]
             most = float(own[channel][np.abs(own[channel]).argmax()])
             terms.append(
-                Acting(event.record.name, float(t[seen[0]]), float(t[seen[-1]]), context.drive.names[channel], most)
+                Acting(
+                    event.record.name,
+                    float(t[seen[0]]),
+                    float(t[seen[-1]]),
+                    context.drive.names[channel],
+                    most,
+                )
             )
     return terms
 
 
 def alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, float]]:
-    """Textbook effects that could make most of what a term changes, the base model giving way: best first."""
+    """Textbook effects that could make most of what a term changes, the base model giving way: best
+    first.
+    """
     context = result.context
     rows = context.whiten(result.noise, change(result, fit)[None])
     projection = first.projection
@@ -156,9 +196,13 @@ def alike(result: TermFits, fit: Refit, first: Disagreement) -> list[tuple[str, 
         gram = block @ block.T
         if np.diag(gram).max(initial=0.0) > 1e-12:
             side = block @ s
-            share = float(side @ np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ side / max(s @ s, 1e-300))
+            share = float(
+                side @ np.linalg.pinv(gram, rcond=1e-10, hermitian=True) @ side / max(s @ s, 1e-300)
+            )
             shares[column.candidate.name] = max(shares.get(column.candidate.name, 0.0), share)
-    return sorted(((n, v) for n, v in shares.items() if v >= LOOKS_LIKE), key=lambda pair: -pair[1])[:4]
+    return sorted(
+        ((n, v) for n, v in shares.items() if v >= LOOKS_LIKE), key=lambda pair: -pair[1]
+    )[:4]
 
 
 def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | None:
@@ -178,7 +222,10 @@ def to_dict(proposed: ProposalResult, plugin: str) -> Mapping[str, object] | Non
         "left": {role: gap.after.chi2_per_sample for role, gap in judged},
         "p": proposal.p,
         "when": [vars(a) for a in proposal.acting],
-        "ties": [_name_term(t) | {"explained": {"train": near, "validate": held}} for t, near, held in proposal.ties],
+        "ties": [
+            _name_term(t) | {"explained": {"train": near, "validate": held}}
+            for t, near, held in proposal.ties
+        ],
         "alike": dict(proposal.alike),
         "plugin": plugin,
     }

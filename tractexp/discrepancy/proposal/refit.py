@@ -1,7 +1,9 @@
-"""The shortlist refitted: the linear rank is none, for where something large is missing the base fit is biased.
+"""The shortlist refitted: the linear rank is none, for where something large is missing the base
+fit is biased.
 
-The best terms get their instants, levels and times from ever finer grids, then everything is fitted at once, from the
-base fit, from the same with what rests on its bounds moved into the middle, and from the base model's other valleys.
+The best terms get their instants, levels and times from ever finer grids, then everything is fitted
+at once, from the base fit, from the same with what rests on its bounds moved into the middle, and
+from the base model's other valleys.
 """
 
 import itertools
@@ -15,13 +17,22 @@ from tractexp.discrepancy.proposal.library import ANSWER, Shape, Term, term, ter
 from tractexp.discrepancy.proposal.screen import Ground, ScreenResult, TermScore, scores
 from tractexp.inference.context import Context
 from tractexp.inference.cores import each_apart
-from tractexp.inference.fitting import Refit, Start, best_of, off_bounds, refit, rough_refit, wide_refit
+from tractexp.inference.fitting import (
+    Refit,
+    Start,
+    best_of,
+    off_bounds,
+    refit,
+    rough_refit,
+    wide_refit,
+)
 from tractexp.inference.information import free_standard_errors
 from tractexp.noise import Noise
 
 MOST, ANSWERS = 30, 15  # terms refitted, and how many at least are functions of voltage and states
 MOST_ALIKE_TERMS = 4  # of one signal and clock at most, so that others are tried, too
-ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)  # of the zoom; of the distance to the grid's neighbors
+# of the zoom; of the distance to the grid's neighbors
+ROUNDS, FINER = 3, (-0.75, -0.5, -0.25, 0.25, 0.5, 0.75)
 EXACT_FIT_SHARE = 0.05  # of what the best explains: the terms that are fitted exactly
 MOST_EXACT_FITS = 6  # of them at most
 MOST_JUDGED_TERMS = 5  # of the best, that held-out events are asked about
@@ -51,7 +62,9 @@ class TermFits:
 
 
 def shortlist(screened: ScreenResult) -> list[TermScore]:
-    """The most promising terms, each at its best setting, so that no kind of signal crowds out the others."""
+    """The most promising terms, each at its best setting, so that no kind of signal crowds out the
+    others.
+    """
     best: dict[str, TermScore] = {}
     for scored in screened.scored:
         if scored.drop > 0:
@@ -69,7 +82,9 @@ def shortlist(screened: ScreenResult) -> list[TermScore]:
 
 
 def further(screened: ScreenResult, listed: Sequence[TermScore]) -> list[TermScore]:
-    """Further settings of terms, far from those listed on the grid of some parameter: peaks of their own."""
+    """Further settings of terms, far from those listed on the grid of some parameter: peaks of
+    their own.
+    """
     more: dict[str, list[TermScore]] = {f.term.name: [f] for f in listed}
     for scored in screened.scored:
         there = more.get(scored.term.name)
@@ -93,7 +108,9 @@ def zoom_settings(ground: Ground, scored: Sequence[TermScore]) -> list[TermScore
     best = list(scored)
     for turn in range(ROUNDS):
         for k in range(max((len(f.term.signal.shapes) for f in best), default=0)):
-            tried = [(i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)]
+            tried = [
+                (i, setting) for i, f in enumerate(best) for setting in _finer(f, k, 4.0**-turn)
+            ]
             again = scores(ground, [(best[i].term, setting) for i, setting in tried])
             for (i, _), other in zip(tried, again, strict=True):
                 if other.drop > best[i].drop:
@@ -115,12 +132,17 @@ def _finer(scored: TermScore, which: int, scale: float) -> list[dict[str, float]
 
 
 def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> TermFits:
-    """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms' coordinates."""
+    """Refit the shortlist; `local_minima` (D,) are other fits of the base model, in the terms'
+    coordinates.
+    """
     ground = screened.ground
     listed = shortlist(screened)
     chosen = zoom_settings(ground, [*listed, *further(screened, listed[:AGAIN])])
     likely = [f.term for f in chosen]
-    context, noise = with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))]), ground.noise
+    context, noise = (
+        with_terms(ground.context, [*likely, *(s for t in likely for s in siblings(t))]),
+        ground.noise,
+    )
     bare = refit(context, noise, [((), ground.unit)])[0]
     fits = rough_refit(context, noise, _starts(context, chosen, [ground.unit]))
     best = {f.names[0] for f in fits[:AGAIN]}
@@ -132,19 +154,31 @@ def term_fits(screened: ScreenResult, local_minima: Sequence[np.ndarray]) -> Ter
     fits = best_of([*fits, *(rough_refit(context, noise, moved) if moved else [])])
     fits = _searched_anew(context, noise, fits, 1, scattered=True)
     near = fits[0].cost + max(EXACT_FIT_SHARE * (bare.deviance - fits[0].deviance), 20.0)
-    exact = {f.names: f for f in refit(context, noise, [(f.names, f.unit) for f in fits[:MOST_EXACT_FITS] if f.cost <= near])}
+    exact = {
+        f.names: f
+        for f in refit(
+            context, noise, [(f.names, f.unit) for f in fits[:MOST_EXACT_FITS] if f.cost <= near]
+        )
+    }
     ranked = sorted((exact.get(f.names, f) for f in fits), key=lambda f: f.cost)
     return TermFits(context, noise, bare, tuple(ranked))
 
 
 def _searched_anew(
     context: Context, noise: Noise, fits: Sequence[Refit], most: int, *, scattered: bool = False
-) -> list[Refit]:  # fmt: skip
-    """The fits, with the shapes of the best terms searched over their grids and moved across their ranges."""
+) -> list[Refit]:
+    """The fits, with the shapes of the best terms searched over their grids and moved across their
+    ranges.
+    """
     again = ROUND_ABOUT if scattered else 0
 
     def anew(fit: Refit) -> list[Refit]:
-        return wide_refit(context, noise, [choose_grid_start(context, noise, fit), (fit.names, fit.unit)], again=again)
+        return wide_refit(
+            context,
+            noise,
+            [choose_grid_start(context, noise, fit), (fit.names, fit.unit)],
+            again=again,
+        )
 
     shaped = [f for f in fits[:most] if term(f.names[0]).signal.shapes]
     return best_of([*fits, *itertools.chain(*each_apart(anew, shaped, context.effort))])
@@ -166,9 +200,11 @@ def elsewhere(context: Context, noise: Noise, fit: Refit) -> list[Start]:
 
 
 def choose_grid_start(context: Context, noise: Noise, fit: Refit) -> Start:
-    """A start for a term at the best setting of its whole grid where the base model is that of its own refit.
+    """A start for a term at the best setting of its whole grid where the base model is that of its
+    own refit.
 
-    At the first fit of the base model, which something missing bends, another setting may have seemed the best.
+    At the first fit of the base model, which something missing bends, another setting may have
+    seemed the best.
     """
     chosen, _, there = _fit_without_term(context, noise, fit)
     best = max(scores(there, [(chosen, s) for s in chosen.signal.settings]), key=lambda f: f.drop)
@@ -176,25 +212,37 @@ def choose_grid_start(context: Context, noise: Noise, fit: Refit) -> Start:
     return fit.names, place(context.coordinates, fit.unit, chosen, best.setting, best.sizes)
 
 
-def _fit_without_term(context: Context, noise: Noise, fit: Refit) -> tuple[Term, dict[str, float], Ground]:
+def _fit_without_term(
+    context: Context, noise: Noise, fit: Refit
+) -> tuple[Term, dict[str, float], Ground]:
     """The term of a fit, its sizes and setting, and the ground of that fit without it."""
     chosen, at = term(fit.names[0]), context.coordinates
     values = values_of(at, fit.unit, chosen)
     return (
         chosen,
         values,
-        Ground.at(context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise),
+        Ground.at(
+            context, place(at, fit.unit, chosen, values, [0.0] * len(chosen.balance.sizes)), noise
+        ),
     )
 
 
-def _starts(context: Context, chosen: Sequence[TermScore], units: Sequence[np.ndarray]) -> list[Start]:
+def _starts(
+    context: Context, chosen: Sequence[TermScore], units: Sequence[np.ndarray]
+) -> list[Start]:
     """Each term at its one-step size on each of the base model's fits (D,)."""
     at = context.coordinates
-    return [((f.term.name,), place(at, unit, f.term, f.setting, f.sizes)) for f in chosen for unit in units]
+    return [
+        ((f.term.name,), place(at, unit, f.term, f.setting, f.sizes))
+        for f in chosen
+        for unit in units
+    ]
 
 
 def standard_errors(result: TermFits, fit: Refit) -> dict[str, float]:
-    """Of a term's parameters, by their own names, all else free beside them; infinite where nothing is known."""
+    """Of a term's parameters, by their own names, all else free beside them; infinite where nothing
+    is known.
+    """
     context, chosen = result.context, result.term(fit)
     at = context.coordinates
     own = at.parameters(fit.names)

@@ -1,8 +1,9 @@
 """The screen: what every term of the library would gain at the base fit, in one linear step.
 
-A term's column is what a small size of it changes, simulated along the fitted trajectory; thousands of them run side by
-side in the library's kernel, which costs less than assembling them of pushes. Columns are whitened and the base
-model's parameters, P0 and Q0 of each event and the faults of the measurement projected out. The rank is a shortlist.
+A term's column is what a small size of it changes, simulated along the fitted trajectory; thousands
+of them run side by side in the library's kernel, which costs less than assembling them of pushes.
+Columns are whitened and the base model's parameters, P0 and Q0 of each event and the faults of the
+measurement projected out. The rank is a shortlist.
 """
 
 import itertools
@@ -28,7 +29,9 @@ Batch = list[Members]
 
 @dataclass(frozen=True, eq=False)
 class Ground:
-    """A fit with all that may give way projected out. R = C N rows of the records, then those of the priors."""
+    """A fit with all that may give way projected out. R = C N rows of the records, then those of
+    the priors.
+    """
 
     context: Context  # of terms
     unit: np.ndarray  # (D,)
@@ -39,7 +42,9 @@ class Ground:
 
     @classmethod
     def at(cls, context: Context, unit: np.ndarray, noise: Noise) -> "Ground":
-        """At coordinates (D,). The base model's parameters give way though they rest on their bounds."""
+        """At coordinates (D,). The base model's parameters give way though they rest on their
+        bounds.
+        """
         raw, rows = context.linearize(unit, noise, context.coordinates.nuisances(()), ())
         Q = np.linalg.qr(rows[1:].T)[0]
         ground = cls(context, unit, noise, raw, Q, rows[0])
@@ -50,7 +55,9 @@ class Ground:
         return rows - (rows @ self.Q) @ self.Q.T
 
     def columns(self, points: np.ndarray, spans: np.ndarray, kind: str) -> np.ndarray:
-        """What points (n, D) of one kind of terms change for each unit of their size, whitened (n, C N)."""
+        """What points (n, D) of one kind of terms change for each unit of their size, whitened (n,
+        C N).
+        """
         raw = self.context.residuals(points, (kind,))
         raw -= self.raw
         raw /= spans[:, None, None]
@@ -59,8 +66,12 @@ class Ground:
     def drawn(self, seed: int, draws: int) -> np.ndarray:
         """Noise (draws, R), whitened and projected as the fit's residual is."""
         context = self.context
-        white = self.noise.draw_white(np.random.default_rng(seed), draws, context.drive, context.valid)
-        return self.off(np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1))
+        white = self.noise.draw_white(
+            np.random.default_rng(seed), draws, context.drive, context.valid
+        )
+        return self.off(
+            np.concatenate([white, np.zeros((draws, len(self.r) - white.shape[1]))], axis=1)
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +86,18 @@ class TermScore:
 
 @dataclass(frozen=True, eq=False)
 class ScreenResult:
-    """Every term of the library at every setting, the most promising first, and the best of each draw of noise (b,)."""
+    """Every term of the library at every setting, the most promising first, and the best of each
+    draw of noise (b,).
+    """
 
     ground: Ground
     scored: list[TermScore]
     chance: np.ndarray
 
     def p(self, drop: float) -> float:
-        """How often noise alone lowers the deviance as much by the best of the whole library: a Gumbel tail."""
+        """How often noise alone lowers the deviance as much by the best of the whole library: a
+        Gumbel tail.
+        """
         scale = max(float(self.chance.std()) * np.sqrt(6) / np.pi, 1e-9)
         location = float(self.chance.mean()) - np.euler_gamma * scale
         return float(-np.expm1(-np.exp(min(-(drop - location) / scale, 700.0))))
@@ -101,7 +116,10 @@ def screen(ground: Ground, terms: Sequence[Term], seed: int, draws: int) -> Scre
 
 def scores(ground: Ground, wanted: Sequence[tuple[Term, Setting]]) -> list[TermScore]:
     """Score terms at settings of their own, in this order; a phase is found, not given."""
-    by_key = {(s.term.name, _key(s.setting)): s for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))}
+    by_key = {
+        (s.term.name, _key(s.setting)): s
+        for s, _ in _scores(ground, wanted, np.zeros((0, len(ground.r))))
+    }
     return [by_key[t.name, _key({k: v for k, v in s.items() if k != "phase"})] for t, s in wanted]
 
 
@@ -112,14 +130,18 @@ def _key(setting: Setting) -> tuple:
 def _scores(
     ground: Ground, wanted: Sequence[tuple[Term, Setting]], noise: np.ndarray
 ) -> Iterator[tuple[TermScore, np.ndarray]]:
-    """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal share columns."""
+    """Each term with its score, and what noise (b, R) would give it (b,). Balances of a signal
+    share columns.
+    """
     ground.noise.prepare(ground.context.drive, ground.context.valid)
     scored = lambda batch: _batch(ground, batch, noise)  # noqa: E731
     return itertools.chain(*each_apart(scored, _batches(wanted), ground.context.effort))
 
 
 def _batches(wanted: Sequence[tuple[Term, Setting]]) -> list[Batch]:
-    """Terms at settings in batches of one kind whose columns are held at once; those of one signal together."""
+    """Terms at settings in batches of one kind whose columns are held at once; those of one signal
+    together.
+    """
     groups: dict[tuple, Members] = {}
     for t, s in wanted:
         groups.setdefault((t.signal.kind, t.signal.name, t.clock, _key(s)), []).append((t, s))
@@ -149,7 +171,10 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
                     key = (label, t.signal.name, t.clock, tuple(sorted(setting.items())))
                     if key not in index:
                         index[key] = len(points)
-                        sizes = [TERM_STEP * size.relevant if i == k else 0.0 for i in range(len(t.balance.sizes))]
+                        sizes = [
+                            TERM_STEP * size.relevant if i == k else 0.0
+                            for i in range(len(t.balance.sizes))
+                        ]
                         points.append(place(at, ground.unit, t, setting, sizes))
                         spans.append(TERM_STEP * size.relevant)
                     rows.append(index[key])
@@ -160,7 +185,8 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
     along = columns @ ground.Q[:seen]
     pairs = []
     for t, s, rows in blocks:
-        gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T  # what the nuisances explain taken away
+        # what the nuisances explain taken away
+        gram = columns[rows] @ columns[rows].T - along[rows] @ along[rows].T
         inverse = _inverse(gram, np.einsum("nr,nr->n", columns[rows], columns[rows]).max())
         sizes, chance = -inverse @ side[rows], drawn[rows]
         drops = (chance * (inverse @ chance)).sum(axis=0)
@@ -169,7 +195,9 @@ def _batch(ground: Ground, batch: Batch, noise: np.ndarray) -> list[tuple[TermSc
 
 
 def _inverse(gram: np.ndarray, whole: float) -> np.ndarray:
-    """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are none."""
+    """The pseudo-inverse (k, k); directions of which the nuisances leave nothing of `whole` are
+    none.
+    """
     if len(gram) == 1:
         return 1 / gram if gram[0, 0] > LEAST_COLUMN_SHARE * whole + 1e-12 else np.zeros((1, 1))
     values, vectors = np.linalg.eigh(gram)
@@ -189,8 +217,12 @@ def _build_term_score(t: Term, setting: Setting, sizes: np.ndarray, drop: float)
 
 
 def _within(score: TermScore) -> TermScore:
-    """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all of them."""
-    over = max(abs(k) / size.bound for k, size in zip(score.sizes, score.term.balance.sizes, strict=True))
+    """A score with sizes that its bounds allow: a column of nearly nothing needs a size beyond all
+    of them.
+    """
+    over = max(
+        abs(k) / size.bound for k, size in zip(score.sizes, score.term.balance.sizes, strict=True)
+    )
     if over <= 1:
         return score
     c = 1 / over

@@ -1,10 +1,13 @@
-"""What a term may follow, as expressions: each function is copied as it stands into the plugin file of a proposal.
+"""What a term may follow, as expressions: each function is copied as it stands into the plugin file
+of a proposal.
 
-Every function takes the equations and its parameters by name and gives a real expression that is 0 before the event.
-Functions of time take the clock that they count by: 0 at the instant from which it counts, less than 0 before.
+Every function takes the equations and its parameters by name and gives a real expression that is 0
+before the event. Functions of time take the clock that they count by: 0 at the instant from which
+it counts, less than 0 before.
 """
 
-SHARP, FALLEN, RISEN = 1e4, 0.02, 0.1  # of decisions; a dip is this deep; it ends when this share of it is back
+# of decisions; a dip is this deep; it ends when this share of it is back
+SHARP, FALLEN, RISEN = 1e4, 0.02, 0.1
 
 
 def step_at_zero(x):
@@ -134,12 +137,20 @@ def washout(eq, time):
 
 
 def relay(eq, level, margin, delay, wait, ramp):
-    """1 from when the voltage has been below a level for a delay; back along a ramp once it has been up for a while."""
+    """1 from when the voltage has been below a level for a delay; back along a ramp once it has
+    been up for a while.
+    """
     import sympy
 
     u = eq.U / eq.U0
-    low, up, gone = eq.memory("time_low", "t_-"), eq.memory("time_up", "t_+"), eq.memory("gone", "g")
-    fallen, risen = (sympy.Max(0, sympy.Min(1, x / 0.005 + 0.5)) for x in (level - u, u - level - margin))
+    low, up, gone = (
+        eq.memory("time_low", "t_-"),
+        eq.memory("time_up", "t_+"),
+        eq.memory("gone", "g"),
+    )
+    fallen, risen = (
+        sympy.Max(0, sympy.Min(1, x / 0.005 + 0.5)) for x in (level - u, u - level - margin)
+    )
     eq.renews(low, fallen * (low + eq.step), 0)
     eq.renews(up, risen * (up + eq.step), 0)
     goes = fallen * sympy.Max(0, sympy.Min(1, (low - delay) / eq.step + 1))
@@ -161,7 +172,9 @@ def field(eq):
 
 
 def field_knee(eq, level):
-    """What the square of the internal voltage, over that before the event, has beyond a level; less before."""
+    """What the square of the internal voltage, over that before the event, has beyond a level; less
+    before.
+    """
     from sympy import conjugate, re
 
     E, E_0 = eq["E"], eq.before(eq["E"])

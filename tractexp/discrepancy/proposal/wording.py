@@ -13,8 +13,10 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
     (term,) = proposal["terms"]
     explained = proposal["explained"]
     sentences = [
-        f"proposed: {term['words']}, which explains {percent(explained['train'])} of what exceeds the noise on the"
-        f" fitted events and {percent(explained['validate'])} on the held-out ones; {_numbers(term['parameters'])}",
+        f"proposed: {term['words']}, which explains {percent(explained['train'])} of what exceeds"
+        " the noise on the"
+        f" fitted events and {percent(explained['validate'])} on the held-out ones;"
+        f" {_numbers(term['parameters'])}",
     ]
     if not term["function_of_voltage"]:
         sentences.append("it is not a function of the voltage: something happened by itself")
@@ -22,7 +24,10 @@ def proposed_in_words(proposal: Mapping[str, Any] | None, why: str | None) -> li
         names = join_words([t["words"] for t in proposal["ties"]], "or")
         sentences.append(f"these events cannot tell it from {names}")
     if proposal["alike"]:
-        sentences.append(f"looks like it: {join_words([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}")
+        sentences.append(
+            "looks like it:"
+            f" {join_words([f'{n} ({percent(v)})' for n, v in proposal['alike'].items()])}"
+        )
     return sentences
 
 
@@ -33,7 +38,10 @@ def chance(p: float) -> str:
 
 def _numbers(parameters: Mapping[str, Mapping[str, Any]]) -> str:
     each: Sequence[str] = [
-        f"{n} = {with_error(p['value'], float('nan') if p['standard_error'] is None else p['standard_error'])}"
+        f"{n} = "
+        + with_error(
+            p["value"], float("nan") if p["standard_error"] is None else p["standard_error"]
+        )
         for n, p in parameters.items()
     ]
     return join_words(each)

@@ -27,7 +27,9 @@ TARGETS = tuple(10.0**k for k in range(2, -9, -1))
 
 @dataclass(frozen=True, eq=False, repr=False)
 class BenchmarkResult(Written):
-    """All runs on BBOB, and what they come to. `optimizers` holds the settings of each, by its name."""
+    """All runs on BBOB, and what they come to. `optimizers` holds the settings of each, by its
+    name.
+    """
 
     kind = "benchmark"
     page = "benchmark.html"
@@ -47,10 +49,15 @@ class BenchmarkResult(Written):
 
         bbob = self.bbob
         rows = [
-            [name, d, *(bbob.share(name, d, fs) for fs in (bbob.plan.functions, *bbob.groups().values())),
-             bbob.solved(name, d)]
-            for d in bbob.plan.dimensions for name in bbob.optimizers
-        ]  # fmt: skip
+            [
+                name,
+                d,
+                *(bbob.share(name, d, fs) for fs in (bbob.plan.functions, *bbob.groups().values())),
+                bbob.solved(name, d),
+            ]
+            for d in bbob.plan.dimensions
+            for name in bbob.optimizers
+        ]
         columns = ["optimizer", "dimension", "all", *map(span, bbob.groups().values()), "solved"]
         return Table(columns, rows, f"share of targets met, functions solved: {scale(bbob)}")
 
@@ -58,7 +65,11 @@ class BenchmarkResult(Written):
         from tractexp.studies.bbob import page
 
         sentences = [page.answer(self.bbob, d) for d in self.bbob.plan.dimensions]
-        return Report().add(self.table()).text(*sentences, *(f"- {sentence}" for sentence in self.sentences))
+        return (
+            Report()
+            .add(self.table())
+            .text(*sentences, *(f"- {sentence}" for sentence in self.sentences))
+        )
 
     def report(self) -> Report:
         from tractexp.studies.bbob import page
@@ -80,11 +91,15 @@ class BenchmarkResult(Written):
         from tractexp.studies.bbob.runs import BbobPlan, BbobRun, BbobRuns
 
         def run(row: Mapping[str, Any]) -> BbobRun:
-            return BbobRun(**{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])})
+            return BbobRun(
+                **{**row, "hits": tuple(np.inf if n is None else n for n in row["hits"])}
+            )
 
         plan = BbobPlan(*(_tuple(content[item.name]) for item in dataclasses.fields(BbobPlan)))
         titles = {int(function): title for function, title in content["titles"].items()}
-        bbob = BbobRuns(plan, tuple(content["optimizers"]), titles, [run(row) for row in content["runs"]])
+        bbob = BbobRuns(
+            plan, tuple(content["optimizers"]), titles, [run(row) for row in content["runs"]]
+        )
         return cls(bbob, content["optimizers"])
 
 
@@ -101,13 +116,16 @@ def benchmark(
     cores: int | None = None,
     progress: Any = None,
 ) -> BenchmarkResult:
-    """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any number of cores.
+    """Run optimizers on the noiseless functions of BBOB; the same seed gives the same runs on any
+    number of cores.
 
-    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names to call them by to
-    such. Each run may make `multiplier` evaluations per dimension; `targets` are distances to the optimum; `cores` None
-    means all. `progress`: None shows how many runs have ended, False does not; a callable is told of each.
+    `optimizers` is one as `tractexp.identify` takes it, a list of such, or a mapping of the names
+    to call them by to such. Each run may make `multiplier` evaluations per dimension; `targets` are
+    distances to the optimum; `cores` None means all. `progress`: None shows how many runs have
+    ended, False does not; a callable is told of each.
 
-    Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the extra [benchmark].
+    Raises `UserError` for wrong names or values, an optimizer that needs residuals, and without the
+    extra [benchmark].
     """
     from tractexp.studies.bbob.runs import BbobPlan, package, perform
 
@@ -118,26 +136,35 @@ def benchmark(
     for name, optimizer in built.items():
         if optimizer.polish:
             raise UserError(
-                f"optimizer {name} polishes by least squares, which need residuals that a BBOB function does not"
+                f"optimizer {name} polishes by least squares, which need residuals that a BBOB"
+                " function does not"
                 " have; set optimizer.polish=false"
             )
     package()
     ordered = tuple(sorted(targets, reverse=True))
-    plan = BbobPlan(tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed)
+    plan = BbobPlan(
+        tuple(functions), tuple(dimensions), tuple(instances), multiplier, ordered, seed
+    )
     with count_parts("runs", len(plan.cases) * len(built), progress) as count:
         bbob = perform(built, plan, cores, count)
     return BenchmarkResult(bbob, {one.name: one.node for one in chosen})
 
 
 def check(
-    functions: Sequence[int], instances: Sequence[int], dimensions: Sequence[int], multiplier: int,
-    targets: Sequence[float], cores: int | None,
-) -> None:  # fmt: skip
+    functions: Sequence[int],
+    instances: Sequence[int],
+    dimensions: Sequence[int],
+    multiplier: int,
+    targets: Sequence[float],
+    cores: int | None,
+) -> None:
     """Raise `UserError` for settings out of range."""
     numbers = {
-        "functions": (functions, 1, 24), "instances": (instances, 1, 10_000), "dimensions": (dimensions, 2, 100),
+        "functions": (functions, 1, 24),
+        "instances": (instances, 1, 10_000),
+        "dimensions": (dimensions, 2, 100),
         "targets": (targets, 1e-12, 1e12),
-    }  # fmt: skip
+    }
     for name, (values, low, high) in numbers.items():
         check_distinct(f"task.{name}", values)
         for value in values:
@@ -170,7 +197,14 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
     cores: int | None = None  # processes; null: all cores, one for a job of a sweep
 
     def check(self) -> None:
-        check(self.functions, self.instances, self.dimensions, self.multiplier, self.targets, self.cores)
+        check(
+            self.functions,
+            self.instances,
+            self.dimensions,
+            self.multiplier,
+            self.targets,
+            self.cores,
+        )
         if self.against:
             check_distinct("task.against", self.against)
         for name in self.against:
@@ -178,7 +212,9 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
 
     def perform(self, job: Job, **instead: Any) -> BenchmarkResult:
         cores = self.cores or (1 if job.of_many else None)
-        return super().perform(job, optimizers=self.optimizers(job), cores=cores, progress=None, **instead)
+        return super().perform(
+            job, optimizers=self.optimizers(job), cores=cores, progress=None, **instead
+        )
 
     def optimizers(self, job: Job) -> dict[str, Any]:
         """The optimizer of the job, and those it is set against as they are by default, by name."""
@@ -197,16 +233,26 @@ class Benchmark(Task, call=benchmark, given=("optimizers",)):
         from tractexp import tracking
 
         metrics = {
-            tracking.metric_name(f"share {name} {d}d"): result.bbob.share(name, d, result.bbob.plan.functions)
-            for name in result.bbob.optimizers for d in result.bbob.plan.dimensions
-        }  # fmt: skip
+            tracking.metric_name(f"share {name} {d}d"): result.bbob.share(
+                name, d, result.bbob.plan.functions
+            )
+            for name in result.bbob.optimizers
+            for d in result.bbob.plan.dimensions
+        }
         optimizer, seed = job.choices["optimizer"], str(job.seed)
         run = tracking.TrackedRun(
             experiment=node["experiment"] or "benchmark bbob",
             name=f"{optimizer} on BBOB",
-            parameters=tracking.flatten({key: job.config[key] for key in ("task", "optimizer", "seed")}),
+            parameters=tracking.flatten(
+                {key: job.config[key] for key in ("task", "optimizer", "seed")}
+            ),
             metrics=metrics,
-            tags={"task": "benchmark", "optimizer": optimizer, "seed": seed, "git_commit": provenance.commit()},
+            tags={
+                "task": "benchmark",
+                "optimizer": optimizer,
+                "seed": seed,
+                "git_commit": provenance.commit(),
+            },
             artifacts=paths,
             parent=job.sweep,
         )

@@ -28,7 +28,9 @@ MOST_TERMINAL_SENTENCES = 8  # sentences on the terminal; the page has all
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ComparisonResult(Written):
-    """A comparison. `content` is that of `comparison.json`; from `call`, the arguments, a loaded result is drawn."""
+    """A comparison. `content` is that of `comparison.json`; from `call`, the arguments, a loaded
+    result is drawn.
+    """
 
     kind = "comparison"
     page = "comparison.html"
@@ -45,7 +47,9 @@ class ComparisonResult(Written):
 
     @property
     def comparisons(self) -> "Mapping[str, Comparison]":
-        """The comparison on each problem, by the problem's name; that of one problem alone is called ""."""
+        """The comparison on each problem, by the problem's name; that of one problem alone is
+        called "".
+        """
         return getattr(self.comparison, "comparisons", {"": self.comparison})
 
     @property
@@ -67,21 +71,43 @@ class ComparisonResult(Written):
         several = self.content.get("problems")
         each = several or {self.content["problem"]: self.content}
         rows = [
-            [*([problem] if several else []), v["name"], v["failures"], v["objective"]["median"],
-             v["objective"]["worst"], v["at_floor"], v["ert"]["simulations"][_hardest(content["targets"])]]
-            for problem, content in each.items() for v in content["variants"]
-        ]  # fmt: skip
-        columns = ["variant", "failed", "median [pu²]", "worst [pu²]", "share at floor", "ERT [simulations]"]
-        return Table(["problem", *columns] if several else columns, rows, f"{self.source}: {', '.join(each)}")
+            [
+                *([problem] if several else []),
+                v["name"],
+                v["failures"],
+                v["objective"]["median"],
+                v["objective"]["worst"],
+                v["at_floor"],
+                v["ert"]["simulations"][_hardest(content["targets"])],
+            ]
+            for problem, content in each.items()
+            for v in content["variants"]
+        ]
+        columns = [
+            "variant",
+            "failed",
+            "median [pu²]",
+            "worst [pu²]",
+            "share at floor",
+            "ERT [simulations]",
+        ]
+        return Table(
+            ["problem", *columns] if several else columns, rows, f"{self.source}: {', '.join(each)}"
+        )
 
     def summary(self) -> Report:
         report, several = Report(), "problems" in self.content
         if several:
-            report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(*self._over_all())
+            report.text(f"{self.source}: {', '.join(self.content['problems'])}").add(
+                *self._over_all()
+            )
         else:
             report.add(self.table())
             target = min(self.content["targets"])
-            terms = "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations to"
+            terms = (
+                "objectives in pu² at the end of the search; at floor: within 1 %; ERT: simulations"
+                " to"
+            )
             report.text(f"{terms} {target:g} x floor", self.answer)
         shown = self.sentences if several else self.sentences[:MOST_TERMINAL_SENTENCES]
         report.text(*(f"- {sentence}" for sentence in [*shown, *self.content["notes"]]))
@@ -93,8 +119,15 @@ class ComparisonResult(Written):
         """What several problems come to under each of the terms, the best variants first."""
         for overall in getattr(self.comparison, "overall", ()):
             best = list(overall.figures.items())[:MOST_TERMINAL_SENTENCES]
-            cells = [[name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)] for name, values in best]
-            yield Table(["variant", *overall.columns], cells, f"{overall.terms}, {overall.where}: {overall.measure}")
+            cells = [
+                [name, *(f"{x:.0%}" if overall.share else f"{x:.3g}" for x in values)]
+                for name, values in best
+            ]
+            yield Table(
+                ["variant", *overall.columns],
+                cells,
+                f"{overall.terms}, {overall.where}: {overall.measure}",
+            )
 
     def report(self) -> Report:
         return _report(self.comparison).report(self.comparison, self.source)
@@ -104,7 +137,9 @@ class ComparisonResult(Written):
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        own = {key: value for key, value in content.items() if key not in ("call", "kind", "tractexp")}
+        own = {
+            key: value for key, value in content.items() if key not in ("call", "kind", "tractexp")
+        }
         return cls(content["call"], content["source"], own)
 
 
@@ -125,16 +160,19 @@ def compare(
     cores: int | None = None,
     progress: Any = None,
 ) -> ComparisonResult:
-    """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a `filter` finds.
+    """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a
+    `filter` finds.
 
-    The filter is MLflow's, over the store at `uri` (None: the current folder's) and one `experiment` (None: all).
-    `data` keeps the runs on one choice of data; runs on several are compared on each, and over all. So are those that
-    differ in the limits of a search named in `apart`, such as "budget". With `bbob` the variants are run on so many
-    instances of the functions of BBOB as well, on `cores` processes (None: all). `targets` are those of running times,
-    in multiples of the floor; objectives within the share `ties` of it count as equal; `floor` [pu²] is what the noise
-    leaves (None: what least squares reach from the ends of the runs and from many starts, or the best of all runs where
-    their records cannot be read any more). With a `reference` only its pairs are tested. `progress`: None shows how far
-    that is, False does not; a callable is told. Raises `UserError` where no runs are found, or their models differ.
+    The filter is MLflow's, over the store at `uri` (None: the current folder's) and one
+    `experiment` (None: all). `data` keeps the runs on one choice of data; runs on several are
+    compared on each, and over all. So are those that differ in the limits of a search named in
+    `apart`, such as "budget". With `bbob` the variants are run on so many instances of the
+    functions of BBOB as well, on `cores` processes (None: all). `targets` are those of running
+    times, in multiples of the floor; objectives within the share `ties` of it count as equal;
+    `floor` [pu²] is what the noise leaves (None: what least squares reach from the ends of the runs
+    and from many starts, or the best of all runs where their records cannot be read any more). With
+    a `reference` only its pairs are tested. `progress`: None shows how far that is, False does not;
+    a callable is told. Raises `UserError` where no runs are found, or their models differ.
     """
     check(sweep, filter, targets, ties, floor, apart, bbob)
     if filter is None:
@@ -142,25 +180,44 @@ def compare(
 
         sweep = str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
     call = {
-        "sweep": sweep, "filter": filter, "uri": uri, "experiment": experiment, "data": data,
-        "targets": list(targets), "ties": ties, "floor": floor, "reference": reference, "apart": list(apart),
+        "sweep": sweep,
+        "filter": filter,
+        "uri": uri,
+        "experiment": experiment,
+        "data": data,
+        "targets": list(targets),
+        "ties": ties,
+        "floor": floor,
+        "reference": reference,
+        "apart": list(apart),
         "bbob": bbob,
-    }  # fmt: skip
+    }
     source, comparison = _compare_gathered_runs(**call, cores=cores, progress=progress)
-    return ComparisonResult(call, source, _report(comparison).content(comparison, source), comparison)
+    return ComparisonResult(
+        call, source, _report(comparison).content(comparison, source), comparison
+    )
 
 
 def check(
-    sweep: Any, filter: str | None, targets: Sequence[float], ties: float, floor: float | None,
-    apart: Sequence[str] = (), bbob: int = 0,
-) -> None:  # fmt: skip
+    sweep: Any,
+    filter: str | None,
+    targets: Sequence[float],
+    ties: float,
+    floor: float | None,
+    apart: Sequence[str] = (),
+    bbob: int = 0,
+) -> None:
     """Raise `UserError` for settings out of range."""
     if sweep is not None and filter is not None:
-        raise UserError(f"{TASK.sweep} and {TASK.filter} are both given; the runs come from one or the other")
+        raise UserError(
+            f"{TASK.sweep} and {TASK.filter} are both given; the runs come from one or the other"
+        )
     if floor is not None and not 0 < floor < float("inf"):
         raise UserError(f"{TASK.floor}={floor:g} must be an objective above 0, in pu²")
     if not targets:
-        raise UserError(f"{TASK.targets} is empty; it lists multiples of the floor, such as [10,2,1.01]")
+        raise UserError(
+            f"{TASK.targets} is empty; it lists multiples of the floor, such as [10,2,1.01]"
+        )
     for target in targets:
         check_range("task.targets", target, 1.0)
     check_range("task.ties", ties, 0.0, 1.0)
@@ -181,10 +238,21 @@ def _hardest(targets: Sequence[float]) -> int:
 
 
 def _compare_gathered_runs(
-    *, sweep: str | None, filter: str | None, uri: str | None, experiment: str | None, data: str | None,
-    apart: Sequence[str] = (), bbob: int = 0, cores: int | None = None, progress: Any = False, **judging: Any,
-) -> "tuple[str, Comparison | Several]":  # fmt: skip
-    """Where the runs are from, and their comparison: of several problems each by itself and all together."""
+    *,
+    sweep: str | None,
+    filter: str | None,
+    uri: str | None,
+    experiment: str | None,
+    data: str | None,
+    apart: Sequence[str] = (),
+    bbob: int = 0,
+    cores: int | None = None,
+    progress: Any = False,
+    **judging: Any,
+) -> "tuple[str, Comparison | Several]":
+    """Where the runs are from, and their comparison: of several problems each by itself and all
+    together.
+    """
     from tractexp.studies.comparison import runs as gathering
     from tractexp.studies.comparison.judging import compare_runs, several
 
@@ -196,15 +264,18 @@ def _compare_gathered_runs(
         return source, compare_runs(gathering.gather(runs, source), progress, judging)
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
-            f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has {len(groups)}; leave it"
+            f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has"
+            f" {len(groups)}; leave it"
             f" out, or choose one by {TASK.data}"
         )
-    return source, several(groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress)
+    return source, several(
+        groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress
+    )
 
 
 def _runs(
     sweep: str | None, filter: str | None, uri: str | None, experiment: str | None
-) -> "tuple[list[SearchRun], str]":  # fmt: skip
+) -> "tuple[list[SearchRun], str]":
     """The runs, and where they are from in words."""
     from tractexp.studies.comparison import load
 
@@ -220,7 +291,9 @@ def _runs(
 
 @plugin
 class Compare(Task, call=compare, given=("uri", "experiment")):
-    """Settle which optimizer is better: tables, tests over paired seeds, charts, one page, sentences to quote."""
+    """Settle which optimizer is better: tables, tests over paired seeds, charts, one page,
+    sentences to quote.
+    """
 
     reads = ()
     instead = {"data": "choose among the runs by task.data"}
@@ -228,11 +301,14 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
     sweep: str | None = None  # folder of a sweep; null: the newest under outputs/sweeps
     filter: str | None = None  # instead: a filter over MLflow, "tags.data = 'tibet_50pct'"
     data: str | None = None  # compare the runs on this choice of data only
-    targets: list[float] = field(default_factory=lambda: list(TARGETS))  # of running times, times the floor
+    # of running times, times the floor
+    targets: list[float] = field(default_factory=lambda: list(TARGETS))
     ties: float = 1e-3  # objectives within this share of the floor count as equal in the tests
-    floor: float | None = None  # objective that the noise leaves; null: polished from the runs and many starts
+    # objective that the noise leaves; null: polished from the runs and many starts
+    floor: float | None = None
     reference: str | None = None  # test only against this variant; null: every pair
-    apart: list[str] = field(default_factory=list)  # limits that make comparisons of their own: [budget]
+    # limits that make comparisons of their own: [budget]
+    apart: list[str] = field(default_factory=list)
     bbob: int = 0  # instances of each function of BBOB on which the variants are run as well
     cores: int | None = None  # processes for these; null: all cores
 
@@ -241,10 +317,14 @@ class Compare(Task, call=compare, given=("uri", "experiment")):
 
     def perform(self, job: Job, **instead: Any) -> ComparisonResult:
         node = job.config["tracking"]
-        return super().perform(job, uri=node["uri"], experiment=node["experiment"], progress=None, **instead)
+        return super().perform(
+            job, uri=node["uri"], experiment=node["experiment"], progress=None, **instead
+        )
 
     def log(self, job: Job, result: ComparisonResult, paths: list[Path]) -> None:
-        """Put what was written into the sweep's folder, too, and the page on the sweep's run, where there is one."""
+        """Put what was written into the sweep's folder, too, and the page on the sweep's run, where
+        there is one.
+        """
         if result.folder is not None and result.folder != job.folder:
             print_paths(files.copy(path, result.folder / path.name) for path in paths)
         if job.config["tracking"]["enabled"]:
@@ -261,7 +341,12 @@ def _track(job: Job, result: ComparisonResult, paths: list[Path]) -> None:
         return  # the page is sent with the run of the sweep
     parent = parent_of(result.folder) if result.folder is not None else None
     comparisons = result.comparisons
-    records = {run.data for c in comparisons.values() for variant in c.gathered.variants for run in variant.runs}
+    records = {
+        run.data
+        for c in comparisons.values()
+        for variant in c.gathered.variants
+        for run in variant.runs
+    }
     data = records.pop() if len(records) == 1 else f"{len(records)} records"
     try:
         if parent is not None and attach(parent, job.store, paths):

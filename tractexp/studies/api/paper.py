@@ -23,16 +23,31 @@ if TYPE_CHECKING:
     from tractexp.studies.paper.study import Study
 
 PARTS = (
-    "table1", "table2", "table3", "table4", "table5", "figure3", "figure4", "figure6", "figure8", "figure9", "figure10",
-    "figure11", "equations", "readings",
-)  # fmt: skip
-HELD_OUT = {"interpolation": {"table4", "figure10"}, "extrapolation": {"table5", "figure11"}}  # what needs which dip
+    "table1",
+    "table2",
+    "table3",
+    "table4",
+    "table5",
+    "figure3",
+    "figure4",
+    "figure6",
+    "figure8",
+    "figure9",
+    "figure10",
+    "figure11",
+    "equations",
+    "readings",
+)
+# what needs which dip
+HELD_OUT = {"interpolation": {"table4", "figure10"}, "extrapolation": {"table5", "figure11"}}
 SEEDS = 30
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PaperResult(Written):
-    """The paper's claims with their verdicts. A loaded result measures its page again, from the records it holds."""
+    """The paper's claims with their verdicts. A loaded result measures its page again, from the
+    records it holds.
+    """
 
     kind = "paper"
     page = "paper.html"
@@ -58,7 +73,12 @@ class PaperResult(Written):
         from tractexp.studies.paper.claims import count_verdicts
 
         rows = [[claim.part, claim.text, claim.verdict, claim.measured] for claim in self.claims]
-        return Table(["where", "the paper's claim", "verdict", "measured"], rows, count_verdicts(self.claims), words=(1, 2, 3))
+        return Table(
+            ["where", "the paper's claim", "verdict", "measured"],
+            rows,
+            count_verdicts(self.claims),
+            words=(1, 2, 3),
+        )
 
     def summary(self) -> Report:
         return Report().add(self.table()).text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
@@ -74,17 +94,25 @@ class PaperResult(Written):
 
     def write_results(self, folder: Path) -> list[Path]:
         """paper.json: the claims and what was measured."""
-        content = {key: value for key, value in self.to_dict().items() if key not in ("setup", "seconds")}
+        content = {
+            key: value for key, value in self.to_dict().items() if key not in ("setup", "seconds")
+        }
         return [files.write_json(folder / "paper.json", content)]
 
     def drawings(self) -> Mapping[str, Drawing]:
-        return {**super().drawings(), "paper.md": lambda path: files.write(path, self._report.markdown)}
+        return {
+            **super().drawings(),
+            "paper.md": lambda path: files.write(path, self._report.markdown),
+        }
 
     def to_dict(self) -> dict[str, Any]:
         return {
-            "claims": [asdict(claim) for claim in self.claims], "settings": dict(self.settings),
-            "parts": list(self.parts), "seconds": self.seconds, "setup": self.setup.to_dict(),
-        }  # fmt: skip
+            "claims": [asdict(claim) for claim in self.claims],
+            "settings": dict(self.settings),
+            "parts": list(self.parts),
+            "seconds": self.seconds,
+            "setup": self.setup.to_dict(),
+        }
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
@@ -92,7 +120,13 @@ class PaperResult(Written):
 
         claims = [Claim(**claim) for claim in content["claims"]]
         seconds = content.get("seconds", 0.0)
-        return cls(Setup.from_dict(content["setup"]), content["settings"], content["parts"], claims, seconds=seconds)
+        return cls(
+            Setup.from_dict(content["setup"]),
+            content["settings"],
+            content["parts"],
+            claims,
+            seconds=seconds,
+        )
 
 
 @public
@@ -117,19 +151,34 @@ def paper(
 ) -> PaperResult:
     """Measure what the paper claims, on `records` fitted and on those of `validate`.
 
-    `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the paper's optimizers
-    searches under `seeds` seeds, on `workers` processes (None: one for each core). Everything else is as in
-    `tractexp.identify`. `progress`: None shows the stage, False does not; a callable is told each stage.
+    `parts` are tables and figures ("table2", "figure9", "equations"; none: all). Each of the
+    paper's optimizers searches under `seeds` seeds, on `workers` processes (None: one for each
+    core). Everything else is as in `tractexp.identify`. `progress`: None shows the stage, False
+    does not; a callable is told each stage.
 
-    Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not there.
+    Raises `UserError` for wrong names or values, and where a part needs a held-out dip that is not
+    there.
     """
     started = time.perf_counter()
     check(parts, seeds, workers)
     setup = Setup.of(
-        records, model, validate, objective, bounds=bounds, fixed=fixed, per_event=per_event, substeps=substeps,
-        seed=seed, budget=budget, time_limit=time_limit, target=target,
-    )  # fmt: skip
-    settings, chosen = {"seeds": seeds, "workers": workers}, [p for p in PARTS if p in parts or not parts]
+        records,
+        model,
+        validate,
+        objective,
+        bounds=bounds,
+        fixed=fixed,
+        per_event=per_event,
+        substeps=substeps,
+        seed=seed,
+        budget=budget,
+        time_limit=time_limit,
+        target=target,
+    )
+    settings, chosen = (
+        {"seeds": seeds, "workers": workers},
+        [p for p in PARTS if p in parts or not parts],
+    )
     with tell_stages(progress) as tell:
         study = _study(setup, **settings, tell=tell, count=_count_searches(tell))
         from tractexp.studies.paper.claims import claims
@@ -138,7 +187,9 @@ def paper(
             if needing & set(chosen):
                 study.held(kind)
         study.prepare(chosen)
-        return PaperResult(setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started)
+        return PaperResult(
+            setup, settings, chosen, claims(study, chosen), study, time.perf_counter() - started
+        )
 
 
 def check(parts: Sequence[str], seeds: int, workers: int | None) -> None:
@@ -154,10 +205,17 @@ def _study(setup: Setup, seeds: int, workers: int | None, **listeners: Any) -> "
 
     literal = replace(setup, model=setup.model.with_(integration="printed"))
     return Study(
-        recipe=setup.problem_of, literal=literal.problem_of,
-        node=asdict(setup.model), train=setup.train, held_out=setup.validate, seeds=seeds,
-        seed=setup.seed, workers=workers, limits=setup.limits, **listeners,
-    )  # fmt: skip
+        recipe=setup.problem_of,
+        literal=literal.problem_of,
+        node=asdict(setup.model),
+        train=setup.train,
+        held_out=setup.validate,
+        seeds=seeds,
+        seed=setup.seed,
+        workers=workers,
+        limits=setup.limits,
+        **listeners,
+    )
 
 
 def _count_searches(tell: Callable[[str], None]) -> Callable[[int, int], None]:
@@ -173,14 +231,17 @@ def _count_searches(tell: Callable[[str], None]) -> Callable[[int, int], None]:
 
 @plugin
 class Paper(Task, call=paper):
-    """Measure what the paper claims, on the shipped stand-ins or on records of your own: paper.json, .html and .md."""
+    """Measure what the paper claims, on the shipped stand-ins or on records of your own:
+    paper.json, .html and .md.
+    """
 
     resumes = True
     reads = ("data", "model", "objective", "budget", "time_limit", "target")
     instead = {"optimizer": "it compares the paper's three; task=generalise takes any"}
 
     parts: list[str] = field(default_factory=list)  # such as [table1,figure9]; empty: all
-    held_out: dict[str, list[str]] = field(default_factory=dict)  # {choice of data: files}; without data.validate
+    # {choice of data: files}; without data.validate
+    held_out: dict[str, list[str]] = field(default_factory=dict)
     docs: str | None = None  # write paper.md to this file too
 
     def check(self) -> None:

@@ -30,31 +30,39 @@ def sentences(benchmark: BbobRuns) -> list[str]:
         shares = {name: benchmark.share(name, d, plan.functions) for name in benchmark.optimizers}
         ranked = sorted(shares, key=lambda name: -shares[name])
         parts = [
-            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)} of"
+            f"{name} met {shares[name]:.0%} of the targets and solved {benchmark.solved(name, d)}"
+            " of"
             f" {len(plan.functions)} functions"
             for name in ranked
         ]
         sentences.append(
-            f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,} evaluations on each"
+            f"On BBOB in dimension {d}, {len(plan.instances)} runs of {plan.multiplier * d:,}"
+            " evaluations on each"
             f" function, {'; '.join(parts)}."
         )
     return sentences
 
 
 def shares(benchmark: BbobRuns, dimension: int) -> tuple[list[str], list[list[str]]]:
-    """Columns and rows: the share of targets met, in all and by group of functions, and the functions solved."""
+    """Columns and rows: the share of targets met, in all and by group of functions, and the
+    functions solved.
+    """
     groups = benchmark.groups()
     functions = benchmark.plan.functions
     rows = []
     for name in benchmark.optimizers:
-        parts = [benchmark.share(name, dimension, chosen) for chosen in (functions, *groups.values())]
+        parts = [
+            benchmark.share(name, dimension, chosen) for chosen in (functions, *groups.values())
+        ]
         solved = f"{benchmark.solved(name, dimension)} of {len(functions)}"
         rows.append([name, *(f"{part:.0%}" for part in parts), solved])
     return ["optimizer", "all", *groups, "solved"], rows
 
 
 def running_times(benchmark: BbobRuns, dimension: int, target: int) -> list[list[str]]:
-    """One row for each function: ERT in evaluations and the runs that met the target, for each optimizer."""
+    """One row for each function: ERT in evaluations and the runs that met the target, for each
+    optimizer.
+    """
     count = len(benchmark.plan.instances)
 
     def cell(optimizer: str, function: int) -> str:
@@ -70,12 +78,19 @@ def running_times(benchmark: BbobRuns, dimension: int, target: int) -> list[list
 def answer(benchmark: BbobRuns, dimension: int) -> str:
     """Which optimizer to take in one dimension, and where another did better."""
     functions = benchmark.plan.functions
-    best, *others = sorted(benchmark.optimizers, key=lambda name: -benchmark.share(name, dimension, functions))
+    best, *others = sorted(
+        benchmark.optimizers, key=lambda name: -benchmark.share(name, dimension, functions)
+    )
     share = f"{benchmark.share(best, dimension, functions):.0%}"
     if not others:
-        return f"{best} met {share} of the targets in dimension {dimension}; task.against=[NAME] sets it beside others."
+        return (
+            f"{best} met {share} of the targets in dimension {dimension}; task.against=[NAME] sets"
+            " it beside others."
+        )
     second = f"{benchmark.share(others[0], dimension, functions):.0%} of {others[0]}"
-    sentence = f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
+    sentence = (
+        f"Take {best} in dimension {dimension}: it met most targets, {share} against {second}."
+    )
     if share == second.partition(" ")[0]:
         sentence = f"{best} and {others[0]} met as many targets in dimension {dimension}, {share}."
     elsewhere = []
@@ -84,13 +99,19 @@ def answer(benchmark: BbobRuns, dimension: int) -> str:
         lead = max(shares, key=lambda name: shares[name])
         if shares[lead] > shares[best]:
             elsewhere.append(f"{group} ({lead} {shares[lead]:.0%}, {best} {shares[best]:.0%})")
-    return sentence + (f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else "")
+    return sentence + (
+        f" Another did better in a group of functions: {'; '.join(elsewhere)}." if elsewhere else ""
+    )
 
 
 def charts(benchmark: BbobRuns, dimension: int) -> dict[str, tuple[Chart, list[Chart]]]:
-    """The ECDF over all functions and over each group, {group or "all": the whole, and each where they are many}."""
+    """The ECDF over all functions and over each group, {group or "all": the whole, and each where
+    they are many}.
+    """
     groups = benchmark.groups()
-    chosen: Mapping[str, Iterable[int]] = {"all": benchmark.plan.functions} | (groups if len(groups) > 1 else {})
+    chosen: Mapping[str, Iterable[int]] = {"all": benchmark.plan.functions} | (
+        groups if len(groups) > 1 else {}
+    )
     drawn = {}
     for group, functions in chosen.items():
         hits = [benchmark.hits(name, dimension, functions) for name in benchmark.optimizers]
@@ -106,7 +127,9 @@ def span(functions: list[int]) -> str:
 
 def report(benchmark: BbobRuns) -> Report:
     plan = benchmark.plan
-    page = Report(f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}.")
+    page = Report(
+        f"Benchmark of {benchmark.optimizers[0]} on BBOB", f"{scale(benchmark)}; seed {plan.seed}."
+    )
     page.verdict(*(answer(benchmark, d) for d in plan.dimensions), *sentences(benchmark))
     for d in plan.dimensions:
         page.heading(f"Dimension {d}")
@@ -120,7 +143,8 @@ def _shares(page: Report, benchmark: BbobRuns, d: int) -> None:
     plan, drawn = benchmark.plan, charts(benchmark, d)
     page.table(
         *shares(benchmark, d),
-        f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g} from the optimum,"
+        f"Share of the {len(plan.targets)} targets, {plan.targets[0]:g} to {plan.targets[-1]:g}"
+        " from the optimum,"
         " met by all runs. Solved: functions on which every run met the last one.",
     )
     whole, each = drawn.pop("all")
@@ -143,7 +167,9 @@ def _times(page: Report, benchmark: BbobRuns, d: int) -> None:
     page.table(columns, running_times(benchmark, d, hardest), _caption(benchmark.plan, hardest))
     with page.folded("to the other targets"):
         for target in range(hardest):
-            page.table(columns, running_times(benchmark, d, target), _caption(benchmark.plan, target))
+            page.table(
+                columns, running_times(benchmark, d, target), _caption(benchmark.plan, target)
+            )
 
 
 def _caption(plan: Any, target: int) -> str:
@@ -153,39 +179,54 @@ def _caption(plan: Any, target: int) -> str:
 def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
-            "ERT, the expected running time, is what all runs spent until they met the target, those that did not all"
+            "ERT, the expected running time, is what all runs spent until they met the target,"
+            " those that did not all"
             " they had, per run that did; a dash where none did (Hansen et al. 2021, COCO).",
-            "A search that ends by itself is started again from new random numbers until the budget is spent. All"
+            "A search that ends by itself is started again from new random numbers until the budget"
+            " is spent. All"
             " optimizers have the same seeds.",
-            "Each optimizer has its own settings, tuned for nothing here. An evaluation counts when it is made, not at"
+            "Each optimizer has its own settings, tuned for nothing here. An evaluation counts when"
+            " it is made, not at"
             " the end of its iteration.",
-            "The functions are those of Hansen, Finck, Ros and Auger 2009 in the package ioh, searched on the box"
+            "The functions are those of Hansen, Finck, Ros and Auger 2009 in the package ioh,"
+            " searched on the box"
             " [-5, 5], from which no point is let out.",
         ]
     )
 
 
 def content(benchmark: BbobRuns, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """What `benchmark.json` holds: the plan, each optimizer's settings, every run; the same for the same seed.
+    """What `benchmark.json` holds: the plan, each optimizer's settings, every run; the same for the
+    same seed.
 
     Evaluations to a target that was not met, and running times to one that no run met, are None.
     """
     plan = benchmark.plan
     times = [
-        {"optimizer": name, "dimension": d, "function": f,
-         "ert": [benchmark.ert(name, d, f, k)[0] for k in range(len(plan.targets))]}
-        for name in benchmark.optimizers for d in plan.dimensions for f in plan.functions
-    ]  # fmt: skip
+        {
+            "optimizer": name,
+            "dimension": d,
+            "function": f,
+            "ert": [benchmark.ert(name, d, f, k)[0] for k in range(len(plan.targets))],
+        }
+        for name in benchmark.optimizers
+        for d in plan.dimensions
+        for f in plan.functions
+    ]
     summary = [
         {
             "optimizer": name,
             "dimension": d,
             "share": benchmark.share(name, d, plan.functions),
-            "groups": {group: benchmark.share(name, d, chosen) for group, chosen in benchmark.groups().items()},
+            "groups": {
+                group: benchmark.share(name, d, chosen)
+                for group, chosen in benchmark.groups().items()
+            },
             "solved": benchmark.solved(name, d),
         }
-        for name in benchmark.optimizers for d in plan.dimensions
-    ]  # fmt: skip
+        for name in benchmark.optimizers
+        for d in plan.dimensions
+    ]
     return files.plain(
         {
             **asdict(plan),

@@ -1,7 +1,8 @@
-"""Optimizers on BBOB, 24 functions with known optima that nobody here wrote. Needs the extra [benchmark].
+"""Optimizers on BBOB, 24 functions with known optima that nobody here wrote. Needs the extra
+[benchmark].
 
-Source: Hansen, Finck, Ros and Auger 2009 (the functions), as implemented by the package `ioh`; running times to targets
-and independent restarts as in Hansen et al. 2021 (COCO).
+Source: Hansen, Finck, Ros and Auger 2009 (the functions), as implemented by the package `ioh`;
+running times to targets and independent restarts as in Hansen et al. 2021 (COCO).
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -41,8 +42,8 @@ def package() -> Any:
 class Bbob:
     """One instance of one function as a problem of the search loop, on the box [-5, 5].
 
-    Notes the number of evaluations at which each target, given as a distance to the optimum (k,), was first met:
-    `hits` (k,), inf before.
+    Notes the number of evaluations at which each target, given as a distance to the optimum (k,),
+    was first met: `hits` (k,), inf before.
     """
 
     def __init__(self, function: int, dimension: int, instance: int, targets: Sequence[float]):
@@ -68,7 +69,8 @@ class Bbob:
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         raise UserError(
-            "a BBOB function is no sum of squares, so least squares have no residuals to work on; choose another"
+            "a BBOB function is no sum of squares, so least squares have no residuals to work on;"
+            " choose another"
             " optimizer, without optimizer.polish"
         )
 
@@ -98,7 +100,9 @@ class BbobPlan:
 
 @dataclass(frozen=True)
 class BbobRun:
-    """One optimizer on one instance of one function, with independent restarts until the budget was spent."""
+    """One optimizer on one instance of one function, with independent restarts until the budget was
+    spent.
+    """
 
     optimizer: str
     function: int
@@ -116,7 +120,9 @@ def seed_of(seed: int, *counts: int) -> int:
 
 
 def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobPlan) -> BbobRun:
-    """Search, and search again from new random numbers, until the last target is met or the budget spent."""
+    """Search, and search again from new random numbers, until the last target is met or the budget
+    spent.
+    """
     function, dimension, instance = case
     problem = Bbob(function, dimension, instance, plan.targets)
     budget, searches = plan.multiplier * dimension, 0
@@ -125,9 +131,13 @@ def run(name: str, optimizer: Optimizer, case: tuple[int, int, int], plan: BbobP
         result = search(problem, optimizer, seed_of(plan.seed, *case, searches), limits)
         searches += 1
         if not result.simulations:
-            raise UserError(f"optimizer {name} ended without a single evaluation; this is a fault of its plugin")
+            raise UserError(
+                f"optimizer {name} ended without a single evaluation; this is a fault of its plugin"
+            )
     distance = problem.best - problem.optimum
-    return BbobRun(name, *case, problem.evaluations, searches, distance, tuple(problem.hits.tolist()))
+    return BbobRun(
+        name, *case, problem.evaluations, searches, distance, tuple(problem.hits.tolist())
+    )
 
 
 def _run(job: tuple[str, Optimizer, tuple[int, int, int], BbobPlan]) -> BbobRun:
@@ -144,16 +154,21 @@ def perform(
 
     `count()` is called as each run ends.
     """
-    titles = {f: Bbob(f, plan.dimensions[0], plan.instances[0], plan.targets).name for f in plan.functions}
+    titles = {
+        f: Bbob(f, plan.dimensions[0], plan.instances[0], plan.targets).name for f in plan.functions
+    }
     jobs = [(name, it, case, plan) for case in plan.cases for name, it in optimizers.items()]
     runs = {}
     for _, r in Workers(cores or -1).completed(_run, jobs, len(jobs)):
         count()
         runs[r.optimizer, r.dimension, r.function, r.instance] = r
     ordered = [
-        runs[name, d, f, i] for name in optimizers for d in plan.dimensions for f in plan.functions
+        runs[name, d, f, i]
+        for name in optimizers
+        for d in plan.dimensions
+        for f in plan.functions
         for i in plan.instances
-    ]  # fmt: skip
+    ]
     return BbobRuns(plan, tuple(optimizers), titles, ordered)
 
 
@@ -169,15 +184,23 @@ class BbobRuns:
     def of(self, optimizer: str, dimension: int, functions: Iterable[int]) -> list[BbobRun]:
         """The runs of an optimizer in one dimension on some functions."""
         among = set(functions)
-        return [r for r in self.runs if (r.optimizer, r.dimension) == (optimizer, dimension) and r.function in among]
+        return [
+            r
+            for r in self.runs
+            if (r.optimizer, r.dimension) == (optimizer, dimension) and r.function in among
+        ]
 
     def groups(self) -> dict[str, list[int]]:
         """The functions of each of COCO's five groups, groups without any left out."""
-        chosen = {name: [f for f in self.plan.functions if f in group] for name, group in GROUPS.items()}
+        chosen = {
+            name: [f for f in self.plan.functions if f in group] for name, group in GROUPS.items()
+        }
         return {name: functions for name, functions in chosen.items() if functions}
 
     def hits(self, optimizer: str, dimension: int, functions: Iterable[int]) -> np.ndarray:
-        """Evaluations to every target in every run, (runs * targets,), sorted, inf where not met: an ECDF's steps."""
+        """Evaluations to every target in every run, (runs * targets,), sorted, inf where not met:
+        an ECDF's steps.
+        """
         return np.sort([n for r in self.of(optimizer, dimension, functions) for n in r.hits])
 
     def share(self, optimizer: str, dimension: int, functions: Iterable[int]) -> float:
@@ -190,7 +213,9 @@ class BbobRuns:
         return sum(all(np.isfinite(r.hits[-1]) for r in group) for group in runs.values())
 
     def ert(self, optimizer: str, dimension: int, function: int, target: int) -> tuple[float, int]:
-        """Expected running time in evaluations to the target of that index, and the runs that met it."""
+        """Expected running time in evaluations to the target of that index, and the runs that met
+        it.
+        """
         runs = self.of(optimizer, dimension, [function])
         spent = np.array([r.hits[target] for r in runs])
         reached = np.isfinite(spent)

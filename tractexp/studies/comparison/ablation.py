@@ -1,8 +1,10 @@
-"""What each switch of an optimizer does, alone and with the others, from whichever variants were run.
+"""What each switch of an optimizer does, alone and with the others, from whichever variants were
+run.
 
-Effects are contrasts within a block, of runs with the same seed or on the same function, in log10 of the objective:
-variants that differ in one switch give its main effect, four that differ in two give an interaction. No model is
-fitted, so what no contrast shows is said to be unknown rather than guessed.
+Effects are contrasts within a block, of runs with the same seed or on the same function, in log10
+of the objective: variants that differ in one switch give its main effect, four that differ in two
+give an interaction. No model is fitted, so what no contrast shows is said to be unknown rather than
+guessed.
 """
 
 from collections import defaultdict
@@ -20,7 +22,8 @@ On = frozenset[str]  # the switches that are on
 
 @dataclass(frozen=True)
 class SwitchEffect:
-    """By what factor switching on multiplies the objective; below 1 it helps. With a 95 % bootstrap interval.
+    """By what factor switching on multiplies the objective; below 1 it helps. With a 95 % bootstrap
+    interval.
 
     For an interaction, the factor by which one switch's factor changes when the other is on.
     """
@@ -29,9 +32,11 @@ class SwitchEffect:
     factor: float
     low: float
     high: float
-    contrasts: tuple[tuple[str, ...], ...]  # the variants behind it: (with, without) or (both, first, second, neither)
+    # the variants behind it: (with, without) or (both, first, second, neither)
+    contrasts: tuple[tuple[str, ...], ...]
     seeds: int  # or other blocks
-    better: tuple[float, float, float] | None = None  # of a main effect: share of pairs in which it helps, interval
+    # of a main effect: share of pairs in which it helps, interval
+    better: tuple[float, float, float] | None = None
 
     @property
     def shown(self) -> bool:
@@ -53,26 +58,35 @@ class Ablation:
 
 @dataclass(frozen=True)
 class VariantFamily:
-    """Variants of one optimizer that share all settings but switches, by the switches that are on."""
+    """Variants of one optimizer that share all settings but switches, by the switches
+    that are on.
+    """
 
     switches: tuple[str, ...]
     members: Mapping[On, str]  # names of variants
 
     def ablation(self, values: Mapping[str, np.ndarray]) -> Ablation | None:
-        """Effects from log10 of the objectives of each variant, (blocks,); None where no contrast can be made."""
+        """Effects from log10 of the objectives of each variant, (blocks,); None where no contrast
+        can be made.
+        """
         logs = {on: values[name] for on, name in self.members.items()}
         ablation = _Contrasts(dict(self.members), logs, self.switches).ablation()
         return ablation if ablation.effects else None
 
     def cost(self, spent: Mapping[str, float]) -> dict[str, float]:
         """What each switch adds, on average over its pairs, to what the variants spend."""
-        pairs = {s: [(on | {s}, on) for on in self.members if s not in on and on | {s} in self.members]
-                 for s in self.switches}  # fmt: skip
+        pairs = {
+            s: [(on | {s}, on) for on in self.members if s not in on and on | {s} in self.members]
+            for s in self.switches
+        }
         name = self.members
         return {
-            s: float(np.mean([spent[name[with_]] - spent[name[without]] for with_, without in rows]))
-            for s, rows in pairs.items() if rows
-        }  # fmt: skip
+            s: float(
+                np.mean([spent[name[with_]] - spent[name[without]] for with_, without in rows])
+            )
+            for s, rows in pairs.items()
+            if rows
+        }
 
 
 def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFamily | None:
@@ -80,7 +94,11 @@ def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFami
 
     `plain` says which optimizer another one is with all its switches off.
     """
-    families = [members for optimizer, without in plain.items() for members in _families(variants, optimizer, without)]
+    families = [
+        members
+        for optimizer, without in plain.items()
+        for members in _families(variants, optimizer, without)
+    ]
     largest = max(families, key=len, default={})
     if len(largest) < 2:
         return None
@@ -89,7 +107,8 @@ def family(variants: Sequence[Variant], plain: Mapping[str, str]) -> VariantFami
 
 
 def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) -> Ablation | None:
-    """Effects from the variants of one optimizer that share all settings but switches; None where there are none.
+    """Effects from the variants of one optimizer that share all settings but switches; None where
+    there are none.
 
     Objectives count from `least` upwards. Seeds that not all of the variants finished are left out.
     """
@@ -100,11 +119,15 @@ def ablate(variants: Sequence[Variant], plain: Mapping[str, str], least: float) 
     seeds = sorted(set.intersection(*({run.seed for run in v.finished} for v in members)))
     if not seeds:
         return None
-    return chosen.ablation({v.name: np.log10([max(v.objectives[s], least) for s in seeds]) for v in members})
+    return chosen.ablation(
+        {v.name: np.log10([max(v.objectives[s], least) for s in seeds]) for v in members}
+    )
 
 
 def _families(variants: Sequence[Variant], optimizer: str, plain: str) -> list[dict[On, Variant]]:
-    """Variants of `optimizer` by the switches that are on, one dictionary for each set of other settings."""
+    """Variants of `optimizer` by the switches that are on, one dictionary for each set of other
+    settings.
+    """
     own = sorted((v for v in variants if v.settings.get("name") == optimizer), key=lambda v: v.name)
     without = [v for v in variants if plain and v.settings.get("name") == plain]
     flags = {k for v in own for k, value in v.settings.items() if isinstance(value, bool)}
@@ -143,17 +166,23 @@ class _Contrasts:
             for contrasts in (single, company, double)
         )
         unknown = tuple(key for key, rows in (single | double).items() if not rows)
-        return Ablation(self.switches, tuple(self.names.values()), effects, changes, interactions, unknown)
+        return Ablation(
+            self.switches, tuple(self.names.values()), effects, changes, interactions, unknown
+        )
 
     def _effect(self, switches: tuple[str, ...], contrasts: list[tuple[On, ...]]) -> SwitchEffect:
-        """Signs alternate as in a factorial design: with - without, or both - first - second + neither."""
+        """Signs alternate as in a factorial design: with - without, or both - first - second +
+        neither.
+        """
         simple = len(contrasts[0]) == 2
         signs = np.array((1.0, -1.0) if simple else (1.0, -1.0, -1.0, 1.0))
         shifts = np.array([signs @ [self.logs[on] for on in row] for row in contrasts])
         logs = shifts.mean(axis=0)
         low, high = bootstrap(logs)
         names = tuple(tuple(self.names[on] for on in row) for row in contrasts)
-        effect = SwitchEffect(switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs))
+        effect = SwitchEffect(
+            switches, 10.0 ** float(logs.mean()), 10.0**low, 10.0**high, names, len(logs)
+        )
         if not simple:
             return effect
         wins = np.mean((shifts < 0) + 0.5 * (shifts == 0), axis=0)
@@ -163,10 +192,14 @@ class _Contrasts:
         return self._existing([(on | {switch}, on) for on in self.logs if switch not in on])
 
     def _squares(self, a: str, b: str) -> list[tuple[On, ...]]:
-        return self._existing([(on | {a, b}, on | {a}, on | {b}, on) for on in self.logs if not {a, b} & on])
+        return self._existing(
+            [(on | {a, b}, on | {a}, on | {b}, on) for on in self.logs if not {a, b} & on]
+        )
 
     def _ends(self, switch: str) -> list[tuple[On, ...]]:
-        """The pair with most other switches on, then the pair with fewest; nothing where there is one company only."""
+        """The pair with most other switches on, then the pair with fewest; nothing where there is
+        one company only.
+        """
         pairs = sorted(self._pairs(switch), key=lambda pair: (len(pair[1]), sorted(pair[1])))
         return [(*pairs[-1], *pairs[0])] if pairs and len(pairs[-1][1]) > len(pairs[0][1]) else []
 

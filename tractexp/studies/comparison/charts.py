@@ -1,4 +1,6 @@
-"""The charts of a comparison. Few variants have a color each; of many the first have, and the others are gray."""
+"""The charts of a comparison. Few variants have a color each; of many the first have, and the
+others are gray.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -20,13 +22,16 @@ ROUND = (1, 2, 3, 5), (1, 1.5, 2, 3, 4, 5, 6, 8)  # times a power of ten
 DOT_JITTER = 0.3  # of a row: dots of equal height hide each other
 INSIDE, OUTSIDE = style.PALETTE[0], style.PALETTE[1]
 Curves = Sequence[tuple[np.ndarray, np.ndarray]]
-Blank = Callable[[str, int | None], Chart]  # title and height -> a chart without curves, its axes as the others'
+# title and height -> a chart without curves, its axes as the others'
+Blank = Callable[[str, int | None], Chart]
 
 
 def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, list[Chart]]:
-    """Median and quartile band of the best objective by "iterations" or "simulations", where a run finished.
+    """Median and quartile band of the best objective by "iterations" or "simulations", where a run
+    finished.
 
-    The whole; and where there are more variants than colors, one for each with the first behind it in gray.
+    The whole; and where there are more variants than colors, one for each with the first behind it
+    in gray.
     """
     variants = [variant for variant in variants if variant.finished]
     names, bands = [v.name for v in variants], [band(v, by) for v in variants]
@@ -38,29 +43,52 @@ def fitness(variants: Sequence[Variant], by: str, floor: Floor) -> tuple[Chart, 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
         label = "best objective [pu²]" if not title else "pu²"
         chart = Chart(
-            by, [label], log_x=counted, log_y=True, hover="closest", title=title, pixels=pixels, legend=not title
+            by,
+            [label],
+            log_x=counted,
+            log_y=True,
+            hover="closest",
+            title=title,
+            pixels=pixels,
+            legend=not title,
         )
         chart.limits(0, low / (high / low) ** 0.06, high).level(floor.value, "floor")
         return chart.limits(None, first, last)
 
     curves = [(b.x, b.median) for b in bands]
-    whole = _draw_curves_together(blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands)
+    whole = _draw_curves_together(
+        blank("", _height(names)), names, curves, [] if len(names) > TOGETHER else bands
+    )
     return whole, _draw_curves_apart(blank, names, curves, bands) if len(names) > TOGETHER else []
 
 
 def ecdf(variants: Sequence[Variant], floor: Floor) -> tuple[Chart, list[Chart]]:
     """The share of all targets that all runs of a variant have reached, by simulations."""
-    return runtime_curves([v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations")
+    return runtime_curves(
+        [v.name for v in variants], [runtimes(v, floor) for v in variants], "simulations"
+    )
 
 
-def runtime_curves(names: Sequence[str], costs: Sequence[np.ndarray], label: str) -> tuple[Chart, list[Chart]]:
-    """The ECDF of runtimes, sorted, inf where a target was not reached; `label` says what they are counted in."""
+def runtime_curves(
+    names: Sequence[str], costs: Sequence[np.ndarray], label: str
+) -> tuple[Chart, list[Chart]]:
+    """The ECDF of runtimes, sorted, inf where a target was not reached; `label` says what they are
+    counted in.
+    """
     reached = np.concatenate([cost[np.isfinite(cost)] for cost in costs])
     first, last = (reached.min(), reached.max()) if len(reached) else (1.0, 10.0)
 
     def blank(title: str = "", pixels: int | None = None) -> Chart:
         share = "share of targets reached" if not title else "share"
-        chart = Chart(label, [share], log_x=True, hover="closest", title=title, pixels=pixels, legend=not title)
+        chart = Chart(
+            label,
+            [share],
+            log_x=True,
+            hover="closest",
+            title=title,
+            pixels=pixels,
+            legend=not title,
+        )
         return chart.limits(0, 0, 1.02).limits(None, first, 1.1 * last)
 
     curves = [_shares(cost, first, 1.1 * last) for cost in costs]
@@ -75,10 +103,15 @@ def _shares(cost: np.ndarray, first: float, last: float) -> tuple[np.ndarray, np
 
 
 def targets_in_words() -> str:
-    return f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times the floor"
+    return (
+        f"{len(ECDF_TARGETS)} targets from {ECDF_TARGETS[0]:.0f} to {ECDF_TARGETS[-1]:.2f} times"
+        " the floor"
+    )
 
 
-def _draw_curves_together(chart: Chart, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> Chart:
+def _draw_curves_together(
+    chart: Chart, names: Sequence[str], curves: Curves, bands: Sequence[Band]
+) -> Chart:
     """All curves in one chart, the first ones in color and on top; bands where they are given."""
     for name, (x, y) in list(zip(names, curves, strict=True))[TOGETHER:]:
         chart.line(name, x, y, style.BEHIND, step=True, legend=False)
@@ -95,7 +128,9 @@ def _height(names: Sequence[str]) -> int:
     return 310 + 22 * (letters // 36)
 
 
-def _draw_curves_apart(blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]) -> list[Chart]:
+def _draw_curves_apart(
+    blank: Blank, names: Sequence[str], curves: Curves, bands: Sequence[Band]
+) -> list[Chart]:
     """One small chart for each curve, the first curve behind it."""
     charts = []
     for k, (name, (x, y)) in enumerate(zip(names, curves, strict=True)):
@@ -108,42 +143,65 @@ def _draw_curves_apart(blank: Blank, names: Sequence[str], curves: Curves, bands
 
 
 def spread(variants: Sequence[Variant], floor: Floor) -> Chart:
-    """Where every finished run ended, one row for each variant, with the median and the quartiles of each."""
+    """Where every finished run ended, one row for each variant, with the median and the quartiles
+    of each.
+    """
     variants = [variant for variant in variants if variant.finished]
     chart = _rows("objective [pu²]", [v.name for v in variants], log=True)
     dots = [(run, row + shift) for row, v in enumerate(variants) for run, shift in _spread_runs(v)]
-    labels = [f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots]
+    labels = [
+        f"{run.optimizer}, seed {run.seed}: {number(run.objective, 4)} pu²" for run, _ in dots
+    ]
     ends = np.array([run.objective for run, _ in dots])
     chart.points("every run", ends, [y for _, y in dots], style.FAINT, size=4, hover=labels)
     ended = [[run.objective for run in v.finished] for v in variants]
     lower, middle, upper = np.array([np.quantile(values, (0.25, 0.5, 0.75)) for values in ended]).T
     labels = [f"{v.name}: median {number(m, 4)} pu²" for v, m in zip(variants, middle, strict=True)]
     chart.points(
-        "median and quartiles", middle, np.arange(len(variants)), style.PALETTE[0], hover=labels,
-        spans=np.column_stack((lower, upper)), symbol="diamond", size=9,
-    )  # fmt: skip
+        "median and quartiles",
+        middle,
+        np.arange(len(variants)),
+        style.PALETTE[0],
+        hover=labels,
+        spans=np.column_stack((lower, upper)),
+        symbol="diamond",
+        size=9,
+    )
     margin = max(ends.max() / floor.value, 1.2) ** 0.04
     low, high = min(floor.value, ends.min()) / margin, ends.max() * margin
     # Plotly's own are as long as 0.4 times 10 to the -4
     if high < DECADE * low and len(at := round_numbers(low, high)) > 2:
-        chart.ticks(None, at, [f"{value:.1e}".replace(".0", "").replace("e-0", "e-") for value in at])
+        chart.ticks(
+            None, at, [f"{value:.1e}".replace(".0", "").replace("e-0", "e-") for value in at]
+        )
     return chart.edge(floor.value, dash="dash").limits(None, low, high)
 
 
 def round_numbers(low: float, high: float) -> list[float]:
-    few, more = ([m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high] for marks in ROUND)
+    few, more = (
+        [m * 10.0**k for k in range(-20, 5) for m in marks if low <= m * 10.0**k <= high]
+        for marks in ROUND
+    )
     return few if len(few) > 2 else more
 
 
 def _spread_runs(variant: Variant) -> list[tuple[SearchRun, float]]:
-    """The finished runs with a share of a row by which each is moved, so that equal ones are seen."""
+    """The finished runs with a share of a row by which each is moved, so that equal
+    ones are seen.
+    """
     done = variant.finished
     return list(zip(done, DOT_JITTER * np.cos(2.4 * np.arange(len(done))), strict=True))
 
 
 def _rows(label: str, names: Sequence[str], *, log: bool = False) -> Chart:
     """A chart with a row for each name, the first on top."""
-    chart = Chart(label, [""], log_x=log, pixels=140 + ROW[len(names) <= TOGETHER] * len(names), hover="closest")
+    chart = Chart(
+        label,
+        [""],
+        log_x=log,
+        pixels=140 + ROW[len(names) <= TOGETHER] * len(names),
+        hover="closest",
+    )
     return chart.ticks(0, range(len(names)), names).limits(0, len(names) - 0.4, -0.6)
 
 
@@ -168,17 +226,33 @@ def _about(values: Sequence[float]) -> tuple[float, float]:
 
 def parameters(variants: Sequence[Variant], polished: Polished) -> Chart:
     """The parameters at which every run ended, a panel for each, and where the floor's lie."""
-    variants = [variant for variant in variants if any(run in polished.reached for run in variant.finished)]
+    variants = [
+        variant for variant in variants if any(run in polished.reached for run in variant.finished)
+    ]
     names = list(polished.parameters)
-    labels = [f"{name} [{polished.units[name]}]" if polished.units[name] != "1" else name for name in names]
+    labels = [
+        f"{name} [{polished.units[name]}]" if polished.units[name] != "1" else name
+        for name in names
+    ]
     turned = sum(4 + len(v.name) for v in variants) > 40  # characters side by side on a phone
     room = 6 * max(len(v.name) for v in variants) if turned else 0
     chart = Chart("", labels, pixels=100 + PANEL * len(names) + room, hover="closest")
-    dots = [(run, k + shift) for k, v in enumerate(variants) for run, shift in _spread_runs(v) if run in polished.reached]
+    dots = [
+        (run, k + shift)
+        for k, v in enumerate(variants)
+        for run, shift in _spread_runs(v)
+        if run in polished.reached
+    ]
     for panel, name in enumerate(names):
-        for inside, label, color in ((False, "elsewhere", OUTSIDE), (True, "in the floor's valley", INSIDE)):
+        for inside, label, color in (
+            (False, "elsewhere", OUTSIDE),
+            (True, "in the floor's valley", INSIDE),
+        ):
             some = [(run, x) for run, x in dots if polished.in_valley(run) is inside]
-            labels = [f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}" for run, _ in some]
+            labels = [
+                f"{run.optimizer}, seed {run.seed}: {name} {run.parameters[name]:.4g}"
+                for run, _ in some
+            ]
             values = [run.parameters[name] for run, _ in some]
             chart.points(label, [x for _, x in some], values, color, panel, size=5, hover=labels)
         floor = polished.parameters[name]

@@ -32,30 +32,46 @@ def answer(comparison: Comparison) -> str:
     best, *others = comparison.leaders
     if len(comparison.summaries) < 2:
         return f"There is one variant only, {best}: nothing to choose from."
-    if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(len(comparison.pairs)):
+    if max((pair.seeds for pair in comparison.pairs), default=0) < seeds_needed(
+        len(comparison.pairs)
+    ):
         lowest = f"{_list_names([best, *others])} have" if others else f"{best} has"
-        return f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so far."
+        return (
+            f"Not settled: there are too few seeds to test. {lowest} the lowest median objective so"
+            " far."
+        )
     if (tested := _best_tested(comparison)) != best:
         advice = _advice(comparison, tested, [])
-        return f"{best} has the lowest median objective, but too few seeds to test. Of the others: {advice}"
+        return (
+            f"{best} has the lowest median objective, but too few seeds to test. Of the others:"
+            f" {advice}"
+        )
     return _advice(comparison, best, others)
 
 
 def _best_tested(comparison: Comparison) -> str:
     """The best of the variants that had seeds enough for a test; of all where none had."""
     tested = {name for pair in comparison.pairs for name in (pair.first, pair.second)}
-    return next((s.name for s in comparison.summaries if s.name in tested), comparison.summaries[0].name)
+    return next(
+        (s.name for s in comparison.summaries if s.name in tested), comparison.summaries[0].name
+    )
 
 
 def _advice(comparison: Comparison, best: str, others: list[str]) -> str:
-    """Whether to take the variant whose median is lowest, or as low as those of others and reached sooner."""
+    """Whether to take the variant whose median is lowest, or as low as those of others and reached
+    sooner.
+    """
     beaten, worse, alike = _verdicts(comparison, best)
     if worse:
-        return f"Not settled: {best} has the lowest median objective, but {_list_names(worse)} did better seed by seed."
+        return (
+            f"Not settled: {best} has the lowest median objective, but {_list_names(worse)} did"
+            " better seed by seed."
+        )
     rivals = [name for name in alike if name not in others]
     if rivals:
         return (
-            f"Take {best}, or as well {_list_names(rivals)}: these runs do not tell them apart.{_spent(comparison, best)}"
+            f"Take {best}, or as well {_list_names(rivals)}: these runs do not tell them"
+            f" apart.{_spent(comparison, best)}"
         )
     why = [f"it ends as low as {_list_names(others)}, sooner"] if others else []
     why += [f"it ends lower than {_list_names(beaten)}"] if beaten else []
@@ -73,11 +89,15 @@ def _spent(comparison: Comparison, best: str) -> str:
 
 
 def _verdicts(comparison: Comparison, name: str) -> tuple[list[str], list[str], list[str]]:
-    """The variants that one is significantly better than, those it is worse than, and those it is not told from."""
+    """The variants that one is significantly better than, those it is worse than, and those it is
+    not told from.
+    """
     own = [pair for pair in comparison.pairs if name in (pair.first, pair.second)]
     beaten = [pair.second for pair in own if pair.significant and pair.first == name]
     worse = [pair.first for pair in own if pair.significant and pair.second == name]
-    alike = [pair.second if pair.first == name else pair.first for pair in own if not pair.significant]
+    alike = [
+        pair.second if pair.first == name else pair.first for pair in own if not pair.significant
+    ]
     return beaten, worse, alike
 
 
@@ -87,18 +107,25 @@ def headline(comparison: Comparison) -> str:
     best, *others = comparison.leaders
     if others:
         within = f"equal within {comparison.ties:.2%} of the floor"
-        said = f"{_list_names([best, *others])} reach the lowest median objective ({within}); {best}, the fastest of them,"
+        said = (
+            f"{_list_names([best, *others])} reach the lowest median objective ({within}); {best},"
+            " the fastest of them,"
+        )
     else:
         said = f"{best} has the lowest median objective; it"
     beaten, worse, alike = _verdicts(comparison, best)
     verdicts = [f"is significantly better than {_list_names(beaten)}"] if beaten else []
-    verdicts += [f"is significantly worse than {_list_names(worse)} over paired seeds"] if worse else []
+    verdicts += (
+        [f"is significantly worse than {_list_names(worse)} over paired seeds"] if worse else []
+    )
     verdicts += [f"shows no significant difference to {_list_names(alike)}"] if alike else []
     return f"{said} {' and '.join(verdicts) or 'was not tested'}."
 
 
 def near_and_far(comparison: Comparison) -> tuple[list[VariantPair], list[VariantPair]]:
-    """The pairs with the reference, or with the best variant tested where there is none; and the others."""
+    """The pairs with the reference, or with the best variant tested where there is none; and the
+    others.
+    """
     chosen = comparison.reference or _best_tested(comparison)
     near = [pair for pair in comparison.pairs if chosen in (pair.first, pair.second)]
     return near, [pair for pair in comparison.pairs if pair not in near]
@@ -112,21 +139,28 @@ def of_pair(comparison: Comparison, pair: VariantPair) -> str:
     """One pair of variants, as it may be quoted."""
     one, two = (comparison.gathered[name] for name in (pair.first, pair.second))
     spent = [Spread.of([run.simulations[-1] for run in v.finished]) for v in (one, two)]
-    first, second = (f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians)
+    first, second = (
+        f"{number(median)} pu²" if np.isfinite(median) else "no result" for median in pair.medians
+    )
     if len({x for s in spent for x in (s.best, s.worst)}) == 1:
         start = f"On {pair.seeds} seeds and {number(spent[0].median)} simulations, "
-        reached = f"{pair.first} reaches a median objective of {first} against {second} for {pair.second}"
+        reached = (
+            f"{pair.first} reaches a median objective of {first} against {second} for {pair.second}"
+        )
     else:
         start = f"On {pair.seeds} seeds, "
         reached = (
-            f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)} simulations "
+            f"{pair.first} reaches a median objective of {first} with {number(spent[0].median)}"
+            " simulations "
             f"(median) against {second} with {number(spent[1].median)} for {pair.second}"
         )
     verdict = "is significant" if pair.significant else "is not significant"
     tests = len(comparison.pairs)
     return (
-        f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over {tests} "
-        f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A = {pair.effect:.2f})."
+        f"{start}{reached}; the difference {verdict} (Wilcoxon signed-rank, Holm-corrected over"
+        f" {tests} "
+        f"{'pair' if tests == 1 else 'pairs'}, p = {p_value(pair.corrected)}; Vargha-Delaney A ="
+        f" {pair.effect:.2f})."
     )
 
 
@@ -140,11 +174,15 @@ def of_ranks(comparison: Comparison) -> str:
     more = f" and {len(order) - 5} more up to {max(ranks.mean):.2f}" if len(order) > 5 else ""
     differ = "differ" if ranks.p < SIGNIFICANCE_LEVEL else "do not differ significantly"
     text = (
-        f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f}, {len(order) - 1} "
+        f"Over {ranks.seeds} seeds the mean ranks {differ} (Friedman chi-square = {ranks.chi2:.2f},"
+        f" {len(order) - 1} "
         f"degrees of freedom, p = {p_value(ranks.p)}): {listed}{more}"
     )
     if ranks.p < SIGNIFICANCE_LEVEL:
-        text += f"; two ranks differ significantly at {SIGNIFICANCE_LEVEL:.0%} when {ranks.critical_difference:.2f} or more apart"
+        text += (
+            f"; two ranks differ significantly at {SIGNIFICANCE_LEVEL:.0%} when"
+            f" {ranks.critical_difference:.2f} or more apart"
+        )
         text += " (Nemenyi)"
     return text + "."
 
@@ -156,7 +194,9 @@ def of_speed(comparison: Comparison) -> str:
     goal = f"{target:g} times the floor of {number(comparison.floor.value)} pu²"
     if np.isinf(rows[0][0]):
         return f"No variant ever reached {goal}."
-    said = [f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)]
+    said = [
+        f"{name} needs {number(float(round(ert)))}" for ert, name in rows[:4] if np.isfinite(ert)
+    ]
     text = f"To reach {goal}, {', '.join(said)} simulations in expectation (ERT)"
     never = [name for ert, name in rows if np.isinf(ert)]
     return text + (f"; {_list_names(never)} never did." if never else ".")
@@ -169,11 +209,20 @@ def of_floor(comparison: Comparison) -> str:
 
 
 def of_valley(comparison: Comparison) -> str:
-    """How often a search ended where the floor's values are only a descent away; "" where that is not known."""
-    rows = [(s.in_valley, s.runs - s.failures, s.name) for s in comparison.summaries if s.in_valley is not None]
+    """How often a search ended where the floor's values are only a descent away; "" where that is
+    not known.
+    """
+    rows = [
+        (s.in_valley, s.runs - s.failures, s.name)
+        for s in comparison.summaries
+        if s.in_valley is not None
+    ]
     if not rows:
         return ""
-    return f"Runs that ended in the floor's valley, from where least squares reach it: {_describe_shares(rows)}."
+    return (
+        "Runs that ended in the floor's valley, from where least squares reach it:"
+        f" {_describe_shares(rows)}."
+    )
 
 
 def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
@@ -185,17 +234,29 @@ def _describe_shares(rows: list[tuple[float, int, str]]) -> str:
 
 def of_effect(effect: SwitchEffect) -> str:
     (switch,) = effect.switches
-    verdict = "no effect is shown" if not effect.shown else "it helps" if effect.factor < 1 else "it harms"
+    verdict = (
+        "no effect is shown"
+        if not effect.shown
+        else "it helps"
+        if effect.factor < 1
+        else "it harms"
+    )
     return (
-        f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean over "
-        f"{effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to {number(effect.high)}, from "
+        f"Switching on {switch} multiplies the objective by {number(effect.factor)} (geometric mean"
+        " over "
+        f"{effect.seeds} seeds, 95 % bootstrap interval {number(effect.low)} to"
+        f" {number(effect.high)}, from "
         f"{_listed_contrasts(effect)}): {verdict}."
     )
 
 
 def _listed_contrasts(effect: SwitchEffect) -> str:
     pairs = [f"{with_} against {without}" for with_, without in effect.contrasts]
-    return " and ".join(pairs) if len(pairs) < 3 else f"{len(pairs)} pairs of variants that differ in it alone"
+    return (
+        " and ".join(pairs)
+        if len(pairs) < 3
+        else f"{len(pairs)} pairs of variants that differ in it alone"
+    )
 
 
 def of_unknown(ablation: Ablation) -> str:
@@ -204,8 +265,10 @@ def of_unknown(ablation: Ablation) -> str:
         return ""
     names = "; ".join(" with ".join(key) for key in ablation.unknown)
     return (
-        f"Not to be had from these {len(ablation.variants)} variants: {names}. A main effect takes two variants that "
-        "differ in that switch alone, an interaction of two switches takes four that differ in those alone."
+        f"Not to be had from these {len(ablation.variants)} variants: {names}. A main effect takes"
+        " two variants that "
+        "differ in that switch alone, an interaction of two switches takes four that differ in"
+        " those alone."
     )
 
 

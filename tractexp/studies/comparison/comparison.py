@@ -1,4 +1,6 @@
-"""The whole comparison: summaries, tests over paired seeds, ranks, the ablation, and what may be said of them."""
+"""The whole comparison: summaries, tests over paired seeds, ranks, the ablation, and what may be
+said of them.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,7 +33,8 @@ class VariantPair:
     medians: tuple[float, float]  # objective, failures counted as inf
     p: float  # Wilcoxon signed-rank, two-sided
     corrected: float  # p after Holm's correction over all pairs tested
-    effect: float  # Vargha-Delaney A: the probability that a run of `first` ends lower than one of `second`
+    # Vargha-Delaney A: the probability that a run of `first` ends lower than one of `second`
+    effect: float
 
     @property
     def significant(self) -> bool:
@@ -40,7 +43,9 @@ class VariantPair:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What `comparison.json` and `comparison.html` show. Summaries: lowest median first, of equal ones fastest."""
+    """What `comparison.json` and `comparison.html` show. Summaries: lowest median first, of equal
+    ones fastest.
+    """
 
     gathered: Gathered
     floor: Floor
@@ -77,33 +82,55 @@ def compare(
     polished: Polished | None = None,
     why_not: str = "",
 ) -> Comparison:
-    """Compare variants; with a `reference`, only its pairs are tested. `plain`: see `ablation.ablate`.
+    """Compare variants; with a `reference`, only its pairs are tested. `plain`: see
+    `ablation.ablate`.
 
-    `polished` gives the floor, unless `floor` does; `why_not` says why there is no such. A failed run counts as worse
-    than any other. Raises `UserError` for an unknown reference.
+    `polished` gives the floor, unless `floor` does; `why_not` says why there is no such. A failed
+    run counts as worse than any other. Raises `UserError` for an unknown reference.
     """
     if reference is not None:
         reference = gathered[reference].name
-    low = floor_of([run for variant in gathered.variants for run in variant.runs], floor, polished, why_not)
+    low = floor_of(
+        [run for variant in gathered.variants for run in variant.runs], floor, polished, why_not
+    )
     least = (1 + ties) * low.value
     summaries = [summarize(variant, low, targets, polished) for variant in gathered.variants]
     hardest = int(np.argmin(targets))
-    summaries.sort(key=lambda s: (*_measure_standing(s.objective.median, least), s.ert["simulations"][hardest], s.name))
+    summaries.sort(
+        key=lambda s: (
+            *_measure_standing(s.objective.median, least),
+            s.ert["simulations"][hardest],
+            s.name,
+        )
+    )
     pairs, notes = _pairs(gathered.variants, least, reference)
     ranks, more = _ranks(gathered.variants, least)
     ablation = ablate(gathered.variants, plain or {}, least)
     if floor is not None and polished is not None and polished.objective < (1 - ties) * floor:
         notes.append(
-            f"task.floor={floor:g} lies above what least squares reach from many starts, {polished.objective:.5g} pu²."
+            f"task.floor={floor:g} lies above what least squares reach from many starts,"
+            f" {polished.objective:.5g} pu²."
         )
     everything = (*gathered.notes, *notes, *more)
     return Comparison(
-        gathered, low, polished, tuple(targets), ties, tuple(summaries), pairs, ranks, ablation, reference, everything
+        gathered,
+        low,
+        polished,
+        tuple(targets),
+        ties,
+        tuple(summaries),
+        pairs,
+        ranks,
+        ablation,
+        reference,
+        everything,
     )
 
 
 def seeds_needed(pairs: int) -> int:
-    """The fewest seeds by which a difference can pass Wilcoxon's test where so many pairs are corrected for."""
+    """The fewest seeds by which a difference can pass Wilcoxon's test where so many pairs are
+    corrected for.
+    """
     return int(np.floor(np.log2(2 * pairs / SIGNIFICANCE_LEVEL))) + 1 if pairs else LEAST_SEEDS
 
 
@@ -119,23 +146,33 @@ def _pairs(
         return (), [f"There is one variant only, {variants[0].name}: nothing to test it against."]
     chosen = [(a, b) for a, b in combinations(variants, 2) if reference in (None, a.name, b.name)]
     common = [sorted({*a.objectives} & {*b.objectives}) for a, b in chosen]
-    enough = [(a, b, seeds) for (a, b), seeds in zip(chosen, common, strict=True) if len(seeds) >= LEAST_SEEDS]
+    enough = [
+        (a, b, seeds)
+        for (a, b), seeds in zip(chosen, common, strict=True)
+        if len(seeds) >= LEAST_SEEDS
+    ]
     notes = []
     if len(enough) < len(chosen):
         short = min(zip(common, chosen, strict=True), key=lambda row: len(row[0]))
         names = " and ".join(variant.name for variant in short[1])
         notes.append(
-            f"{len(chosen) - len(enough)} of {len(chosen)} pairs were not tested, for want of seeds: {names} have "
-            f"{len(short[0])} in common, and the Wilcoxon signed-rank test needs at least {LEAST_SEEDS} to reach "
+            f"{len(chosen) - len(enough)} of {len(chosen)} pairs were not tested, for want of"
+            f" seeds: {names} have "
+            f"{len(short[0])} in common, and the Wilcoxon signed-rank test needs at least"
+            f" {LEAST_SEEDS} to reach "
             f"{SIGNIFICANCE_LEVEL:.0%}; run more, such as 'seed=range(0,30)'."
         )
     tested = [_pair(*row, least) for row in enough]
     corrected = holm([pair.p for pair in tested])
-    pairs = [VariantPair(**{**vars(pair), "corrected": float(p)}) for pair, p in zip(tested, corrected, strict=True)]
+    pairs = [
+        VariantPair(**{**vars(pair), "corrected": float(p)})
+        for pair, p in zip(tested, corrected, strict=True)
+    ]
     needed = seeds_needed(len(tested))
     if tested and max(pair.seeds for pair in tested) < needed:
         notes.append(
-            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no difference at {SIGNIFICANCE_LEVEL:.0%}, "
+            f"With {len(tested)} pairs corrected for, fewer than {needed} seeds can show no"
+            f" difference at {SIGNIFICANCE_LEVEL:.0%}, "
             "however large: run more seeds, or test against one variant by task.reference=NAME."
         )
     return tuple(sorted(pairs, key=lambda pair: (pair.corrected, pair.first, pair.second))), notes
@@ -147,7 +184,9 @@ def _pair(a: Variant, b: Variant, seeds: Sequence[int], least: float) -> Variant
     effect = vargha_delaney(x, y)
     if (lower, effect) < (0.0, 0.5):
         a, b, x, y, effect = b, a, y, x, 1 - effect
-    return VariantPair(a.name, b.name, len(seeds), (_median(a, seeds), _median(b, seeds)), p, p, effect)
+    return VariantPair(
+        a.name, b.name, len(seeds), (_median(a, seeds), _median(b, seeds)), p, p, effect
+    )
 
 
 def _median(variant: Variant, seeds: Sequence[int]) -> float:
@@ -163,7 +202,8 @@ def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, lis
     seeds = sorted(set.intersection(*({*variant.objectives} for variant in variants)))
     if len(seeds) < LEAST_SEEDS:
         return None, [
-            f"The variants were not ranked: they have {len(seeds) or 'no'} seed{'s' * (len(seeds) != 1)} in common, "
+            f"The variants were not ranked: they have {len(seeds) or 'no'}"
+            f" seed{'s' * (len(seeds) != 1)} in common, "
             f"and Friedman's test with its critical difference needs at least {LEAST_SEEDS}."
         ]
     table = np.array([[max(v.objectives[seed], least) for v in variants] for seed in seeds])

@@ -22,20 +22,28 @@ from tractexp.studies.comparison.overall import Overall, Several, on_functions, 
 from tractexp.studies.comparison.runs import Gathered, SearchRun, gather
 from tractexp.wording import join_words
 
-DIMENSION, EVALUATIONS = 5, 15_000  # on BBOB; the evaluations where the searches had no budget in common
+# on BBOB; the evaluations where the searches had no budget in common
+DIMENSION, EVALUATIONS = 5, 15_000
 BBOB = "bbob.json"
 
 
 def compare_runs(gathered: Gathered, progress: Any, judging: Mapping[str, Any]) -> Comparison:
-    """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a user chooses."""
+    """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a
+    user chooses.
+    """
     polished, why_not = _polish_described_problem(gathered, progress)
     return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
 
 
 def several(
-    groups: Mapping[tuple[str, ...], Sequence[SearchRun]], source: str, judging: Mapping[str, Any],
-    folder: Path | None, bbob: int, cores: int | None, progress: Any,
-) -> Several:  # fmt: skip
+    groups: Mapping[tuple[str, ...], Sequence[SearchRun]],
+    source: str,
+    judging: Mapping[str, Any],
+    folder: Path | None,
+    bbob: int,
+    cores: int | None,
+    progress: Any,
+) -> Several:
     """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
     comparisons: dict[str, Comparison] = {}
     by_terms: dict[str, dict[str, Comparison]] = {}
@@ -49,31 +57,57 @@ def several(
     notes = _collect_notes(comparisons)
     if bbob:
         try:
-            overall.append(_on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress))
-        except UserError as error:  # the records have been searched: what they say is told all the same
+            overall.append(
+                _on_bbob(next(iter(comparisons.values())), bbob, folder, cores, progress)
+            )
+        # the records have been searched: what they say is told all the same
+        except UserError as error:
             notes.append(f"BBOB was left out: {str(error).rstrip('.')}.")
     return Several(comparisons, tuple(overall), tuple(notes))
 
 
 def _collect_notes(comparisons: Mapping[str, Comparison]) -> list[str]:
-    """What a reader must know, once, with the problems that it is true of unless that is all of them."""
+    """What a reader must know, once, with the problems that it is true of unless that is all of
+    them.
+    """
     of: dict[str, list[str]] = {}
     for label, comparison in comparisons.items():
         for note in comparison.notes:
             of.setdefault(note, []).append(label)
-    return [n if len(labels) == len(comparisons) else f"{join_words(labels)}: {n}" for n, labels in of.items()]
+    return [
+        n if len(labels) == len(comparisons) else f"{join_words(labels)}: {n}"
+        for n, labels in of.items()
+    ]
 
 
-def _on_bbob(comparison: Comparison, instances: int, folder: Path | None, cores: int | None, progress: Any) -> Overall:
-    """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what they depend on."""
+def _on_bbob(
+    comparison: Comparison, instances: int, folder: Path | None, cores: int | None, progress: Any
+) -> Overall:
+    """The variants of a comparison on BBOB; the runs are kept beside those of the sweep, under what
+    they depend on.
+    """
     variants = [v for v in comparison.gathered.variants if not v.settings.get("polish")]
     optimizers = {v.name: nest_keys(v.runs[0].config)["optimizer"] for v in variants}
-    budgets = {budget for v in variants for run in v.runs if (budget := run.config.get("budget")) is not None}
+    budgets = {
+        budget
+        for v in variants
+        for run in v.runs
+        if (budget := run.config.get("budget")) is not None
+    }
     multiplier = -(-int(budgets.pop() if len(budgets) == 1 else EVALUATIONS) // DIMENSION)
-    settings = {"optimizers": optimizers, "instances": instances, "multiplier": multiplier, "code": provenance.code()}
+    settings = {
+        "optimizers": optimizers,
+        "instances": instances,
+        "multiplier": multiplier,
+        "code": provenance.code(),
+    }
     result = _load_stored_runs(folder, settings) if folder else None
     if result is None:
-        chosen = {"instances": range(1, instances + 1), "dimensions": [DIMENSION], "multiplier": multiplier}
+        chosen = {
+            "instances": range(1, instances + 1),
+            "dimensions": [DIMENSION],
+            "multiplier": multiplier,
+        }
         result = unwrap(benchmark)(optimizers, **chosen, cores=cores, progress=progress)
         if folder:
             files.write_json(folder / BBOB, {"of": settings, "made": result.to_dict()})
@@ -90,24 +124,37 @@ def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkRes
 
 
 def _polish_described_problem(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
-    """What polishing found on the problem that the runs' configuration describes; None, and why, where it cannot."""
+    """What polishing found on the problem that the runs' configuration describes; None, and why,
+    where it cannot.
+    """
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
         problem = _problem(next(run for run in runs if run.finished))
     except UserError as error:
         return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
     except (KeyError, TypeError, ValueError) as error:
-        return None, f"the configuration of the runs is not understood any more ({type(error).__name__}: {error})"
+        return (
+            None,
+            f"the configuration of the runs is not understood any more ({type(error).__name__}:"
+            f" {error})",
+        )
     with contextlib.ExitStack() as stack:
-        polished = polish(problem, runs, lambda n: stack.enter_context(count_parts("groups of descents", n, progress)))
+        polished = polish(
+            problem,
+            runs,
+            lambda n: stack.enter_context(count_parts("groups of descents", n, progress)),
+        )
     why = "the records or the model have changed since: these parameters fit otherwise now"
     return polished, "" if polished else why
 
 
 def _problem(run: SearchRun) -> Problem:
-    """The problem that a run's configuration describes. Raises `UserError` where its records are not there any more."""
+    """The problem that a run's configuration describes. Raises `UserError` where its records are
+    not there any more.
+    """
     config = nest_keys(run.config)
-    home = Path(run.folder) if run.folder else Path()  # relative paths count from where the run was started
+    # relative paths count from where the run was started
+    home = Path(run.folder) if run.folder else Path()
     with contextlib.chdir(home) if home.is_dir() else contextlib.nullcontext():
         records = build("data", config["data"]).read()
     train = [detect(record) for record in records.train]

@@ -16,8 +16,10 @@ from tractexp.identification.result import by_event
 from tractexp.studies.comparison.runs import SearchRun
 
 FITTING = "identify"  # the task whose runs are compared
-FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"  # what a job's status.json says
-UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")  # what MLflow says of a run that neither finished nor failed
+# what a job's status.json says
+FINISHED, RUNNING, INTERRUPTED = "finished", "running", "interrupted"
+# what MLflow says of a run that neither finished nor failed
+UNDER_WAY = ("RUNNING", "SCHEDULED", "KILLED")
 MEND = "run this job again, or remove its folder"
 ENDED = ("objective", "epsilon_p", "epsilon_q")
 
@@ -28,21 +30,31 @@ def newest_sweep(folder: Path) -> Path:
     if not sweeps:
         raise UserError(
             f"there is no sweep under {folder} to compare; make one, such as "
-            f"tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by {TASK.sweep}=FOLDER"
+            "tractexp -m optimizer=issa,ssa,pso 'seed=range(0,30)', or name one by"
+            f" {TASK.sweep}=FOLDER"
         )
-    return max(sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name))
+    return max(
+        sweeps, key=lambda path: (max(job.stat().st_mtime for job in _jobs(path)), path.name)
+    )
 
 
 def from_sweep(folder: Path) -> list[SearchRun]:
     """The runs of a sweep's job folders. Raises `UserError` where there is none."""
     if not folder.is_dir():
-        raise UserError(f"{TASK.sweep}={folder} is not a folder; a sweep writes one under outputs/sweeps")
+        raise UserError(
+            f"{TASK.sweep}={folder} is not a folder; a sweep writes one under outputs/sweeps"
+        )
     jobs = _jobs(folder)
     if not jobs:
-        raise UserError(f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)")
+        raise UserError(
+            f"the sweep {folder} is empty: none of its folders holds a job (.hydra/config.yaml)"
+        )
     runs = [run for run in map(_job, jobs) if run is not None]
     if not runs:
-        raise UserError(f"the sweep {folder} has no job of task={FITTING}, the only one whose runs can be compared")
+        raise UserError(
+            f"the sweep {folder} has no job of task={FITTING}, the only one whose runs can be"
+            " compared"
+        )
     return runs
 
 
@@ -65,12 +77,17 @@ def _read_job(folder: Path) -> SearchRun | None:
     unfinished = _explain_missing_result(folder, status)
     runtime: Mapping[str, Any] = {"choices": status.get("choices")}
     if (folder / ".hydra" / "hydra.yaml").is_file() or not (unfinished and runtime["choices"]):
-        runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]  # of a job ended at once it is missing
+        # of a job ended at once it is missing
+        runtime = _yaml(folder / ".hydra" / "hydra.yaml")["hydra"]["runtime"]
     choices = runtime["choices"]
     fields: dict[str, Any] = {
-        "optimizer": choices["optimizer"], "data": choices["data"], "seed": int(config["seed"]),
-        "config": flat(config), "where": folder.name, "folder": runtime.get("cwd", ""),
-    }  # fmt: skip
+        "optimizer": choices["optimizer"],
+        "data": choices["data"],
+        "seed": int(config["seed"]),
+        "config": flat(config),
+        "where": folder.name,
+        "folder": runtime.get("cwd", ""),
+    }
     if unfinished:
         return SearchRun(**fields, **unfinished)
     with _readable(folder / "result.json") as path:
@@ -84,17 +101,23 @@ def _read_job(folder: Path) -> SearchRun | None:
 
 def _history(text: str) -> dict[str, Any]:
     """The search by iteration, of a `history.csv`."""
-    _, simulations, seconds, history = np.loadtxt(text.splitlines(), delimiter=",", skiprows=1, ndmin=2).T
+    _, simulations, seconds, history = np.loadtxt(
+        text.splitlines(), delimiter=",", skiprows=1, ndmin=2
+    ).T
     return {"simulations": simulations, "seconds": seconds, "history": history}
 
 
 def ended_search(result: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of it."""
+    """Where the optimizer itself ended, of a `result.json`: in early ones, that was the whole of
+    it.
+    """
     return result.get("search") or result
 
 
 def code_of(result: Mapping[str, Any]) -> str:
-    """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early ones."""
+    """The version and commit of the package, of a `result.json`: "0.4.0 at 1c2d3e4f"; "" in early
+    ones.
+    """
     version, commit = result.get("tractexp_version", ""), result.get("commit", "")
     dirty = "-dirty" * commit.endswith("-dirty")
     return f"{version} at {commit[:8]}{dirty}" if version and commit else version
@@ -120,7 +143,9 @@ def _readable(path: Path) -> Iterator[Path]:
 
 
 def _status(folder: Path) -> Mapping[str, Any]:
-    """The content of `status.json`; {} where the job was none of a sweep of ours, or has not begun."""
+    """The content of `status.json`; {} where the job was none of a sweep of ours, or
+    has not begun.
+    """
     if not (folder / "status.json").is_file():
         return {}
     with _readable(folder / "status.json") as path:
@@ -130,7 +155,8 @@ def _status(folder: Path) -> Mapping[str, Any]:
 
 def _explain_missing_result(folder: Path, status: Mapping[str, Any]) -> dict[str, Any]:
     """Why a job has no result: {"failure": ...} or {"interruption": ...}; {} where it has one."""
-    if INTERRUPTED in (status.get("status"), status.get("message")):  # early sweeps: "failed", with this message
+    # early sweeps: "failed", with this message
+    if INTERRUPTED in (status.get("status"), status.get("message")):
         return {"interruption": "its sweep was interrupted"}
     if status and status["status"] not in (FINISHED, RUNNING):
         return {"failure": status["message"] or f"its status is {status['status']}"}
@@ -162,15 +188,22 @@ def nest_keys(flattened: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
-    """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no parent runs.
+    """Runs from what `tractexp.tracking.find` returns, oldest first; only identifications count, no
+    parent runs.
 
-    Where the artifacts of a run are missing, its search is known by the curve in MLflow alone, which has fewer points
-    and no seconds: what the search took is divided evenly over its simulations. Raises `UserError` where there is none.
+    Where the artifacts of a run are missing, its search is known by the curve in MLflow alone,
+    which has fewer points and no seconds: what the search took is divided evenly over its
+    simulations. Raises `UserError` where there is none.
     """
-    runs = [_read_logged_run(one) for one in logged if one.tags.get("task") == FITTING and "optimizer" in one.tags]
+    runs = [
+        _read_logged_run(one)
+        for one in logged
+        if one.tags.get("task") == FITTING and "optimizer" in one.tags
+    ]
     if not runs:
         raise UserError(
-            f"{source} matches no run of task={FITTING}; the tags to filter by are task, model, optimizer, data and "
+            f"{source} matches no run of task={FITTING}; the tags to filter by are task, model,"
+            " optimizer, data and "
             f"seed, as in {TASK.filter}=\"tags.data = 'tibet_50pct'\""
         )
     return runs
@@ -178,15 +211,19 @@ def from_logged(logged: Iterable[Any], source: str) -> list[SearchRun]:
 
 def _read_logged_run(one: Any) -> SearchRun:
     fields: dict[str, Any] = {
-        "optimizer": one.tags["optimizer"], "data": one.tags["data"], "seed": int(one.tags["seed"]),
-        "config": {key: _value(text) for key, text in one.parameters.items()}, "where": one.name,
-    }  # fmt: skip
+        "optimizer": one.tags["optimizer"],
+        "data": one.tags["data"],
+        "seed": int(one.tags["seed"]),
+        "config": {key: _value(text) for key, text in one.parameters.items()},
+        "where": one.name,
+    }
     curve, ended = one.curves.get("fitness_by_simulations"), {}
     if one.status in UNDER_WAY:
         return SearchRun(**fields, interruption=f"its status in MLflow is {one.status}")
     if one.status != "FINISHED" or "objective" not in one.metrics or curve is None:
         return SearchRun(**fields, failure=f"its status in MLflow is {one.status}")
-    for key in (*ENDED, "simulations", "seconds"):  # early runs have one value of each, the search's
+    # early runs have one value of each, the search's
+    for key in (*ENDED, "simulations", "seconds"):
         ended[key] = one.metrics.get(f"search_{key}", one.metrics.get(key, np.nan))
     result = files.parse_json(one.files.get("result.json", "{}"), f"the result.json of {one.name}")
     details = {"parameters": parameters_of(ended_search(result)), "code": code_of(result)}
@@ -195,7 +232,9 @@ def _read_logged_run(one: Any) -> SearchRun:
         return SearchRun(**fields, **ended, **_history(one.files["history.csv"]), **details)
     simulations = np.fmin(curve[0], total)
     spent = seconds * simulations / simulations[-1]
-    return SearchRun(**fields, **ended, simulations=simulations, seconds=spent, history=curve[1], **details)
+    return SearchRun(
+        **fields, **ended, simulations=simulations, seconds=spent, history=curve[1], **details
+    )
 
 
 def _value(text: str) -> Any:

@@ -1,4 +1,6 @@
-"""Several problems at once: what comparisons under the same terms come to together, on records or on BBOB."""
+"""Several problems at once: what comparisons under the same terms come to together, on records or
+on BBOB.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,14 +21,17 @@ SOLVED = 1e-8  # a distance to the optimum of a BBOB function below which it cou
 
 @dataclass(frozen=True, eq=False)
 class Overall:
-    """What variants come to on several problems under the same terms. Lower figures are better unless `share`."""
+    """What variants come to on several problems under the same terms. Lower figures are better
+    unless `share`.
+    """
 
     terms: str  # "15,000 simulations"
     where: str  # "3 records, 30 seeds each"
     block: str  # within which variants are ranked: "record and seed" or "function"
     columns: tuple[str, ...]  # the problems, or groups of them
     measure: str  # what the figures are
-    figures: Mapping[str, tuple[float, ...]]  # {variant: one for each column}, the best ranked first
+    # {variant: one for each column}, the best ranked first
+    figures: Mapping[str, tuple[float, ...]]
     ranks: Ranks | None
     each: Mapping[str, Ablation]  # {problem: effects of the switches on it alone}
     ablation: Ablation | None  # on all of them
@@ -36,7 +41,9 @@ class Overall:
 
 @dataclass(frozen=True, eq=False)
 class Several:
-    """Comparisons on several problems: each by itself, {name: ...}, and what they come to by terms."""
+    """Comparisons on several problems: each by itself, {name: ...}, and what they come
+    to by terms.
+    """
 
     comparisons: Mapping[str, Comparison]
     overall: tuple[Overall, ...]
@@ -44,7 +51,9 @@ class Several:
 
 
 def terms_of(runs: Sequence[SearchRun]) -> str:
-    """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end in common."""
+    """What ended the searches: "15,000 simulations", "300 iterations", or "" where they had no end
+    in common.
+    """
     budgets = {run.config.get("budget") for run in runs}
     if len(budgets) == 1 and (budget := budgets.pop()) is not None:
         return f"{int(budget):,} simulations"
@@ -52,8 +61,12 @@ def terms_of(runs: Sequence[SearchRun]) -> str:
     return f"{int(*counts)} iterations" if len(counts) == 1 else ""
 
 
-def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping[str, str]) -> Overall:
-    """The variants that were run on all of these problems, {name: comparison}; `plain` as in `ablation.family`."""
+def on_records(
+    terms: str, comparisons: Mapping[str, Comparison], plain: Mapping[str, str]
+) -> Overall:
+    """The variants that were run on all of these problems, {name: comparison}; `plain` as in
+    `ablation.family`.
+    """
     first, *others = comparisons.values()
     variants = [v for v in first.gathered.variants if all(_has(other, v.name) for other in others)]
     names = [v.name for v in variants]
@@ -67,29 +80,53 @@ def on_records(terms: str, comparisons: Mapping[str, Comparison], plain: Mapping
         mean = np.mean([[by_seed[seed] for seed in seeds] for by_seed in logs.values()], axis=0)
         whole = chosen.ablation(dict(zip(names, mean.T, strict=True)))
     medians = {
-        name: tuple(float(np.median([run.objective for run in c.gathered[name].runs]) / c.floor.value)
-                    for c in comparisons.values())
+        name: tuple(
+            float(np.median([run.objective for run in c.gathered[name].runs]) / c.floor.value)
+            for c in comparisons.values()
+        )
         for name in _order_names(names, ranks)
-    }  # fmt: skip
+    }
     several = f"{len(comparisons)} records, " if len(comparisons) > 1 else ""
     data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
-    names_of = dict(zip(comparisons, data, strict=True)) if len({*data}) == len(data) else {c: c for c in comparisons}
+    names_of = (
+        dict(zip(comparisons, data, strict=True))
+        if len({*data}) == len(data)
+        else {c: c for c in comparisons}
+    )
     return Overall(
-        terms, f"{several}{len(seeds)} seeds{' each' * bool(several)}", "record and seed", tuple(names_of.values()),
-        "median objective over the floor", medians, ranks,
-        {names_of[label]: c.ablation for label, c in comparisons.items() if c.ablation}, whole,
+        terms,
+        f"{several}{len(seeds)} seeds{' each' * bool(several)}",
+        "record and seed",
+        tuple(names_of.values()),
+        "median objective over the floor",
+        medians,
+        ranks,
+        {names_of[label]: c.ablation for label, c in comparisons.items() if c.ablation},
+        whole,
         _cost(chosen, comparisons.values()),
-    )  # fmt: skip
+    )
 
 
 def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall:
-    """The variants on BBOB: distances to the optimum, a function being one block; the family's effects on them."""
+    """The variants on BBOB: distances to the optimum, a function being one block; the family's
+    effects on them.
+    """
     (dimension,), plan = benchmark.plan.dimensions, benchmark.plan
     names = list(benchmark.optimizers)
-    table = np.array([
-        [np.mean([np.log10(max(run.distance, SOLVED)) for run in benchmark.of(name, dimension, [f])]) for name in names]
-        for f in plan.functions
-    ])  # fmt: skip
+    table = np.array(
+        [
+            [
+                np.mean(
+                    [
+                        np.log10(max(run.distance, SOLVED))
+                        for run in benchmark.of(name, dimension, [f])
+                    ]
+                )
+                for name in names
+            ]
+            for f in plan.functions
+        ]
+    )
     ranks = _rank_optimizers(names, table)
     groups = {"all": plan.functions, **benchmark.groups()}
     shares = {
@@ -99,9 +136,18 @@ def on_functions(benchmark: "BbobRuns", chosen: VariantFamily | None) -> Overall
     whole = chosen.ablation(dict(zip(names, table.T, strict=True))) if chosen else None
     return Overall(
         f"{plan.multiplier * dimension:,} evaluations",
-        f"BBOB: {len(plan.functions)} functions in dimension {dimension}, {len(plan.instances)} instances each",
-        "function", tuple(groups), "share of the targets met", shares, ranks, {}, whole, {}, share=True,
-    )  # fmt: skip
+        f"BBOB: {len(plan.functions)} functions in dimension {dimension}, {len(plan.instances)}"
+        " instances each",
+        "function",
+        tuple(groups),
+        "share of the targets met",
+        shares,
+        ranks,
+        {},
+        whole,
+        {},
+        share=True,
+    )
 
 
 def _has(comparison: Comparison, name: str) -> bool:
@@ -112,7 +158,11 @@ def _logs(comparison: Comparison, names: Sequence[str]) -> dict[int, list[float]
     """{seed: log10 of each variant's objective over the floor}, of the seeds that all finished."""
     least = (1 + comparison.ties) * comparison.floor.value
     variants = [comparison.gathered[name] for name in names]
-    seeds = set.intersection(*({run.seed for run in v.finished} for v in variants)) if variants else set()
+    seeds = (
+        set.intersection(*({run.seed for run in v.finished} for v in variants))
+        if variants
+        else set()
+    )
     return {
         s: [float(np.log10(max(v.objectives[s], least) / comparison.floor.value)) for v in variants]
         for s in sorted(seeds)
@@ -124,7 +174,11 @@ def _rank_optimizers(names: Sequence[str], table: np.ndarray) -> Ranks | None:
 
 
 def _order_names(names: Sequence[str], ranks: Ranks | None) -> list[str]:
-    return sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__) if ranks else list(names)
+    return (
+        sorted(names, key=dict(zip(ranks.names, ranks.mean, strict=True)).__getitem__)
+        if ranks
+        else list(names)
+    )
 
 
 def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> dict[str, float]:
@@ -136,6 +190,7 @@ def _cost(chosen: VariantFamily | None, comparisons: Iterable[Comparison]) -> di
         for name, rates in each.items():
             rates += [
                 float((run.simulations[-1] - run.simulations[0]) / (len(run.history) - 1))
-                for run in comparison.gathered[name].finished if len(run.history) > 1
-            ]  # fmt: skip
+                for run in comparison.gathered[name].finished
+                if len(run.history) > 1
+            ]
     return chosen.cost({name: float(np.mean(rates)) for name, rates in each.items()})

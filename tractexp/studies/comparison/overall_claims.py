@@ -24,14 +24,19 @@ def of_ranks(overall: Overall) -> str:
     alike = [name for mean, name in others if mean - best[0] < ranks.critical_difference]
     said = f"{where}: {best[1]} has the best mean rank, {best[0]:.2f} of {len(ranks.names)}"
     if ranks.p >= SIGNIFICANCE_LEVEL:
-        return f"{said}, but the variants do not differ significantly (Friedman, p = {in_words(ranks.p)})."
+        return (
+            f"{said}, but the variants do not differ significantly (Friedman, p ="
+            f" {in_words(ranks.p)})."
+        )
     close = join_words(alike) if len(alike) < 6 else f"{len(alike)} others"
     verdict = f"; not told from it: {close}" if alike else ", significantly before all others"
     return f"{said}{verdict} (critical difference {ranks.critical_difference:.2f})."
 
 
 def of_switches(overall: Overall) -> str:
-    """Which switches help and which harm, over all problems under the same terms; "" without an ablation."""
+    """Which switches help and which harm, over all problems under the same terms; "" without an
+    ablation.
+    """
     if overall.ablation is None:
         return ""
     effects = [of_effect(effect) for effect in overall.ablation.effects]
@@ -41,7 +46,13 @@ def of_switches(overall: Overall) -> str:
 
 def of_effect(effect: SwitchEffect) -> str:
     """ "levy helps (x 0.81, 0.76 to 0.87; in 64 % of the pairs)"."""
-    verdict = "has no effect that is shown" if not effect.shown else "helps" if effect.factor < 1 else "harms"
+    verdict = (
+        "has no effect that is shown"
+        if not effect.shown
+        else "helps"
+        if effect.factor < 1
+        else "harms"
+    )
     pairs = f"; better in {percent(effect.better[0])} of the pairs" if effect.better else ""
     interval = f"{number(effect.low)} to {number(effect.high)}"
     return f"{effect.switches[0]} {verdict} (× {number(effect.factor)}, {interval}{pairs})"
@@ -52,7 +63,9 @@ def of_cost(overall: Overall) -> str:
     if not overall.cost:
         return ""
     costs = [f"{switch} {cost:+.1f}" for switch, cost in overall.cost.items()]
-    return f"{overall.terms}: simulations that switching on adds to an iteration: {', '.join(costs)}."
+    return (
+        f"{overall.terms}: simulations that switching on adds to an iteration: {', '.join(costs)}."
+    )
 
 
 def of_agreement(several: Several) -> str:
@@ -63,8 +76,14 @@ def of_agreement(several: Several) -> str:
     signs: dict[str, list[int]] = {}
     for ablation in ablations:
         for effect in ablation.effects:
-            signs.setdefault(effect.switches[0], []).append(int(np.sign(1 - effect.factor)) * effect.shown)
-    always = [s for s, each in signs.items() if len(each) == len(ablations) and all(sign > 0 for sign in each)]
+            signs.setdefault(effect.switches[0], []).append(
+                int(np.sign(1 - effect.factor)) * effect.shown
+            )
+    always = [
+        s
+        for s, each in signs.items()
+        if len(each) == len(ablations) and all(sign > 0 for sign in each)
+    ]
     never = [s for s, each in signs.items() if all(sign <= 0 for sign in each)]
     parts = [f"{_help(always)} everywhere" if always else "no ingredient helps everywhere"]
     parts += [f"{_help(never)} nowhere"] if never else []

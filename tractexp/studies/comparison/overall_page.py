@@ -1,4 +1,6 @@
-"""Comparisons on several problems as one self-contained page for people, and as JSON for machines."""
+"""Comparisons on several problems as one self-contained page for people, and as JSON
+for machines.
+"""
 
 from typing import Any
 
@@ -23,9 +25,14 @@ def report(several: Several, source: str) -> Report:
     """The page; `source` says where the runs are from."""
     first = next(iter(several.comparisons.values()))
     runs = sum(summary.runs for c in several.comparisons.values() for summary in c.summaries)
-    title = f"Comparison of {len(first.summaries)} optimizers on {len(several.comparisons)} problems"
+    title = (
+        f"Comparison of {len(first.summaries)} optimizers on {len(several.comparisons)} problems"
+    )
     page = Report(title, f"{runs} runs of {source}. Objectives are those {one.AT_END}.")
-    sentences = [claims.of_agreement(several), *(claims.of_ranks(overall) for overall in several.overall)]
+    sentences = [
+        claims.of_agreement(several),
+        *(claims.of_ranks(overall) for overall in several.overall),
+    ]
     page.verdict(*(text for text in sentences if text))
     if several.notes:
         page.heading("Mind").items(several.notes)
@@ -44,10 +51,13 @@ def _overall(page: Report, overall: Overall) -> None:
     page.heading(f"{overall.terms}: {overall.where}" if overall.terms else overall.where)
     if overall.ablation:
         page.text(claims.of_switches(overall))
-        what, over = ("distance to the optimum", " over functions") if overall.share else ("objective", "")
+        what, over = (
+            ("distance to the optimum", " over functions") if overall.share else ("objective", "")
+        )
         page.chart(
             effects(overall),
-            f"The factor by which switching an ingredient on multiplies the {what}, with 95 % bootstrap"
+            f"The factor by which switching an ingredient on multiplies the {what}, with 95 %"
+            " bootstrap"
             f" intervals{over}: left of 1 it helps.",
         )
         _effects(page, overall, overall.ablation)
@@ -55,8 +65,10 @@ def _overall(page: Report, overall: Overall) -> None:
         page.text(claims.of_ranks(overall))
         page.chart(
             charts.mean_ranks(overall.ranks, f"mean rank within a {overall.block} (1 is best)"),
-            f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half of Nemenyi's"
-            f" critical difference to either side: variants whose bars do not overlap differ significantly at"
+            f"Mean ranks over {overall.ranks.seeds} blocks, one for each {overall.block}, with half"
+            " of Nemenyi's"
+            " critical difference to either side: variants whose bars do not overlap differ"
+            " significantly at"
             f" {SIGNIFICANCE_LEVEL:.0%}.",
         )
     tell = (lambda x: f"{x:.0%}") if overall.share else (lambda x: number(x, 3))
@@ -70,14 +82,21 @@ def _overall(page: Report, overall: Overall) -> None:
 
 
 def effects(overall: Overall) -> Chart:
-    """The main effects on each problem and on all together, a row for each, one color for each switch."""
+    """The main effects on each problem and on all together, a row for each, one color for each
+    switch.
+    """
     assert overall.ablation is not None
-    groups: dict[str, Ablation] = {**(overall.each if len(overall.each) > 1 else {}), ALL: overall.ablation}
+    groups: dict[str, Ablation] = {
+        **(overall.each if len(overall.each) > 1 else {}),
+        ALL: overall.ablation,
+    }
     rows = [
         (effect, label, k)
-        for k, switch in enumerate(overall.ablation.switches) for label, ablation in groups.items()
-        for effect in ablation.effects if effect.switches == (switch,)
-    ]  # fmt: skip
+        for k, switch in enumerate(overall.ablation.switches)
+        for label, ablation in groups.items()
+        for effect in ablation.effects
+        if effect.switches == (switch,)
+    ]
     chart = Chart("factor", [""], log_x=True, pixels=110 + ROW * len(rows), hover="closest")
     for k, switch in enumerate(overall.ablation.switches):
         own = [(row, effect, label) for row, (effect, label, n) in enumerate(rows) if n == k]
@@ -99,21 +118,31 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
     columns = ["switched on", "factor", "from", "to", "better in", "from", "to", "shown"]
     columns += ["simulations per iteration"] if cost else []
     rows = [
-        [*one.factor(effect), *(f"{x:.0%}" for x in effect.better or ()), "yes" if effect.shown else "no"]
+        [
+            *one.factor(effect),
+            *(f"{x:.0%}" for x in effect.better or ()),
+            "yes" if effect.shown else "no",
+        ]
         + ([f"{cost[effect.switches[0]]:+.1f}"] if cost else [])
         for effect in ablation.effects
     ]
     page.table(
-        columns, rows,
-        f"Main effects over {ablation.effects[0].seeds} blocks, each from {len(ablation.effects[0].contrasts)} pairs"
-        " of variants that differ in that switch alone. Better in: the share of these pairs in which the run with it"
+        columns,
+        rows,
+        f"Main effects over {ablation.effects[0].seeds} blocks, each from"
+        f" {len(ablation.effects[0].contrasts)} pairs"
+        " of variants that differ in that switch alone. Better in: the share of these pairs in"
+        " which the run with it"
         " ends lower; 50 % is no difference. 95 % bootstrap intervals."
         + (" Simulations per iteration: what switching on adds to the cost." if cost else ""),
-    )  # fmt: skip
+    )
     if not (ablation.interactions or ablation.company):
         return
     with page.folded("interactions of pairs of ingredients"):
-        for changes, caption in ((ablation.interactions, one.INTERACTIONS), (ablation.company, one.COMPANY)):
+        for changes, caption in (
+            (ablation.interactions, one.INTERACTIONS),
+            (ablation.company, one.COMPANY),
+        ):
             rows = [[*one.factor(effect), "yes" if effect.shown else "no"] for effect in changes]
             page.table(["switched on", "factor", "from", "to", "shown"], rows, caption)
 
@@ -121,15 +150,21 @@ def _effects(page: Report, overall: Overall, ablation: Ablation) -> None:
 def _reading(page: Report) -> Report:
     return page.heading("How to read this page").items(
         [
-            "Every problem has a floor of its own, the lowest objective that least squares reach; objectives are told"
+            "Every problem has a floor of its own, the lowest objective that least squares reach;"
+            " objectives are told"
             " in multiples of it, and count as equal where they are within rounding of it.",
-            "Over several records an effect is the mean of its logarithm over the records, seed by seed; its interval"
-            " says how much other seeds may change it, not other records. On BBOB the functions are drawn anew.",
-            "Under equal simulations every search is laid out to end with its budget; under equal iterations it spends"
+            "Over several records an effect is the mean of its logarithm over the records, seed by"
+            " seed; its interval"
+            " says how much other seeds may change it, not other records. On BBOB the functions are"
+            " drawn anew.",
+            "Under equal simulations every search is laid out to end with its budget; under equal"
+            " iterations it spends"
             " what its ingredients cost, which the table of effects tells.",
-            "task=compare task.sweep=FOLDER task.data=NAME makes the whole page of one problem: curves, running times,"
+            "task=compare task.sweep=FOLDER task.data=NAME makes the whole page of one problem:"
+            " curves, running times,"
             " every pair of variants, parameters.",
-            "Friedman 1937 and Nemenyi 1963 after Demsar 2006; bootstrap intervals after Efron 1979; BBOB: Hansen,"
+            "Friedman 1937 and Nemenyi 1963 after Demsar 2006; bootstrap intervals after Efron"
+            " 1979; BBOB: Hansen,"
             " Finck, Ros and Auger 2009.",
         ]
     )
@@ -137,11 +172,13 @@ def _reading(page: Report) -> Report:
 
 def content(several: Several, source: str) -> dict[str, Any]:
     """What `comparison.json` holds: each problem as if it were alone, and what they come to."""
-    return files.plain({
-        "source": source,
-        "answer": claims.answer(several),
-        "sentences": claims.sentences(several),
-        "notes": several.notes,
-        "overall": several.overall,
-        "problems": {label: one.content(c, source) for label, c in several.comparisons.items()},
-    })  # fmt: skip
+    return files.plain(
+        {
+            "source": source,
+            "answer": claims.answer(several),
+            "sentences": claims.sentences(several),
+            "notes": several.notes,
+            "overall": several.overall,
+            "problems": {label: one.content(c, source) for label, c in several.comparisons.items()},
+        }
+    )

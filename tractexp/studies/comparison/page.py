@@ -26,9 +26,13 @@ def report(comparison: Comparison, source: str) -> Report:
     """The page; `source` says where the runs are from."""
     runs = sum(summary.runs for summary in comparison.summaries)
     title = f"Comparison of {len(comparison.summaries)} optimizers on {comparison.gathered.problem}"
-    page = Report(title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}.")
+    page = Report(
+        title, f"{runs} runs of {source}. Objectives, errors and parameters are those {AT_END}."
+    )
     headlines = (claims.headline, claims.of_floor, claims.of_valley, claims.of_speed)
-    page.verdict(claims.answer(comparison), *(text for claim in headlines if (text := claim(comparison))))
+    page.verdict(
+        claims.answer(comparison), *(text for claim in headlines if (text := claim(comparison)))
+    )
     if comparison.notes:
         page.heading("Mind").items(comparison.notes)
     quality(page, comparison)
@@ -43,23 +47,44 @@ def report(comparison: Comparison, source: str) -> Report:
 
 
 def _spread(spread: Spread, scale: float = 1.0) -> list[str]:
-    return [number(x * scale, 4) for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)]
+    return [
+        number(x * scale, 4)
+        for x in (spread.best, spread.lower, spread.median, spread.upper, spread.worst)
+    ]
 
 
 def quality(page: Report, comparison: Comparison) -> None:
     page.heading("Where the runs ended")
     drawn = charts.spread(comparison.variants, comparison.floor)
     page.chart(drawn, f"Objective {AT_END} of every run that finished. Dashed: the floor.")
-    columns = ["variant", "runs", "failed", "best", "lower quartile", "median", "upper quartile", "worst", "at floor"]
+    columns = [
+        "variant",
+        "runs",
+        "failed",
+        "best",
+        "lower quartile",
+        "median",
+        "upper quartile",
+        "worst",
+        "at floor",
+    ]
     rows = [
-        [s.name, str(s.runs), str(s.failures), *_spread(s.objective), f"{s.at_floor:.0%}", _share(s.in_valley)]
+        [
+            s.name,
+            str(s.runs),
+            str(s.failures),
+            *_spread(s.objective),
+            f"{s.at_floor:.0%}",
+            _share(s.in_valley),
+        ]
         for s in comparison.summaries
     ]
     floor = f"the floor, {number(comparison.floor.value, 5)} pu² ({comparison.floor.source})"
     page.table(
         [*columns, "in its valley"],
         rows,
-        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {FLOOR_SHARE:.0%} of {floor}. In its "
+        f"Objective of Eq. (8) [pu²] {AT_END}. At floor: share of runs within {FLOOR_SHARE:.0%} of"
+        f" {floor}. In its "
         "valley: share of the finished runs from whose end least squares reach it.",
     )
     for name in ("epsilon_p", "epsilon_q"):
@@ -73,7 +98,9 @@ def _share(value: float | None) -> str:
 
 
 def _parameters(page: Report, comparison: Comparison) -> None:
-    """Every run's parameters against the floor's; nothing where the problem could not be put again."""
+    """Every run's parameters against the floor's; nothing where the problem could not
+    be put again.
+    """
     polished = comparison.polished
     if polished is None or not polished.reached:
         return
@@ -82,12 +109,19 @@ def _parameters(page: Report, comparison: Comparison) -> None:
     inside = sum(polished.in_valley(run) is True for run in polished.reached)
     page.chart(
         drawn,
-        f"Parameters {AT_END}, each axis as wide as the runs scatter; dashed: those of the lowest objective, "
-        f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of "
+        f"Parameters {AT_END}, each axis as wide as the runs scatter; dashed: those of the lowest"
+        " objective, "
+        f"{number(polished.objective, 5)} pu². Least squares from where they ended lead {inside} of"
+        " "
         f"{len(polished.reached)} runs there, and the others to higher valleys.",
     )
     rows = [
-        [name, polished.units[name], number(value, 4), *(number(bound, 4) for bound in polished.bounds[name])]
+        [
+            name,
+            polished.units[name],
+            number(value, 4),
+            *(number(bound, 4) for bound in polished.bounds[name]),
+        ]
         for name, value in polished.parameters.items()
     ]
     with page.folded("the values of the lowest objective"):
@@ -97,7 +131,12 @@ def _parameters(page: Report, comparison: Comparison) -> None:
 def _speed(page: Report, comparison: Comparison) -> None:
     page.heading("How fast")
     goals = [f"{target:g} x floor" for target in comparison.targets]
-    columns = ["variant", "simulations", *(f"{g} [simulations]" for g in goals), *(f"{g} [s]" for g in goals)]
+    columns = [
+        "variant",
+        "simulations",
+        *(f"{g} [simulations]" for g in goals),
+        *(f"{g} [s]" for g in goals),
+    ]
     rows = [
         [s.name, number(s.simulations.median)]
         + [number(float(round(x)) if math.isfinite(x) else x) for x in s.ert["simulations"]]
@@ -108,21 +147,35 @@ def _speed(page: Report, comparison: Comparison) -> None:
     for by in ("simulations", "iterations"):
         caption = f"Best objective by {by}: the median{' and the quartiles' * few}."
         costs = " An iteration may cost several populations." if by == "iterations" else ""
-        _curves(page, comparison, charts.fitness(comparison.variants, by, comparison.floor), caption + costs)
-    caption = f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
+        _curves(
+            page,
+            comparison,
+            charts.fitness(comparison.variants, by, comparison.floor),
+            caption + costs,
+        )
+    caption = (
+        f"Runtimes: the share of {charts.targets_in_words()} reached by all runs, by simulations."
+    )
     _curves(page, comparison, charts.ecdf(comparison.variants, comparison.floor), caption)
     page.table(
         columns,
         rows,
-        "Median of all simulations made, and expected running time (ERT) to each target: what all runs spent until "
+        "Median of all simulations made, and expected running time (ERT) to each target: what all"
+        " runs spent until "
         "they reached it, those that did not all they had, per run that did.",
     )
 
 
-def _curves(page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str) -> None:
+def _curves(
+    page: Report, comparison: Comparison, drawn: tuple[Chart, list[Chart]], caption: str
+) -> None:
     """A chart of all variants; where there are many, one of each folded away."""
     whole, each = drawn
-    many = f" In color the first {charts.TOGETHER}; gray ones are named when pointed at." if each else ""
+    many = (
+        f" In color the first {charts.TOGETHER}; gray ones are named when pointed at."
+        if each
+        else ""
+    )
     page.chart(whole, caption + many)
     if each:
         with page.folded("each variant in a chart of its own"):
@@ -135,7 +188,8 @@ def _differences(page: Report, comparison: Comparison) -> None:
         page.text(claims.of_ranks(comparison))
         page.chart(
             charts.mean_ranks(comparison.ranks),
-            f"Mean ranks over seeds, with half of Nemenyi's critical difference to either side: variants whose bars "
+            "Mean ranks over seeds, with half of Nemenyi's critical difference to either side:"
+            " variants whose bars "
             f"do not overlap differ significantly at {SIGNIFICANCE_LEVEL:.0%}.",
         )
     if not comparison.pairs:
@@ -154,15 +208,37 @@ def _differences(page: Report, comparison: Comparison) -> None:
 
 def _pairs(page: Report, pairs: list[VariantPair]) -> None:
     rows = [
-        [pair.first, pair.second, str(pair.seeds), *map(number, pair.medians), *map(p_value, (pair.p, pair.corrected)),
-         f"{pair.effect:.2f}", size_of(pair.effect), "yes" if pair.significant else "no"]
+        [
+            pair.first,
+            pair.second,
+            str(pair.seeds),
+            *map(number, pair.medians),
+            *map(p_value, (pair.p, pair.corrected)),
+            f"{pair.effect:.2f}",
+            size_of(pair.effect),
+            "yes" if pair.significant else "no",
+        ]
         for pair in pairs
-    ]  # fmt: skip
+    ]
     page.table(
-        ["lower", "higher", "seeds", "median", "median", "p", "p (Holm)", "A", "effect", "significant"], rows,
-        "p: Wilcoxon signed-rank test over paired seeds, two-sided, as it is and after Holm's correction. A: "
-        "probability that a run of the first ends lower than one of the second (Vargha-Delaney).", words=(1, 8),
-    )  # fmt: skip
+        [
+            "lower",
+            "higher",
+            "seeds",
+            "median",
+            "median",
+            "p",
+            "p (Holm)",
+            "A",
+            "effect",
+            "significant",
+        ],
+        rows,
+        "p: Wilcoxon signed-rank test over paired seeds, two-sided, as it is and after Holm's"
+        " correction. A: "
+        "probability that a run of the first ends lower than one of the second (Vargha-Delaney).",
+        words=(1, 8),
+    )
 
 
 def switches(page: Report, ablation: Ablation) -> None:
@@ -170,12 +246,18 @@ def switches(page: Report, ablation: Ablation) -> None:
     page.items([claims.of_effect(effect) for effect in ablation.effects])
     columns = ["switched on", "factor", "from", "to", "seeds", "shown", "contrasts"]
     groups = (
-        (ablation.effects, "Main effects: the factor by which the objective is multiplied; below 1 it is lowered."),
+        (
+            ablation.effects,
+            "Main effects: the factor by which the objective is multiplied; below 1 it is lowered.",
+        ),
         (ablation.company, COMPANY),
         (ablation.interactions, INTERACTIONS),
     )
     for effects, caption in groups:
-        rows = [[*factor(e), str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))] for e in effects]
+        rows = [
+            [*factor(e), str(e.seeds), "yes" if e.shown else "no", str(len(e.contrasts))]
+            for e in effects
+        ]
         if rows:
             page.table(columns, rows, f"{caption} 95 % bootstrap intervals over seeds.")
     if unknown := claims.of_unknown(ablation):
@@ -188,19 +270,29 @@ def factor(effect: SwitchEffect) -> list[str]:
 
 
 def _not_judged(page: Report, comparison: Comparison) -> None:
-    for title, rows in zip(("Failures", "Interrupted: not judged"), _without_result(comparison), strict=True):
+    for title, rows in zip(
+        ("Failures", "Interrupted: not judged"), _without_result(comparison), strict=True
+    ):
         if rows:
             page.heading(f"{title}: {len(rows)}")
-            page.table(["variant", "seed", "job", "because"], [[str(v) for v in row.values()] for row in rows],
-                       words=(2, 3))  # fmt: skip
+            page.table(
+                ["variant", "seed", "job", "because"],
+                [[str(v) for v in row.values()] for row in rows],
+                words=(2, 3),
+            )
 
 
 def _without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
     """The runs that failed, and those that were interrupted: variant, seed, job and why."""
-    failed = [(v.name, run, run.failure) for v in comparison.variants for run in v.runs if run.failure]
+    failed = [
+        (v.name, run, run.failure) for v in comparison.variants for run in v.runs if run.failure
+    ]
     interrupted = [(name, run, run.interruption) for name, run in comparison.gathered.interrupted]
     return [
-        [{"variant": name, "seed": run.seed, "job": run.where, "message": why} for name, run, why in rows]
+        [
+            {"variant": name, "seed": run.seed, "job": run.where, "message": why}
+            for name, run, why in rows
+        ]
         for rows in (failed, interrupted)
     ]
 
@@ -208,16 +300,24 @@ def _without_result(comparison: Comparison) -> list[list[dict[str, Any]]]:
 def _reading(page: Report, comparison: Comparison) -> None:
     page.heading("How to read this page").items(
         [
-            f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what is left there is "
+            f"Objectives within {comparison.ties:g} of the floor count as equal in the tests: what"
+            " is left there is "
             "rounding, not quality. The tables show them as they are.",
-            "A failed run counts as worse than any other in the tests; its budget counts as spent in the ERT; "
-            "quartiles and curves are those of the finished runs. An interrupted run counts as nothing.",
-            "The optimizer is judged by where its own search ended. An identification goes on from there: its estimate "
-            "is polished by least squares from several starts, and mostly the same whichever optimizer is taken.",
-            "A target counts as reached at the end of the iteration in which it was, so running times are at most "
+            "A failed run counts as worse than any other in the tests; its budget counts as spent"
+            " in the ERT; "
+            "quartiles and curves are those of the finished runs. An interrupted run counts as"
+            " nothing.",
+            "The optimizer is judged by where its own search ended. An identification goes on from"
+            " there: its estimate "
+            "is polished by least squares from several starts, and mostly the same whichever"
+            " optimizer is taken.",
+            "A target counts as reached at the end of the iteration in which it was, so running"
+            " times are at most "
             "one iteration too long.",
-            "Not significant means that these runs do not show a difference, not that there is none.",
-            "Wilcoxon 1945; Holm 1979; Vargha and Delaney 2000; Friedman 1937 and Nemenyi 1963 after Demsar 2006; ERT "
+            "Not significant means that these runs do not show a difference, not that there is"
+            " none.",
+            "Wilcoxon 1945; Holm 1979; Vargha and Delaney 2000; Friedman 1937 and Nemenyi 1963"
+            " after Demsar 2006; ERT "
             "after Hansen et al. 2021 (COCO); bootstrap intervals after Efron 1979.",
         ]
     )
@@ -227,27 +327,46 @@ def content(comparison: Comparison, source: str) -> dict[str, Any]:
     """What `comparison.json` holds: every number of the page. What is not finite is None."""
     failed, interrupted = _without_result(comparison)
     polished = comparison.polished
-    return files.plain({
-        "source": source,
-        "problem": comparison.gathered.problem,
-        "values": f"objectives, errors and parameters are those {AT_END}",
-        "answer": claims.answer(comparison),
-        "floor": {**asdict(comparison.floor), "parameters": polished.parameters if polished else None},
-        "targets": comparison.targets,
-        "ties": comparison.ties,
-        "variants": comparison.summaries,
-        "runs": [_of_run(variant, run, comparison) for variant in comparison.variants for run in variant.finished],
-        "pairs": [asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs],
-        "ranks": comparison.ranks,
-        "ablation": comparison.ablation,
-        "sentences": claims.sentences(comparison),
-        "notes": comparison.notes,
-        "failures": failed,
-        "interrupted": interrupted,
-    })  # fmt: skip
+    return files.plain(
+        {
+            "source": source,
+            "problem": comparison.gathered.problem,
+            "values": f"objectives, errors and parameters are those {AT_END}",
+            "answer": claims.answer(comparison),
+            "floor": {
+                **asdict(comparison.floor),
+                "parameters": polished.parameters if polished else None,
+            },
+            "targets": comparison.targets,
+            "ties": comparison.ties,
+            "variants": comparison.summaries,
+            "runs": [
+                _of_run(variant, run, comparison)
+                for variant in comparison.variants
+                for run in variant.finished
+            ],
+            "pairs": [
+                asdict(pair) | {"significant": pair.significant} for pair in comparison.pairs
+            ],
+            "ranks": comparison.ranks,
+            "ablation": comparison.ablation,
+            "sentences": claims.sentences(comparison),
+            "notes": comparison.notes,
+            "failures": failed,
+            "interrupted": interrupted,
+        }
+    )
 
 
 def _of_run(variant: Variant, run: SearchRun, comparison: Comparison) -> dict[str, Any]:
     inside = comparison.polished.in_valley(run) if comparison.polished else None
-    fields = {key: getattr(run, key) for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")}
-    return {"variant": variant.name, **fields, "simulations": run.simulations[-1], "in_valley": inside}
+    fields = {
+        key: getattr(run, key)
+        for key in ("seed", "objective", "epsilon_p", "epsilon_q", "parameters")
+    }
+    return {
+        "variant": variant.name,
+        **fields,
+        "simulations": run.simulations[-1],
+        "in_valley": inside,
+    }

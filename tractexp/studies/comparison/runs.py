@@ -1,4 +1,5 @@
-"""One run of a comparison, and the runs of one variant: an optimizer with its settings, under all its seeds.
+"""One run of a comparison, and the runs of one variant: an optimizer with its settings, under all
+its seeds.
 
 What is compared is where each search ended, before the estimate was polished.
 """
@@ -12,9 +13,11 @@ import numpy as np
 
 from tractexp.errors import TASK, UserError, among
 
-# The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled under one name.
+# The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled
+# under one name.
 PROBLEM = ("data", "model", "objective")  # one comparison has one of each
-SETTINGS = ("optimizer", "task", "budget", "time_limit", "target")  # what differs in these makes a variant
+# what differs in these makes a variant
+SETTINGS = ("optimizer", "task", "budget", "time_limit", "target")
 REST = ("seed", "tracking", "sweep")  # what differs in these does not
 
 
@@ -33,9 +36,11 @@ class SearchRun:
     objective: float = np.inf  # pu²
     epsilon_p: float = np.nan
     epsilon_q: float = np.nan
-    simulations: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) spent by the end of an iteration
+    # (n,) spent by the end of an iteration
+    simulations: np.ndarray = field(default_factory=lambda: np.empty(0))
     seconds: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,)
-    history: np.ndarray = field(default_factory=lambda: np.empty(0))  # (n,) best objective so far, pu²
+    # (n,) best objective so far, pu²
+    history: np.ndarray = field(default_factory=lambda: np.empty(0))
     parameters: Mapping[str, float] = field(default_factory=dict)  # empty where they are not known
     failure: str = ""  # why there is no result
     interruption: str = ""  # why there is none yet
@@ -47,7 +52,9 @@ class SearchRun:
         return not (self.failure or self.interruption)
 
     def spent(self, target: float, cost: str) -> float:
-        """Simulations or seconds (`cost`) by the end of the iteration that reached `target`; inf where none did."""
+        """Simulations or seconds (`cost`) by the end of the iteration that reached `target`; inf
+        where none did.
+        """
         reached = self.history <= target
         return float(getattr(self, cost)[reached.argmax()]) if reached.any() else np.inf
 
@@ -73,7 +80,9 @@ class Variant:
 
 @dataclass(frozen=True, eq=False)
 class Gathered:
-    """Runs of one problem by variant, in alphabetic order, and what the reader must know about the gathering."""
+    """Runs of one problem by variant, in alphabetic order, and what the reader must know about the
+    gathering.
+    """
 
     variants: tuple[Variant, ...]
     problem: str
@@ -84,7 +93,8 @@ class Gathered:
         variants = [variant for variant in self.variants if variant.name == name]
         if not variants:
             raise UserError(
-                f"there is no variant '{name}' in this comparison{among(name, (v.name for v in self.variants))}"
+                f"there is no variant '{name}' in this"
+                f" comparison{among(name, (v.name for v in self.variants))}"
             )
         return variants[0]
 
@@ -94,12 +104,18 @@ def select_runs_on(runs: Sequence[SearchRun], source: str, data: str) -> list[Se
     chosen = [run for run in runs if run.data == data]
     if not chosen:
         choices = {run.data for run in runs}
-        raise UserError(f"{TASK.data}={data}: {source} has no run on these data{among(data, choices, 'Data')}")
+        raise UserError(
+            f"{TASK.data}={data}: {source} has no run on these data{among(data, choices, 'Data')}"
+        )
     return chosen
 
 
-def part_runs(runs: Sequence[SearchRun], apart: Sequence[str] = ()) -> dict[tuple[str, ...], list[SearchRun]]:
-    """Runs by their data and by the limits named in `apart`, which make comparisons of their own, as they come."""
+def part_runs(
+    runs: Sequence[SearchRun], apart: Sequence[str] = ()
+) -> dict[tuple[str, ...], list[SearchRun]]:
+    """Runs by their data and by the limits named in `apart`, which make comparisons of their own,
+    as they come.
+    """
     groups: dict[tuple[str, ...], list[SearchRun]] = defaultdict(list)
     for run in runs:
         groups[(run.data, *(repr(run.config.get(key)) for key in apart))].append(run)
@@ -109,42 +125,59 @@ def part_runs(runs: Sequence[SearchRun], apart: Sequence[str] = ()) -> dict[tupl
 def gather(runs: Sequence[SearchRun], source: str) -> Gathered:
     """Group runs into variants. Later repeats replace earlier ones.
 
-    Interrupted runs are told apart from those that are judged. Raises `UserError` where none finished, or the runs do
-    not solve the same problem.
+    Interrupted runs are told apart from those that are judged. Raises `UserError` where none
+    finished, or the runs do not solve the same problem.
     """
     _check_same_problem(runs, source)
     _check_any_finished(runs, source)
     ended = [run for run in runs if not run.interruption]
     unique = {_identity(run): run for run in ended}
     left_out = len(ended) - len(unique)
-    notes = [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
+    notes = (
+        [f"Of runs made more than once, the newest count: {left_out} left out."] if left_out else []
+    )
     if len(versions := {run.code for run in ended if run.code}) > 1:
         notes.append(
-            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference between variants may"
+            f"The runs were made by different code ({', '.join(sorted(versions))}): a difference"
+            " between variants may"
             " be one between versions."
         )
     names = _names(runs)
-    interrupted = {_identity(run): run for run in runs if run.interruption and _identity(run) not in unique}
+    interrupted = {
+        _identity(run): run for run in runs if run.interruption and _identity(run) not in unique
+    }
     unjudged = tuple((names[_settings(run)], run) for run in interrupted.values())
     if unjudged:
         count = f"{len(unjudged)} runs were" if len(unjudged) > 1 else "One run was"
-        notes.append(f"{count} interrupted, or still going on, and not judged: see the end of the page.")
-    return Gathered(_variants(list(unique.values()), names), _problem_name(runs[0]), tuple(notes), unjudged)
+        notes.append(
+            f"{count} interrupted, or still going on, and not judged: see the end of the page."
+        )
+    return Gathered(
+        _variants(list(unique.values()), names), _problem_name(runs[0]), tuple(notes), unjudged
+    )
 
 
 def _check_any_finished(runs: Sequence[SearchRun], source: str) -> None:
     if any(run.finished for run in runs):
         return
     failures = [run.failure for run in runs if run.failure]
-    why = f"the first failed because: {failures[0]}" if failures else "all were interrupted, or still go on"
-    raise UserError(f"none of the {len(runs)} runs of {source} finished, so there is nothing to compare; {why}")
+    why = (
+        f"the first failed because: {failures[0]}"
+        if failures
+        else "all were interrupted, or still go on"
+    )
+    raise UserError(
+        f"none of the {len(runs)} runs of {source} finished, so there is nothing to compare; {why}"
+    )
 
 
 Settings = tuple[str, tuple[tuple[str, str], ...]]  # the optimizer as chosen, and what is set
 
 
 def _settings(run: SearchRun) -> Settings:
-    settings = {key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS}
+    settings = {
+        key: value for key, value in run.config.items() if key.partition(".")[0] in SETTINGS
+    }
     return run.optimizer, tuple(sorted((key, repr(value)) for key, value in settings.items()))
 
 
@@ -153,7 +186,9 @@ def _identity(run: SearchRun) -> tuple[Settings, int]:
 
 
 def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
-    """What each variant is called: its optimizer, and the settings in which runs of that optimizer differ."""
+    """What each variant is called: its optimizer, and the settings in which runs of that optimizer
+    differ.
+    """
     groups: dict[str, list[Settings]] = defaultdict(list)
     for settings in dict.fromkeys(map(_settings, runs)):
         groups[settings[0]].append(settings)
@@ -162,7 +197,11 @@ def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:
         differing = {item for _, settings in several for item in settings}
         differing -= set.intersection(*(set(settings) for _, settings in several))
         for one in several:
-            parts = [f"{k.removeprefix('optimizer.')}={_plain(v)}" for k, v in one[1] if (k, v) in differing]
+            parts = [
+                f"{k.removeprefix('optimizer.')}={_plain(v)}"
+                for k, v in one[1]
+                if (k, v) in differing
+            ]
             names[one] = " ".join([optimizer, *parts])
     return names
 
@@ -185,7 +224,8 @@ def _plain(value: str) -> str:
 
 def _problem_name(run: SearchRun) -> str:
     return (
-        f"{run.data}, model {run.config.get('model.motor.name', '?')} with {run.config.get('model.static.name', '?')}"
+        f"{run.data}, model {run.config.get('model.motor.name', '?')} with"
+        f" {run.config.get('model.static.name', '?')}"
     )
 
 
@@ -194,15 +234,21 @@ def _check_same_problem(runs: Sequence[SearchRun], source: str) -> None:
     chosen = sorted({run.data for run in runs})
     if len(chosen) > 1:
         raise UserError(
-            f"{source} holds runs on different data ({', '.join(chosen)}), whose objectives cannot be compared; "
+            f"{source} holds runs on different data ({', '.join(chosen)}), whose objectives cannot"
+            " be compared; "
             f"choose one, such as {TASK.data}={chosen[0]}"
         )
     for part in PROBLEM:
-        contents = [{k: repr(v) for k, v in run.config.items() if k.partition(".")[0] == part} for run in runs]
+        contents = [
+            {k: repr(v) for k, v in run.config.items() if k.partition(".")[0] == part}
+            for run in runs
+        ]
         for key in sorted({key for content in contents for key in content}):
             values = sorted({_plain(content.get(key, "None")) for content in contents})
             if len(values) > 1:
                 raise UserError(
-                    f"{source} holds runs that differ in {key} ({', '.join(values)}), so their objectives cannot be "
-                    f"compared; compare one problem at a time, from sweeps of their own or by {TASK.filter}"
+                    f"{source} holds runs that differ in {key} ({', '.join(values)}), so their"
+                    " objectives cannot be "
+                    "compared; compare one problem at a time, from sweeps of their own or by"
+                    f" {TASK.filter}"
                 )

@@ -1,4 +1,6 @@
-"""Tests, effect sizes and running times. Lower values are better throughout; inf is a failed run, the worst."""
+"""Tests, effect sizes and running times. Lower values are better throughout; inf is a failed run,
+the worst.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +13,8 @@ LEAST_SEEDS = 6  # two-sided, Wilcoxon's smallest p is 2 / 2^n: below 0.05 from 
 
 
 def vargha_delaney(a: np.ndarray, b: np.ndarray) -> float:
-    """The probability that a value of `a` is lower than one of `b`, ties counting half: 0.5 is no difference.
+    """The probability that a value of `a` is lower than one of `b`, ties counting half: 0.5 is no
+    difference.
 
     Source: Vargha and Delaney 2000, Eq. (1), with the sign of a minimization.
     """
@@ -20,9 +23,13 @@ def vargha_delaney(a: np.ndarray, b: np.ndarray) -> float:
 
 
 def size_of(effect: float) -> str:
-    """Vargha and Delaney's words for an A: 0.56 small, 0.64 medium, 0.71 large, on either side of 0.5."""
+    """Vargha and Delaney's words for an A: 0.56 small, 0.64 medium, 0.71 large, on either side of
+    0.5.
+    """
     distance = abs(effect - 0.5)
-    return ["negligible", "small", "medium", "large"][int(np.searchsorted((0.06, 0.14, 0.21), distance + 1e-12))]
+    return ["negligible", "small", "medium", "large"][
+        int(np.searchsorted((0.06, 0.14, 0.21), distance + 1e-12))
+    ]
 
 
 def holm(p: Sequence[float]) -> np.ndarray:
@@ -30,12 +37,15 @@ def holm(p: Sequence[float]) -> np.ndarray:
     values = np.asarray(p, dtype=float)
     order = np.argsort(values, kind="stable")
     corrected = np.empty(len(values))
-    corrected[order] = np.minimum(np.maximum.accumulate(values[order] * np.arange(len(values), 0, -1)), 1.0)
+    corrected[order] = np.minimum(
+        np.maximum.accumulate(values[order] * np.arange(len(values), 0, -1)), 1.0
+    )
     return corrected
 
 
 def wilcoxon(a: np.ndarray, b: np.ndarray) -> tuple[float, float]:
-    """Two-sided p of the signed-rank test on pairs (n,) each, and the rank sum where `a` is lower minus the reverse.
+    """Two-sided p of the signed-rank test on pairs (n,) each, and the rank sum where `a` is lower
+    minus the reverse.
 
     Equal pairs say nothing and are dropped, as Wilcoxon 1945 did. No unequal pair: p = 1.
     """
@@ -68,11 +78,13 @@ class Ranks:
     chi2: float
     p: float
     critical_difference: float
-    groups: tuple[tuple[str, ...], ...]  # largest sets whose mean ranks differ by less than the critical difference
+    # largest sets whose mean ranks differ by less than the critical difference
+    groups: tuple[tuple[str, ...], ...]
 
 
 def friedman(names: Sequence[str], table: np.ndarray, alpha: float = SIGNIFICANCE_LEVEL) -> Ranks:
-    """Rank k >= 3 variants within each of N seeds; `table` is (N, k). The chi-square is corrected for ties.
+    """Rank k >= 3 variants within each of N seeds; `table` is (N, k). The chi-square is corrected
+    for ties.
 
     Source: Demsar 2006, section 3.2.
     """
@@ -97,7 +109,9 @@ def critical_difference(variants: int, seeds: int, alpha: float = SIGNIFICANCE_L
     return float(q * np.sqrt(variants * (variants + 1) / (6 * seeds)))
 
 
-def indifferent(names: Sequence[str], mean: Sequence[float], difference: float) -> tuple[tuple[str, ...], ...]:
+def indifferent(
+    names: Sequence[str], mean: Sequence[float], difference: float
+) -> tuple[tuple[str, ...], ...]:
     """The largest sets of two or more neighbors in rank that are less than `difference` apart."""
     order = np.argsort(mean, kind="stable")
     ranks = np.asarray(mean, dtype=float)[order]
@@ -111,15 +125,18 @@ def indifferent(names: Sequence[str], mean: Sequence[float], difference: float) 
 
 
 def expected_running_time(spent: np.ndarray, reached: np.ndarray) -> float:
-    """ERT: all that was spent before the target, by failures all they had, per success; inf without a success.
+    """ERT: all that was spent before the target, by failures all they had, per success; inf without
+    a success.
 
-    `spent` (n,) is the cost until the target where `reached` (n,), else the whole cost of the run. Source: Hansen et
-    al. 2021, COCO, section on runtime, after Auger and Hansen 2005.
+    `spent` (n,) is the cost until the target where `reached` (n,), else the whole cost of the run.
+    Source: Hansen et al. 2021, COCO, section on runtime, after Auger and Hansen 2005.
     """
     return float(np.sum(spent) / np.sum(reached)) if np.any(reached) else np.inf
 
 
-def bootstrap(values: np.ndarray, seed: int = 0, draws: int = 4000, share: float = 0.95) -> tuple[float, float]:
+def bootstrap(
+    values: np.ndarray, seed: int = 0, draws: int = 4000, share: float = 0.95
+) -> tuple[float, float]:
     """The percentile interval of the mean of `values` (n,). Source: Efron 1979."""
     rng = np.random.default_rng(seed)
     values = np.asarray(values, dtype=float)

@@ -1,4 +1,6 @@
-"""How good and how fast each variant is: quartiles, the share at the noise floor, expected running times."""
+"""How good and how fast each variant is: quartiles, the share at the noise floor, expected running
+times.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -42,23 +44,38 @@ class Summary:
     epsilon_q: Spread
     simulations: Spread
     at_floor: float  # share of runs within 1 % of the floor
-    in_valley: float | None  # share of finished runs that ended in the floor's valley; None where that is not known
+    # share of finished runs that ended in the floor's valley; None where that is not known
+    in_valley: float | None
     ert: dict[str, list[float]]  # {"simulations": [one for each target], "seconds": [...]}
 
 
-def summarize(variant: Variant, floor: Floor, targets: Sequence[float], polished: Polished | None = None) -> Summary:
+def summarize(
+    variant: Variant, floor: Floor, targets: Sequence[float], polished: Polished | None = None
+) -> Summary:
     """`targets` are multiples of the floor."""
     done = variant.finished
-    spreads = {key: Spread.of([getattr(run, key) for run in done]) for key in ("objective", "epsilon_p", "epsilon_q")}
+    spreads = {
+        key: Spread.of([getattr(run, key) for run in done])
+        for key in ("objective", "epsilon_p", "epsilon_q")
+    }
     reached = [run.objective <= (1 + FLOOR_SHARE) * floor.value for run in variant.runs]
-    ert = {cost: [running_time(variant, target * floor.value, cost) for target in targets] for cost in COSTS}
+    ert = {
+        cost: [running_time(variant, target * floor.value, cost) for target in targets]
+        for cost in COSTS
+    }
     simulations = Spread.of([run.simulations[-1] for run in done])
     failures = len(variant.runs) - len(done)
     inside = [there for run in done if polished and (there := polished.in_valley(run)) is not None]
     return Summary(
-        variant.name, len(variant.runs), failures, **spreads, simulations=simulations,
-        at_floor=float(np.mean(reached)), in_valley=float(np.mean(inside)) if inside else None, ert=ert,
-    )  # fmt: skip
+        variant.name,
+        len(variant.runs),
+        failures,
+        **spreads,
+        simulations=simulations,
+        at_floor=float(np.mean(reached)),
+        in_valley=float(np.mean(inside)) if inside else None,
+        ert=ert,
+    )
 
 
 def running_time(variant: Variant, target: float, cost: str) -> float:
@@ -70,7 +87,9 @@ def running_time(variant: Variant, target: float, cost: str) -> float:
 
 
 def _whole(variant: Variant, run: SearchRun, cost: str) -> float:
-    """All that a run spent; a run that failed spent its budget, or what the others of its variant did."""
+    """All that a run spent; a run that failed spent its budget, or what the others of its variant
+    did.
+    """
     if run.finished:
         return float(getattr(run, cost)[-1])
     if cost == "simulations" and variant.settings.get("budget"):
@@ -79,8 +98,12 @@ def _whole(variant: Variant, run: SearchRun, cost: str) -> float:
 
 
 def runtimes(variant: Variant, floor: Floor) -> np.ndarray:
-    """Simulations to each target of the ECDF in each run, (runs * targets,), sorted, inf where not reached."""
-    return np.sort([run.spent(m * floor.value, "simulations") for run in variant.runs for m in ECDF_TARGETS])
+    """Simulations to each target of the ECDF in each run, (runs * targets,), sorted, inf where not
+    reached.
+    """
+    return np.sort(
+        [run.spent(m * floor.value, "simulations") for run in variant.runs for m in ECDF_TARGETS]
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,19 +117,29 @@ class Band:
 
     @property
     def top(self) -> float:
-        """Of an axis: the upper quartile after a fiftieth of the search. The very start is off the page."""
-        return float(self.upper[np.searchsorted(self.x, self.x[0] + 0.02 * (self.x[-1] - self.x[0]))])
+        """Of an axis: the upper quartile after a fiftieth of the search. The very start is off the
+        page.
+        """
+        return float(
+            self.upper[np.searchsorted(self.x, self.x[0] + 0.02 * (self.x[-1] - self.x[0]))]
+        )
 
 
 def band(variant: Variant, by: str, points: int = 300) -> Band:
     """The fitness curves of a variant's finished runs by "iterations" or "simulations".
 
-    A run that ended earlier keeps its last objective. By simulations, the band starts where every run has one.
+    A run that ended earlier keeps its last objective. By simulations, the band starts where every
+    run has one.
     """
     done = variant.finished
-    steps = [run.simulations if by == "simulations" else np.arange(len(run.history)) for run in done]
+    steps = [
+        run.simulations if by == "simulations" else np.arange(len(run.history)) for run in done
+    ]
     first, last = max(step[0] for step in steps), max(step[-1] for step in steps)
     spaced = np.geomspace if by == "simulations" else np.linspace  # as they are drawn
     x = np.unique(spaced(first, last, points).round())
-    at = [run.history[np.searchsorted(step, x, side="right") - 1] for run, step in zip(done, steps, strict=True)]
+    at = [
+        run.history[np.searchsorted(step, x, side="right") - 1]
+        for run, step in zip(done, steps, strict=True)
+    ]
     return Band(x, *np.quantile(at, (0.25, 0.5, 0.75), axis=0))

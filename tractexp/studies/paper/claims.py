@@ -7,7 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from tractexp.identification.result import ACCEPTED
-from tractexp.studies.comparison.statistics import LEAST_SEEDS, SIGNIFICANCE_LEVEL, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import (
+    LEAST_SEEDS,
+    SIGNIFICANCE_LEVEL,
+    holm,
+    vargha_delaney,
+    wilcoxon,
+)
 from tractexp.studies.paper import equations, maps, printed, why
 from tractexp.studies.paper.printed import LABELS
 from tractexp.studies.paper.study import BUDGETS, TARGETS, Study
@@ -18,7 +24,8 @@ IMPOSSIBLE = "cannot be reproduced"
 OPEN = f"not settled: a test needs {LEAST_SEEDS} seeds or more"
 DEPENDS = "depends on the reading"
 PAIRS = (("issa", "ssa"), ("issa", "pso"), ("ssa", "pso"))
-BOTH = ("issa", "issa_10_perceivers", "issa_raw", "issa_raw_scalar", "issa_to_the_letter")  # with an SSA read alike
+# with an SSA read alike
+BOTH = ("issa", "issa_10_perceivers", "issa_raw", "issa_raw_scalar", "issa_to_the_letter")
 LARGER = 2  # times the operations of the others make a large one of Table 1
 DIFFERENT = 1.1  # accuracies within a tenth of each other count as equal in Table 1
 
@@ -39,9 +46,16 @@ class Claim:
 
 
 def count_verdicts(claims: Sequence[Claim]) -> str:
-    """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not confirmed"."""
+    """How many there are and how many got which verdict: "38 claims: 7 confirmed, 31 not
+    confirmed".
+    """
     counts = Counter(claim.word for claim in claims)
-    phrases = {CONFIRMED: CONFIRMED, DEPENDS: "depending on the reading", REFUTED: REFUTED, IMPOSSIBLE: IMPOSSIBLE}
+    phrases = {
+        CONFIRMED: CONFIRMED,
+        DEPENDS: "depending on the reading",
+        REFUTED: REFUTED,
+        IMPOSSIBLE: IMPOSSIBLE,
+    }
     phrases |= {word: word for word in counts if word not in phrases}
     return f"{len(claims)} claims: " + ", ".join(
         f"{counts[word]} {said}" for word, said in phrases.items() if counts[word]
@@ -68,7 +82,9 @@ def percent(value: float) -> str:
 
 
 def compare_ends(study: Study, first: str, second: str, by: str) -> tuple[str, str]:
-    """Whether `first` ends lower than `second`, by every reading of both: the verdict and the numbers behind it."""
+    """Whether `first` ends lower than `second`, by every reading of both: the verdict and the
+    numbers behind it.
+    """
     verdicts, phrases = {}, []
     for how, names in readings_of(first, second).items():
         verdicts[how], numbers = better(study, names, (first, second), by)
@@ -92,10 +108,15 @@ def merge_verdicts(verdicts: Mapping[str, str]) -> str:
     different = set(verdicts.values())
     if len(different) == 1 or OPEN in different:
         return OPEN if OPEN in different else different.pop()
-    return f"{DEPENDS}: {CONFIRMED} only {join_words([how for how, v in verdicts.items() if v == CONFIRMED])}"
+    return (
+        f"{DEPENDS}: {CONFIRMED} only"
+        f" {join_words([how for how, v in verdicts.items() if v == CONFIRMED])}"
+    )
 
 
-def better(study: Study, names: Mapping[str, str], pair: tuple[str, str], by: str) -> tuple[str, str]:
+def better(
+    study: Study, names: Mapping[str, str], pair: tuple[str, str], by: str
+) -> tuple[str, str]:
     """Whether the first of a pair ends lower, the three optimizers read as `names` says."""
     three = [study.pair(names[a], names[b], by) for a, b in PAIRS]
     corrected = dict(zip(PAIRS, holm([each.p for each in three]), strict=True))
@@ -113,24 +134,52 @@ def table1(study: Study) -> list[Claim]:
     ranked_P = P[0] * DIFFERENT < P[1] and P[1] * DIFFERENT < P[2]
     ranked_Q = Q[0] * DIFFERENT < Q[2] and Q[2] * DIFFERENT < Q[1]
     identified = [f"{o.identified} of {o.free}" for o in (third, first, second)]
-    alone = third.identified == third.free and first.identified < first.free and second.identified < second.free
-    steps, sizes = ([getattr(o, each).total for o in (third, first, second)] for each in ("step", "per_sample"))
+    alone = (
+        third.identified == third.free
+        and first.identified < first.free
+        and second.identified < second.free
+    )
+    steps, sizes = (
+        [getattr(o, each).total for o in (third, first, second)] for each in ("step", "per_sample")
+    )
     times = [f"{o.nanoseconds:.2g}" for o in (third, first, second)]
     return [
-        Claim("table1", "P: the electromechanical model is better, the mechanical good, the voltage model bad",
-              "epsilon_p " + said.format(*map(percent, P)), CONFIRMED if ranked_P else REFUTED),
-        Claim("table1", "Q: the electromechanical model is better, the voltage model good, the mechanical bad",
-              "epsilon_q " + said.format(*map(percent, Q)), CONFIRMED if ranked_Q else REFUTED),
-        Claim("table1", "stability accuracy: better, better, good",
-              "the paper neither defines this column nor says how it was found", IMPOSSIBLE),
-        Claim("table1", "only the electromechanical model is identifiable",
-              "parameters identified: " + said.format(*identified), CONFIRMED if alone else REFUTED),
-        Claim("table1", "the electromechanical model is large to compute, the others small",
-              "operations of the compiled equations in a Runge-Kutta step: " + said.format(*(f"{n:.0f}" for n in steps))
-              + "; in a sample with all its steps: " + said.format(*(f"{n:.0f}" for n in sizes))
-              + "; measured beside it, ns: " + said.format(*times),
-              CONFIRMED if sizes[0] > LARGER * max(sizes[1:]) else REFUTED),
-    ]  # fmt: skip
+        Claim(
+            "table1",
+            "P: the electromechanical model is better, the mechanical good, the voltage model bad",
+            "epsilon_p " + said.format(*map(percent, P)),
+            CONFIRMED if ranked_P else REFUTED,
+        ),
+        Claim(
+            "table1",
+            "Q: the electromechanical model is better, the voltage model good, the mechanical bad",
+            "epsilon_q " + said.format(*map(percent, Q)),
+            CONFIRMED if ranked_Q else REFUTED,
+        ),
+        Claim(
+            "table1",
+            "stability accuracy: better, better, good",
+            "the paper neither defines this column nor says how it was found",
+            IMPOSSIBLE,
+        ),
+        Claim(
+            "table1",
+            "only the electromechanical model is identifiable",
+            "parameters identified: " + said.format(*identified),
+            CONFIRMED if alone else REFUTED,
+        ),
+        Claim(
+            "table1",
+            "the electromechanical model is large to compute, the others small",
+            "operations of the compiled equations in a Runge-Kutta step: "
+            + said.format(*(f"{n:.0f}" for n in steps))
+            + "; in a sample with all its steps: "
+            + said.format(*(f"{n:.0f}" for n in sizes))
+            + "; measured beside it, ns: "
+            + said.format(*times),
+            CONFIRMED if sizes[0] > LARGER * max(sizes[1:]) else REFUTED,
+        ),
+    ]
 
 
 def table2(study: Study) -> list[Claim]:
@@ -140,23 +189,40 @@ def table2(study: Study) -> list[Claim]:
         fits = [several[0] for several in study.fits(name)]
         P, Q = (np.array([getattr(f, e) for f in fits]) for e in ("epsilon_p", "epsilon_q"))
         worst[how_read(name)] = max(P.max(), Q.max())
-        phrases.append(f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
-                    f" {percent(worst[how_read(name)])}")  # fmt: skip
+        phrases.append(
+            f"{how_read(name)} medians {percent(np.median(P))} and {percent(np.median(Q))}, worst"
+            f" {percent(worst[how_read(name)])}"
+        )
     sine = equations.steady_state_sine(printed.TABLE_3["issa"])
     accepted = {how: CONFIRMED if error < ACCEPTED else REFUTED for how, error in worst.items()}
     return [
-        Claim("table2", "the identified values", f"with them Eq. (3) asks for the arcsine of {sine:.2f}, and C ="
-              " (X - X')/X = -2.62 is no ratio of reactances; the record is not public", IMPOSSIBLE),
-        Claim("table2", "all identified parameters are within reasonable ranges",
-              "C lies outside (0, 1), where its definition puts it", REFUTED),
-        Claim("table2", "the errors of P and Q are below 5 %: the model is acceptable",
-              f"epsilon_p and epsilon_q: {'; '.join(phrases)}", merge_verdicts(accepted)),
-    ]  # fmt: skip
+        Claim(
+            "table2",
+            "the identified values",
+            f"with them Eq. (3) asks for the arcsine of {sine:.2f}, and C ="
+            " (X - X')/X = -2.62 is no ratio of reactances; the record is not public",
+            IMPOSSIBLE,
+        ),
+        Claim(
+            "table2",
+            "all identified parameters are within reasonable ranges",
+            "C lies outside (0, 1), where its definition puts it",
+            REFUTED,
+        ),
+        Claim(
+            "table2",
+            "the errors of P and Q are below 5 %: the model is acceptable",
+            f"epsilon_p and epsilon_q: {'; '.join(phrases)}",
+            merge_verdicts(accepted),
+        ),
+    ]
 
 
 def how_read(name: str) -> str:
     """A reading as a sentence has it."""
-    return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(name, printed.READINGS[name].words)
+    return {"issa": "with SD = 20", printed.TEN["issa"]: "with 10 perceivers"}.get(
+        name, printed.READINGS[name].words
+    )
 
 
 def table3(study: Study) -> list[Claim]:
@@ -169,25 +235,39 @@ def table3(study: Study) -> list[Claim]:
             claims.append(Claim("table3", text, measured, verdict))
     letter = [better(study, printed.LITERAL, pair, "iterations") for pair in PAIRS[:2]]
     numbers = (said for _, said in letter)
-    measured = "; ".join(f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), said in zip(PAIRS, numbers, strict=False))
+    measured = "; ".join(
+        f"{LABELS[a]} and {LABELS[b]}: {said}" for (a, b), said in zip(PAIRS, numbers, strict=False)
+    )
     won = all(verdict == CONFIRMED for verdict, _ in letter)
     text = "to the letter, ISSA is more accurate than SSA and PSO, after 300 iterations"
     claims.append(Claim("table3", text, measured, _sure(study, won)))
-    P, Q = ({n: np.median([getattr(s[0], e) for s in study.fits(n)]) for n in printed.COMPARED}
-            for e in ("epsilon_p", "epsilon_q"))  # fmt: skip
+    P, Q = (
+        {n: np.median([getattr(s[0], e) for s in study.fits(n)]) for n in printed.COMPARED}
+        for e in ("epsilon_p", "epsilon_q")
+    )
     said = "; ".join(f"{LABELS[n]} {percent(P[n])}, {percent(Q[n])}" for n in P)
     claims.append(
-        Claim("table3", "Q is described more accurately than P", f"median epsilon_p, epsilon_q: {said}",
-              CONFIRMED if all(Q[n] < P[n] for n in P) else REFUTED)
-    )  # fmt: skip
+        Claim(
+            "table3",
+            "Q is described more accurately than P",
+            f"median epsilon_p, epsilon_q: {said}",
+            CONFIRMED if all(Q[n] < P[n] for n in P) else REFUTED,
+        )
+    )
     gap = equations.consistency()
     worst = max(gap.misses, key=lambda n: abs(gap.misses[n]))
     claims.append(
-        Claim("table3", "the three columns are fits to one record",
-              "errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q² of"
-              f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses {LABELS[worst]}'s objective by"
-              f" {100 * abs(gap.misses[worst]):.0f} %", IMPOSSIBLE)
-    )  # fmt: skip
+        Claim(
+            "table3",
+            "the three columns are fits to one record",
+            "errors and objective of a column give mean P² and Q²; ISSA's and SSA's give a mean Q²"
+            " of"
+            f" {gap.pairs['issa and ssa'][1]:.2f}, and the best common pair misses"
+            f" {LABELS[worst]}'s objective by"
+            f" {100 * abs(gap.misses[worst]):.0f} %",
+            IMPOSSIBLE,
+        )
+    )
     return claims
 
 
@@ -209,17 +289,26 @@ def figure9(study: Study) -> list[Claim]:
 
 
 def faster(study: Study, first: str, second: str, by: str) -> tuple[str, list[str]]:
-    """Whether `first` reaches every target with less, over paired seeds, and the expected running times of both."""
+    """Whether `first` reaches every target with less, over paired seeds, and the expected running
+    times of both.
+    """
     p, A = [], []
     for target in TARGETS:
-        a, b = (np.where(*_mark_reached_cost(study.spent(name, target, by))) for name in (first, second))
+        a, b = (
+            np.where(*_mark_reached_cost(study.spent(name, target, by))) for name in (first, second)
+        )
         p.append(wilcoxon(a, b)[0])
         A.append(vargha_delaney(a, b))
-    times = [", ".join(number(study.running_time(name, t, by)) for t in TARGETS) for name in (first, second)]
+    times = [
+        ", ".join(number(study.running_time(name, t, by)) for t in TARGETS)
+        for name in (first, second)
+    ]
     return _sure(study, max(holm(p)) < SIGNIFICANCE_LEVEL and min(A) > 0.5), times
 
 
-def _mark_reached_cost(spent: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
+def _mark_reached_cost(
+    spent: tuple[np.ndarray, np.ndarray],
+) -> tuple[np.ndarray, np.ndarray, float]:
     """What `numpy.where` takes: the cost where the target was reached, else without end."""
     return spent[1], spent[0], np.inf
 
@@ -232,29 +321,42 @@ def _jumps(study: Study) -> Claim:
         tests = [why.fisher(shares["issa"], shares[name], "valley") for name in ("ssa", "pso")]
         more = all(shares["issa"].valley > shares[name].valley for name in ("ssa", "pso"))
         verdicts[how] = _sure(study, more and max(holm(tests)) < SIGNIFICANCE_LEVEL)
-        phrases.append(f"{how} " + ", ".join(f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
-                                          for n, s in shares.items()))  # fmt: skip
+        phrases.append(
+            f"{how} "
+            + ", ".join(
+                f"{LABELS[n]} {s.valley} of {s.n} (at its floor {s.floor})"
+                for n, s in shares.items()
+            )
+        )
     control = study.control_shares
     phrases.append(f"of random points {control.valley} of {control.n} descend there")
     return Claim(
-        "figure9", "SSA and PSO are caught in local optima, ISSA jumps out of them",
-        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}", merge_verdicts(verdicts),
-    )  # fmt: skip
+        "figure9",
+        "SSA and PSO are caught in local optima, ISSA jumps out of them",
+        f"searches that end in the valley of the lowest objective: {'; '.join(phrases)}",
+        merge_verdicts(verdicts),
+    )
 
 
 def _sure(study: Study, holds: bool) -> str:
     return OPEN if study.seeds < LEAST_SEEDS else CONFIRMED if holds else REFUTED
 
 
-def claim_generalization(part: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[[Study], list[Claim]]:
+def claim_generalization(
+    part: str, kind: str, table: dict[str, tuple[float, float]]
+) -> Callable[[Study], list[Claim]]:
 
     def claims(study: Study) -> list[Claim]:
         residuals = study.residuals(kind)
         own = [min(table, key=lambda n, c=c: table[n][c]) for c in (0, 1)]
         verdicts, phrases, good, worst = {}, [], {}, []
         for how, names in readings_of("issa", "ssa").items():
-            errors = [getattr(fits[e], name) for fits in study.fits(names["issa"]) for e in study.held(kind)
-                      for name in ("epsilon_p", "epsilon_q")]  # fmt: skip
+            errors = [
+                getattr(fits[e], name)
+                for fits in study.fits(names["issa"])
+                for e in study.held(kind)
+                for name in ("epsilon_p", "epsilon_q")
+            ]
             good[how] = CONFIRMED if max(errors) < ACCEPTED else REFUTED
             worst.append(f"{how} {percent(max(errors))}")
             verdicts[how] = _lowest(study, {n: residuals[names[n]] for n in names})
@@ -262,20 +364,31 @@ def claim_generalization(part: str, kind: str, table: dict[str, tuple[float, flo
             pairs = (f"{LABELS[n]} {number(r[0])}, {number(r[1])}" for n, r in middle.items())
             phrases.append(f"{how} {', '.join(pairs)}")
         return [
-            Claim(part, f"ISSA's model has good {kind} ability",
-                  f"epsilon_p and epsilon_q of the held-out dip, worst of all seeds: {'; '.join(worst)}",
-                  merge_verdicts(good)),
-            Claim(part, f"ISSA's model has the best {kind} overall",
-                  f"median residuals of P, Q [pu]: {'; '.join(phrases)}. The paper's own table has {LABELS[own[0]]}"
-                  " lowest in P", merge_verdicts(verdicts)),
-        ]  # fmt: skip
+            Claim(
+                part,
+                f"ISSA's model has good {kind} ability",
+                "epsilon_p and epsilon_q of the held-out dip, worst of all seeds:"
+                f" {'; '.join(worst)}",
+                merge_verdicts(good),
+            ),
+            Claim(
+                part,
+                f"ISSA's model has the best {kind} overall",
+                f"median residuals of P, Q [pu]: {'; '.join(phrases)}. The paper's own table has"
+                f" {LABELS[own[0]]}"
+                " lowest in P",
+                merge_verdicts(verdicts),
+            ),
+        ]
 
     return claims
 
 
 def _lowest(study: Study, residuals: Mapping[str, np.ndarray]) -> str:
     """Whether ISSA's residuals (seeds, 2), of P and of Q, are lower than those of both others."""
-    rivals = [(residuals["issa"][:, c], residuals[name][:, c]) for name in ("ssa", "pso") for c in (0, 1)]
+    rivals = [
+        (residuals["issa"][:, c], residuals[name][:, c]) for name in ("ssa", "pso") for c in (0, 1)
+    ]
     return _sure(study, all(lower(rivals)))
 
 
@@ -289,16 +402,29 @@ def figure3(study: Study) -> list[Claim]:
     measured = f"median centered discrepancy of {next(iter(study.uniformity))}: "
     far = np.median(flock[own]) / np.median(flock["uniform"])
     return [
-        Claim("figure3", "the tent map is more uniform than the logistic map",
-              f"{measured}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
-              CONFIRMED if middle[own] < middle["logistic"] else REFUTED),
-        Claim("figure3", "with alpha = 0.3 it is relatively uniform",
-              f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3 has"
-              f" {number(tent[own])}", CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED),
-        Claim("figure3", "initializing by the tent map makes the flock more even",
-              f"{far:.2f} times the discrepancy of plain random numbers, {middle[own] / middle['Sobol']:.1f} times"
-              " that of Sobol points", CONFIRMED if far < 1 / DIFFERENT else REFUTED),
-    ]  # fmt: skip
+        Claim(
+            "figure3",
+            "the tent map is more uniform than the logistic map",
+            f"{measured}tent {number(middle[own])}, logistic {number(middle['logistic'])}",
+            CONFIRMED if middle[own] < middle["logistic"] else REFUTED,
+        ),
+        Claim(
+            "figure3",
+            "with alpha = 0.3 it is relatively uniform",
+            f"lowest of the alphas tried: {best.partition(', ')[2]} with {number(tent[best])}; 0.3"
+            " has"
+            f" {number(tent[own])}",
+            CONFIRMED if tent[own] < DIFFERENT * tent[best] else REFUTED,
+        ),
+        Claim(
+            "figure3",
+            "initializing by the tent map makes the flock more even",
+            f"{far:.2f} times the discrepancy of plain random numbers,"
+            f" {middle[own] / middle['Sobol']:.1f} times"
+            " that of Sobol points",
+            CONFIRMED if far < 1 / DIFFERENT else REFUTED,
+        ),
+    ]
 
 
 def figure4(study: Study) -> list[Claim]:
@@ -306,28 +432,46 @@ def figure4(study: Study) -> list[Claim]:
     slopes = {formula: maps.tail_exponent(steps) for formula, steps in study.tails.items()}
     even = {formula: float(np.mean(steps > 0)) for formula, steps in study.tails.items()}
     return [
-        Claim("figure4", "Lévy steps have good randomness in size and direction",
-              f"Mantegna's: {even['mantegna']:.1%} of the steps positive, tail exponent {slopes['mantegna']:.2f}",
-              CONFIRMED if abs(even["mantegna"] - 0.5) < 0.01 and slopes["mantegna"] < 2 else REFUTED),
-        Claim("figure4", "Eq. (15) gives Lévy steps with beta = 3/2",
-              f"as printed the tail exponent is {slopes['printed']:.2f} (2/3 in theory), which a Lévy flight of"
-              f" exponent 3/2 has not; Mantegna's |nu|^(1/beta) has {slopes['mantegna']:.2f}",
-              CONFIRMED if abs(slopes["printed"] - 1.5) < 0.2 else REFUTED),
-    ]  # fmt: skip
+        Claim(
+            "figure4",
+            "Lévy steps have good randomness in size and direction",
+            f"Mantegna's: {even['mantegna']:.1%} of the steps positive, tail exponent"
+            f" {slopes['mantegna']:.2f}",
+            CONFIRMED if abs(even["mantegna"] - 0.5) < 0.01 and slopes["mantegna"] < 2 else REFUTED,
+        ),
+        Claim(
+            "figure4",
+            "Eq. (15) gives Lévy steps with beta = 3/2",
+            f"as printed the tail exponent is {slopes['printed']:.2f} (2/3 in theory), which a Lévy"
+            " flight of"
+            f" exponent 3/2 has not; Mantegna's |nu|^(1/beta) has {slopes['mantegna']:.2f}",
+            CONFIRMED if abs(slopes["printed"] - 1.5) < 0.2 else REFUTED,
+        ),
+    ]
 
 
 def lower(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> list[bool]:
-    """Whether the first values (seeds,) of each pair are lower than the second, corrected for all pairs."""
+    """Whether the first values (seeds,) of each pair are lower than the second, corrected for all
+    pairs.
+    """
     corrected = holm([wilcoxon(a, b)[0] for a, b in pairs])
-    return [p < SIGNIFICANCE_LEVEL and vargha_delaney(a, b) > 0.5 for p, (a, b) in zip(corrected, pairs, strict=True)]
+    return [
+        p < SIGNIFICANCE_LEVEL and vargha_delaney(a, b) > 0.5
+        for p, (a, b) in zip(corrected, pairs, strict=True)
+    ]
 
 
 def readings(study: Study) -> list[Claim]:
     """Whether the ranking survives the readings, and whether the ingredients help."""
-    both = [(study.objectives(name), study.objectives(name.replace("issa", "ssa", 1))) for name in BOTH]
+    both = [
+        (study.objectives(name), study.objectives(name.replace("issa", "ssa", 1))) for name in BOTH
+    ]
     issa, ssa = lower(both), lower([(b, a) for a, b in both])
     whole = study.objectives("issa")
-    without = {label: study.objectives(f"issa_no_{name}") for name, (_, label) in printed.INGREDIENTS.items()}
+    without = {
+        label: study.objectives(f"issa_no_{name}")
+        for name, (_, label) in printed.INGREDIENTS.items()
+    }
     helps = lower([(whole, ends) for ends in without.values()])
     factors = ", ".join(
         f"{what} × {np.median(ends) / np.median(whole):.2f} (A = {vargha_delaney(whole, ends):.2f}"
@@ -336,16 +480,30 @@ def readings(study: Study) -> list[Claim]:
     )
     zero = {n: far / max(near, 1e-300) for n, (near, far) in study.bias.items()}
     return [
-        Claim("readings", "ISSA is better than SSA, whatever the reading of Eqs. (11) to (13)",
-              f"of {len(both)} readings, at 300 iterations, ISSA ends significantly lower in {sum(issa)}, SSA in"
-              f" {sum(ssa)}", _sure(study, all(issa))),
-        Claim("readings", "each of the four ingredients improves the search",
-              f"with SD = 20, median objective without it over that of ISSA, both after 300 iterations: {factors}",
-              _sure(study, all(helps))),
-        Claim("readings", "SSA searches the space without preference",
-              f"error on the sphere with the optimum one unit off zero over that at zero: SSA {zero['ssa']:.0e},"
-              f" ISSA {zero['issa']:.0e}, PSO {zero['pso']:.1g}", CONFIRMED if zero["ssa"] < 100 else REFUTED),
-    ]  # fmt: skip
+        Claim(
+            "readings",
+            "ISSA is better than SSA, whatever the reading of Eqs. (11) to (13)",
+            f"of {len(both)} readings, at 300 iterations, ISSA ends significantly lower in"
+            f" {sum(issa)}, SSA in"
+            f" {sum(ssa)}",
+            _sure(study, all(issa)),
+        ),
+        Claim(
+            "readings",
+            "each of the four ingredients improves the search",
+            "with SD = 20, median objective without it over that of ISSA, both after 300"
+            f" iterations: {factors}",
+            _sure(study, all(helps)),
+        ),
+        Claim(
+            "readings",
+            "SSA searches the space without preference",
+            "error on the sphere with the optimum one unit off zero over that at zero: SSA"
+            f" {zero['ssa']:.0e},"
+            f" ISSA {zero['issa']:.0e}, PSO {zero['pso']:.1g}",
+            CONFIRMED if zero["ssa"] < 100 else REFUTED,
+        ),
+    ]
 
 
 def agreement(study: Study) -> list[Claim]:
@@ -354,12 +512,19 @@ def agreement(study: Study) -> list[Claim]:
     failed = [check for check in checks if not check.holds]
     wrong, right = equations.order(equations.as_printed), equations.order(equations.classical)
     return [
-        Claim("equations", "what is printed agrees with the printed equations",
-              f"{len(failed)} of {len(checks)} checks fail", REFUTED if failed else CONFIRMED),
-        Claim("equations", "Eq. (4) is the fourth-order Runge-Kutta method",
-              f"measured order {wrong:.2f} as printed, {right:.2f} of the classical method",
-              CONFIRMED if wrong > 3.5 else REFUTED),
-    ]  # fmt: skip
+        Claim(
+            "equations",
+            "what is printed agrees with the printed equations",
+            f"{len(failed)} of {len(checks)} checks fail",
+            REFUTED if failed else CONFIRMED,
+        ),
+        Claim(
+            "equations",
+            "Eq. (4) is the fourth-order Runge-Kutta method",
+            f"measured order {wrong:.2f} as printed, {right:.2f} of the classical method",
+            CONFIRMED if wrong > 3.5 else REFUTED,
+        ),
+    ]
 
 
 BY_PART: dict[str, Callable[[Study], Sequence[Claim]]] = {

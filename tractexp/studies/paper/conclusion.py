@@ -1,4 +1,6 @@
-"""What the measurements come to, in sentences: of the whole page, of the ranking, and of the valley at a bound."""
+"""What the measurements come to, in sentences: of the whole page, of the ranking, and of the valley
+at a bound.
+"""
 
 from collections.abc import Mapping, Sequence
 
@@ -10,12 +12,15 @@ from tractexp.studies.paper.printed import COMPARED, LABELS
 from tractexp.studies.paper.study import FLOOR_FACTOR, NARROW, TRADED, WIDE, Study
 from tractexp.wording import join_words
 
-LARGEST_NEAR_RATIO = 2.0  # times the lowest objective: a valley that a search might take for the right one
+# times the lowest objective: a valley that a search might take for the right one
+LARGEST_NEAR_RATIO = 2.0
 
 
 def sentences(study: Study, claims: Sequence[Claim]) -> list[str]:
     """The conclusion of the page, of as many of its parts as there are."""
-    parts: Mapping[str, list[Claim]] = {c.part: [d for d in claims if d.part == c.part] for c in claims}
+    parts: Mapping[str, list[Claim]] = {
+        c.part: [d for d in claims if d.part == c.part] for c in claims
+    }
     paragraphs = []
     if parts.keys() & {"table2", "table4", "table5"}:
         paragraphs.append(_model(parts))
@@ -35,9 +40,14 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
     verdicts = {dip: parts[part][k].verdict for part, (dip, k) in where.items() if part in parts}
     good = [dip for dip, verdict in verdicts.items() if verdict == CONFIRMED]
-    said = [f"describes {join_words(good)} dip with errors below 5 %, with every seed and reading tried"] * bool(good)
-    said += [f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
-             for dip, verdict in verdicts.items() if verdict != CONFIRMED]  # fmt: skip
+    said = [
+        f"describes {join_words(good)} dip with errors below 5 %, with every seed and reading tried"
+    ] * bool(good)
+    said += [
+        f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
+        for dip, verdict in verdicts.items()
+        if verdict != CONFIRMED
+    ]
     return f"The load model that ISSA identifies {'; '.join(said)}."
 
 
@@ -45,7 +55,8 @@ def _values() -> str:
     checks = equations.checks()
     failed = sum(not check.holds for check in checks)
     return (
-        "The parameters printed are not those of the equations printed: Eq. (3) has no steady state for any column of"
+        "The parameters printed are not those of the equations printed: Eq. (3) has no steady state"
+        " for any column of"
         f" Table 3, and of {len(checks)} checks of the print against itself {failed} fail."
     )
 
@@ -57,9 +68,17 @@ def _describe_ranking(study: Study) -> str:
         ("simulations", f"after {study.equal:,} simulations each"),
     ):
         order = sorted(COMPARED, key=lambda name: np.median(study.objectives(name, by)))
-        medians = ", ".join(f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order)
-        apart = [f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)]
-        rest = f" (no significant difference {join_words(apart)})" if apart else " (all differences significant)"
+        medians = ", ".join(
+            f"{LABELS[n]} {number(float(np.median(study.objectives(n, by))))}" for n in order
+        )
+        apart = [
+            f"between {LABELS[a]} and {LABELS[b]}" for a, b in PAIRS if not _differ(study, a, b, by)
+        ]
+        rest = (
+            f" (no significant difference {join_words(apart)})"
+            if apart
+            else " (all differences significant)"
+        )
         parts.append(f"{budget} the median objectives are {medians} pu²{rest}")
     verdict, _ = compare_ends(study, "issa", "ssa", "iterations")
     reading = f" Whether ISSA ends lower than SSA {verdict}." if verdict.startswith(DEPENDS) else ""
@@ -75,7 +94,9 @@ def _differ(study: Study, first: str, second: str, by: str) -> bool:
 
 def _lack(study: Study) -> str:
     said = why.answer(why.lacks(study))
-    return f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
+    return (
+        f"That convergence at the end, not exploration, is what the sparrow searches lack {said}."
+    )
 
 
 def _random(study: Study) -> str:
@@ -83,8 +104,10 @@ def _random(study: Study) -> str:
     there = ", ".join(f"{LABELS[n]} {s.valley} of {s.n}" for n, s in shares.items())
     above = ", ".join(f"{LABELS[n]} {np.median(study.above_bottom(n)):.2f}" for n in COMPARED)
     return (
-        f"In the valley of the lowest objective end {there} searches, and {control.valley} of {control.n} random points"
-        f" descend there; the median objective over that at the bottom of the search's own valley is {above}."
+        f"In the valley of the lowest objective end {there} searches, and {control.valley} of"
+        f" {control.n} random points"
+        " descend there; the median objective over that at the bottom of the search's own valley"
+        f" is {above}."
     )
 
 
@@ -93,21 +116,29 @@ def _readings(claims: Sequence[Claim]) -> str:
     held = [claim.text for claim in claims if claim.verdict == CONFIRMED]
     if held:
         return f"Of what the improvement rests on, this holds: {'; '.join(held)}."
-    return f"None of what the improvement rests on holds: {'; '.join(claim.text for claim in claims)}."
+    return (
+        f"None of what the improvement rests on holds: {'; '.join(claim.text for claim in claims)}."
+    )
 
 
 def reasons(study: Study) -> list[str]:
     """Why the three rank as they do, tested."""
     paragraphs = [
-        f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)} {_random(study)}"
+        f"Is it convergence at the end, and not exploration, that the sparrows lack? {_lack(study)}"
+        f" {_random(study)}"
     ]
     paragraphs += [_describe_lack(lack) for lack in why.lacks(study)]
-    rival, limited, control = study.shares(why.RIVAL), study.shares("pso_limited"), study.control_shares
+    rival, limited, control = (
+        study.shares(why.RIVAL),
+        study.shares("pso_limited"),
+        study.control_shares,
+    )
     p = why.fisher(rival, control, "valley")
     word = "more" if rival.valley * control.n > control.valley * rival.n else "less"
     word = word if p < why.SIGNIFICANCE_LEVEL else f"not significantly {word}"
     paragraphs.append(
-        f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its velocity limited to 0.2 in"
+        f"PSO is in the right valley {word} often than random points (p = {p:.2g}); with its"
+        " velocity limited to 0.2 in"
         f" {limited.valley} of {limited.n} searches."
     )
     return paragraphs
@@ -115,21 +146,29 @@ def reasons(study: Study) -> list[str]:
 
 def _describe_lack(lack: why.Lack) -> str:
     farther = "" if lack.convergence.lacks else "not "
-    others = {"PSO": lack.valley, "random points": lack.random, "the best of as many random points": lack.best}
+    others = {
+        "PSO": lack.valley,
+        "random points": lack.random,
+        "the best of as many random points": lack.best,
+    }
     lost = [name for name, test in others.items() if test.lacks]
     often, than = ("", join_words(lost)) if lost else ("not ", join_words(list(others), "or"))
     ended = "not significantly different from"
     if lack.polished.p < why.SIGNIFICANCE_LEVEL:
         ended = f"significantly {'higher' if lack.polished.less else 'lower'} than"
     return (
-        f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own valley than PSO, and is"
-        f" {often}significantly less often in the right valley than {than}. Once least squares have ended both, it is"
+        f"{LABELS[lack.name]} ends {farther}significantly farther above the bottom of its own"
+        " valley than PSO, and is"
+        f" {often}significantly less often in the right valley than {than}. Once least squares have"
+        " ended both, it is"
         f" {ended} PSO."
     )
 
 
 def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
-    """Q_s0 [pu], what the motor leaves of Q0 to the static load, of free values (n, free); None for other motors."""
+    """Q_s0 [pu], what the motor leaves of Q0 to the static load, of free values (n, free); None for
+    other motors.
+    """
     names, event = study.problem.model.names, study.problem.events[0]
     if not {"T_m", "X_prime", "C"} <= set(names):
         return None
@@ -138,7 +177,9 @@ def static_reactive(study: Study, values: np.ndarray) -> np.ndarray | None:
 
 
 def valley(study: Study) -> list[str]:
-    """What the second valley is, where it lies and why searches go there; as much of it as this model shows."""
+    """What the second valley is, where it lies and why searches go there; as much of it as this
+    model shows.
+    """
     groups, names = study.control.grouped(), study.problem.space.names
     if len(groups) < 2:
         return [f"All random points descend to {number(groups[0][0])} pu²: there is one valley."]
@@ -146,12 +187,21 @@ def valley(study: Study) -> list[str]:
     column = names.index(TRADED)
     low, high = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
     at_bound = other[column] - low < 0.01 * (high - low)
-    ended = {n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < FLOOR_FACTOR - 1)) for n in COMPARED}
-    where = f"on the lower bound of {TRADED}, {low:g}" if at_bound else f"at {TRADED} = {other[column]:.3g}"
+    ended = {
+        n: int(np.sum(np.abs(study.ends[n].objective / second - 1) < FLOOR_FACTOR - 1))
+        for n in COMPARED
+    }
+    where = (
+        f"on the lower bound of {TRADED}, {low:g}"
+        if at_bound
+        else f"at {TRADED} = {other[column]:.3g}"
+    )
     each = ", ".join(f"{LABELS[n]} {k}" for n, k in ended.items())
     paragraphs = [
-        f"{sum(ended.values())} of {3 * study.seeds} searches ({each}) end in a valley whose bottom lies {where}, with"
-        f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} = {right[column]:.3g};"
+        f"{sum(ended.values())} of {3 * study.seeds} searches ({each}) end in a valley whose bottom"
+        f" lies {where}, with"
+        f" {second / lowest:.2f} times the lowest objective, which is at {TRADED} ="
+        f" {right[column]:.3g};"
         f" {count} of {len(study.control.objective)} random points of the bounds descend there."
     ]
     if at_bound and second < LARGEST_NEAR_RATIO * lowest and right[column] > other[column]:
@@ -160,15 +210,19 @@ def valley(study: Study) -> list[str]:
 
 
 def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarray) -> list[str]:
-    """Why the lower bound attracts: what lies between it and the lowest valley, and what trades along its own."""
+    """Why the lower bound attracts: what lies between it and the lowest valley, and what trades
+    along its own.
+    """
     grid, path = study.path
     column = study.problem.space.names.index(TRADED)
     between = np.flatnonzero((grid > other[column]) & (grid < right[column]))
     ridge = int(between[np.argmax(path.objective[between])])
     static = static_reactive(study, np.stack((right, other)))
     remark = (
-        f" There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign: {static[0]:+.2f} pu"
-        f" in the lowest valley, {static[1]:+.2f} pu in the other, which stands for a source such as a capacitor."
+        " There the static load's part of the reactive power, Q_s0 = Q0 - Q_d0, changes its sign:"
+        f" {static[0]:+.2f} pu"
+        f" in the lowest valley, {static[1]:+.2f} pu in the other, which stands for a source such"
+        " as a capacitor."
         if static is not None and static[0] * static[1] < 0
         else ""
     )
@@ -178,12 +232,16 @@ def _attraction(study: Study, lowest: float, right: np.ndarray, other: np.ndarra
     ]
     along = np.flatnonzero((grid < grid[ridge]) & (path.objective < LARGEST_NEAR_RATIO * lowest))
     if len(along) > 1 and (np.diff(path.objective[along]) > 0).all():
-        paragraphs.append(_describe_trade(study, along, int(np.abs(grid - other[column]).argmin()), lowest))
+        paragraphs.append(
+            _describe_trade(study, along, int(np.abs(grid - other[column]).argmin()), lowest)
+        )
     return paragraphs
 
 
 def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -> str:
-    """What trades along the valley, which `along` are points of the path; its bottom within the bounds is `here`."""
+    """What trades along the valley, which `along` are points of the path; its bottom within the
+    bounds is `here`.
+    """
     grid, path = study.path
     names = study.problem.space.names
     sentence = f"Along the valley the objective falls with {TRADED}"
@@ -191,28 +249,37 @@ def _describe_trade(study: Study, along: np.ndarray, here: int, lowest: float) -
     places = [near, here, far]
     sentence += (
         f", {join_words([f'{path.objective[k] / lowest:.2f}' for k in places])} times the lowest at"
-        f" {join_words([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever the bound, it attracts."
+        f" {join_words([f'{grid[k]:.2f}' for k in places])}, and has no minimum inside: whatever"
+        " the bound, it attracts."
     )
     if "X_prime" in names:
         ratio = path.values[along, names.index("X_prime")] / path.values[along, names.index(TRADED)]
         sentence += (
             f" {TRADED} trades against X': X'/{TRADED} stays {np.median(ratio):.3f}"
-            f" (within {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the same active power."
+            f" (within {50 * np.ptp(ratio) / np.median(ratio):.1f} %), so that the motor draws the"
+            " same active power."
         )
     if {"X_prime", "q_v"} <= set(names):
         q_v = path.values[:, names.index("q_v")]
         sentence += (
-            " As the U²/X' of its reactive power grows, the static load takes it off again, with its exponent"
-            f" approaching that of the motor's term, 2: q_v is {join_words([f'{q_v[k]:.2f}' for k in places])} there."
+            " As the U²/X' of its reactive power grows, the static load takes it off again, with"
+            " its exponent"
+            " approaching that of the motor's term, 2: q_v is"
+            f" {join_words([f'{q_v[k]:.2f}' for k in places])} there."
         )
     return sentence
 
 
 def _bounds(study: Study, own: tuple[float, float], lowest: float) -> str:
-    shares = {bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest) for bounds, ends in study.rebounded.items()}
+    shares = {
+        bounds: np.mean(ends.objective <= FLOOR_FACTOR * lowest)
+        for bounds, ends in study.rebounded.items()
+    }
     listed = ", ".join(f"{shares[b]:.0%} from {b[0]:g}" for b in (WIDE, own, NARROW))
     helps = shares[NARROW] > 1.5 * shares[own] and shares[WIDE] < 1.1 * shares[own]
     return (
-        f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}: {listed}, where"
-        " induction motors have it" + (". Wider bounds do not help, narrower ones do." if helps else ".")
+        f"Of random points, these descend to the lowest objective by the lower bound of {TRADED}:"
+        f" {listed}, where"
+        " induction motors have it"
+        + (". Wider bounds do not help, narrower ones do." if helps else ".")
     )

@@ -12,7 +12,8 @@ from tractexp.plugin import build
 from tractexp.studies.paper import maps, printed
 from tractexp.studies.paper.printed import LABELS
 
-FAIR = (0.06, 0.75, 0.85, 0.0026, 0.36)  # T', X', C, M, T_m of a motor that has a steady state at U0 = 1
+# T', X', C, M, T_m of a motor that has a steady state at U0 = 1
+FAIR = (0.06, 0.75, 0.85, 0.0026, 0.36)
 PRINTED_TOLERANCE = 0.01  # of a printed number that rounding explains
 Field = Callable[[np.ndarray], np.ndarray]
 
@@ -25,12 +26,17 @@ def steady_state_sine(column: Sequence[float], U0: float = 1.0) -> float:
 
 def refusals(model: Any, drive: Any) -> dict[str, str]:
     """What the model answers to each column of Table 3; "" where it has a steady state."""
-    return {name: model.refusal(np.array(column), drive) or "" for name, column in printed.TABLE_3.items()}
+    return {
+        name: model.refusal(np.array(column), drive) or ""
+        for name, column in printed.TABLE_3.items()
+    }
 
 
 @dataclass(frozen=True)
 class Consistency:
-    """The mean squares of P and Q that Table 3 implies, and by how much each printed objective then misses."""
+    """The mean squares of P and Q that Table 3 implies, and by how much each printed objective then
+    misses.
+    """
 
     pairs: Mapping[str, tuple[float, float]]  # "issa and ssa" -> mean squares of P and Q
     best: tuple[float, float]  # non-negative, with the smallest relative misses
@@ -38,7 +44,9 @@ class Consistency:
 
 
 def consistency() -> Consistency:
-    """Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²) by Eq. (20): three columns, two unknowns of one record."""
+    """Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²) by Eq. (20): three columns, two unknowns
+    of one record.
+    """
     from scipy.optimize import nnls
 
     names = list(printed.TABLE_3)
@@ -50,7 +58,9 @@ def consistency() -> Consistency:
         pairs[f"{names[i]} and {names[j]}"] = float(P), float(Q)
     best, _ = nnls(rows / goal[:, None], np.ones(3))
     misses = (rows @ best - goal) / goal
-    return Consistency(pairs, (float(best[0]), float(best[1])), dict(zip(names, misses.tolist(), strict=True)))
+    return Consistency(
+        pairs, (float(best[0]), float(best[1])), dict(zip(names, misses.tolist(), strict=True))
+    )
 
 
 def classical(f: Field, y: np.ndarray, h: float) -> np.ndarray:
@@ -59,7 +69,9 @@ def classical(f: Field, y: np.ndarray, h: float) -> np.ndarray:
 
 
 def as_printed(f: Field, y: np.ndarray, h: float) -> np.ndarray:
-    """One step of Eq. (4) as printed, h/6 in the second and third stage, its twice named K1 read as K3 and K4."""
+    """One step of Eq. (4) as printed, h/6 in the second and third stage, its twice named K1 read as
+    K3 and K4.
+    """
     return _runge_kutta(f, y, h, h / 6)
 
 
@@ -72,7 +84,9 @@ def _runge_kutta(f: Field, y: np.ndarray, h: float, inner: float) -> np.ndarray:
 
 
 def order(step: Callable[[Field, np.ndarray, float], np.ndarray], halvings: int = 5) -> float:
-    """The order of a method: the slope of log error over log step, for an oscillator over one radian."""
+    """The order of a method: the slope of log error over log step, for an oscillator over one
+    radian.
+    """
     turn = np.array([[0.0, 1.0], [-1.0, 0.0]])
     exact = np.array([np.cos(1.0), -np.sin(1.0)])
     counts, errors = 8 * 2 ** np.arange(halvings), []
@@ -102,19 +116,34 @@ def checks() -> list[Check]:
 def _steady_states() -> list[Check]:
     """Eqs. (1) to (3) and the definitions below them."""
     residual = rest_residual(FAIR)
-    results = [Check("Eq. (3)", "the steady state of Eq. (1)", f"with it the derivatives of Eq. (1) are {residual:.0e}",
-                  residual < 1e-12)]  # fmt: skip
+    results = [
+        Check(
+            "Eq. (3)",
+            "the steady state of Eq. (1)",
+            f"with it the derivatives of Eq. (1) are {residual:.0e}",
+            residual < 1e-12,
+        )
+    ]
     for name, column in printed.TABLE_3.items():
         value, sine = dict(zip(printed.NAMES, column, strict=True)), steady_state_sine(column)
         where = f"Table 3, {LABELS[name]}"
         C, T = value["C"], value["T_prime"]
         results += [
-            Check(where, f"T_m = {value['T_m']:g}, X' = {value['X_prime']:g}, C = {C:g}",
-                  f"Eq. (3) takes the arcsine of 2 T_m X'/(C U0²), in size {sine:.2f} at U0 = 1: it must not exceed 1",
-                  sine <= 1),
-            Check(where, f"C = {C:g}", "C = (X - X')/X, with X' between 0 and X, lies between 0 and 1", 0 < C < 1),
+            Check(
+                where,
+                f"T_m = {value['T_m']:g}, X' = {value['X_prime']:g}, C = {C:g}",
+                f"Eq. (3) takes the arcsine of 2 T_m X'/(C U0²), in size {sine:.2f} at U0 = 1: it"
+                " must not exceed 1",
+                sine <= 1,
+            ),
+            Check(
+                where,
+                f"C = {C:g}",
+                "C = (X - X')/X, with X' between 0 and X, lies between 0 and 1",
+                0 < C < 1,
+            ),
             Check(where, f"T' = {T:g} s", "T' = X'/X T0' is a time constant: positive", T > 0),
-        ]  # fmt: skip
+        ]
     return results
 
 
@@ -124,18 +153,36 @@ def _errors() -> list[Check]:
     for name, label in LABELS.items():
         if name in printed.EPSILON_P:
             P, Q = printed.EPSILON_P[name], printed.EPSILON_Q[name]
-            results.append(Check(f"Table 3, {label}", f"epsilon_p {100 * P:g} %, epsilon_q {100 * Q:g} %",
-                              f"section 4.2 accepts less than {100 * ACCEPTED:g} %", max(P, Q) < ACCEPTED))  # fmt: skip
+            results.append(
+                Check(
+                    f"Table 3, {label}",
+                    f"epsilon_p {100 * P:g} %, epsilon_q {100 * Q:g} %",
+                    f"section 4.2 accepts less than {100 * ACCEPTED:g} %",
+                    max(P, Q) < ACCEPTED,
+                )
+            )
     gap = consistency()
     for pair, (P, Q) in gap.pairs.items():
         first, second = pair.split(" and ")
-        results.append(Check(f"Table 3, {LABELS[first]} and {LABELS[second]}", "errors and objectives of one record",
-                          f"Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²), Eq. (20): the means are {P:.2f} and"
-                          f" {Q:.2f}, and no mean of squares is negative", min(P, Q) >= 0))  # fmt: skip
+        results.append(
+            Check(
+                f"Table 3, {LABELS[first]} and {LABELS[second]}",
+                "errors and objectives of one record",
+                "Eq. (8) is epsilon_p² mean(P²) + epsilon_q² mean(Q²), Eq. (20): the means are"
+                f" {P:.2f} and"
+                f" {Q:.2f}, and no mean of squares is negative",
+                min(P, Q) >= 0,
+            )
+        )
     misses = ", ".join(f"{LABELS[n]} {100 * m:+.0f} %" for n, m in gap.misses.items())
-    results.append(Check("Table 3, all three", "errors and objectives of one record",
-                      f"the means that fit best miss the printed objectives by {misses}",
-                      max(map(abs, gap.misses.values())) < PRINTED_TOLERANCE))  # fmt: skip
+    results.append(
+        Check(
+            "Table 3, all three",
+            "errors and objectives of one record",
+            f"the means that fit best miss the printed objectives by {misses}",
+            max(map(abs, gap.misses.values())) < PRINTED_TOLERANCE,
+        )
+    )
     return results
 
 
@@ -144,42 +191,83 @@ def _methods() -> list[Check]:
     wrong, right = order(as_printed), order(classical)
     slopes = {formula: maps.tail_exponent(steps) for formula, steps in maps.tails().items()}
     return [
-        Check("Eq. (4)", "the fourth-order Runge-Kutta method",
-              f"measured order {wrong:.2f}; with h/2 for h/6 in the second and third stage {right:.2f}", wrong > 3.5),
-        Check("Eq. (15)", "Lévy steps with beta = 3/2",
-              f"-mu/|nu|^beta has the tail exponent {slopes['printed']:.2f}; Mantegna's mu/|nu|^(1/beta)"
-              f" {slopes['mantegna']:.2f}", abs(slopes["printed"] - 1.5) < 0.2),
-        Check("section 4.3", "SD = 20 of N = 50", "section 4.2 has 20 % of perceivers, which are 10", False),
-        Check("step 5", "the perturbation is chosen by fitness",
-              "section 3.2.3 chooses it by the stage of the search", False),
-        Check("section 4.4.2", "the dip to extrapolate to is of less than 50 %",
-              "beyond the fitted dip of 50 % lies a deeper one; one of less is to interpolate, as in 4.4.1", False),
-    ]  # fmt: skip
+        Check(
+            "Eq. (4)",
+            "the fourth-order Runge-Kutta method",
+            f"measured order {wrong:.2f}; with h/2 for h/6 in the second and third stage"
+            f" {right:.2f}",
+            wrong > 3.5,
+        ),
+        Check(
+            "Eq. (15)",
+            "Lévy steps with beta = 3/2",
+            f"-mu/|nu|^beta has the tail exponent {slopes['printed']:.2f}; Mantegna's"
+            " mu/|nu|^(1/beta)"
+            f" {slopes['mantegna']:.2f}",
+            abs(slopes["printed"] - 1.5) < 0.2,
+        ),
+        Check(
+            "section 4.3",
+            "SD = 20 of N = 50",
+            "section 4.2 has 20 % of perceivers, which are 10",
+            False,
+        ),
+        Check(
+            "step 5",
+            "the perturbation is chosen by fitness",
+            "section 3.2.3 chooses it by the stage of the search",
+            False,
+        ),
+        Check(
+            "section 4.4.2",
+            "the dip to extrapolate to is of less than 50 %",
+            "beyond the fitted dip of 50 % lies a deeper one; one of less is to interpolate, as in"
+            " 4.4.1",
+            False,
+        ),
+    ]
 
 
 def _rankings() -> list[Check]:
     results = []
-    tables = {"epsilon_p": printed.EPSILON_P, "epsilon_q": printed.EPSILON_Q, "Obj.E": printed.OBJECTIVE}
+    tables = {
+        "epsilon_p": printed.EPSILON_P,
+        "epsilon_q": printed.EPSILON_Q,
+        "Obj.E": printed.OBJECTIVE,
+    }
     for said, table in tables.items():
         results.append(_lowest("Table 3", said, table))
     P = printed.EPSILON_P
-    results.append(Check("Table 3", "SSA is more accurate than PSO", f"its epsilon_p is {100 * P['ssa']:g} %, PSO's"
-                      f" {100 * P['pso']:g} %", P["ssa"] < P["pso"]))  # fmt: skip
+    results.append(
+        Check(
+            "Table 3",
+            "SSA is more accurate than PSO",
+            f"its epsilon_p is {100 * P['ssa']:g} %, PSO's {100 * P['pso']:g} %",
+            P["ssa"] < P["pso"],
+        )
+    )
     for where, rows in (("Table 4", printed.INTERPOLATION), ("Table 5", printed.EXTRAPOLATION)):
         for c, channel in enumerate("PQ"):
-            results.append(_lowest(where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()}))
+            results.append(
+                _lowest(where, f"residual of {channel}", {n: pair[c] for n, pair in rows.items()})
+            )
     return results
 
 
 def _lowest(where: str, what: str, table: Mapping[str, float]) -> Check:
     best = min(table, key=lambda name: table[name])
     return Check(
-        where, f"ISSA has the lowest {what}", f"the lowest is {LABELS[best]}'s, {table[best]:g}", best == "issa"
+        where,
+        f"ISSA has the lowest {what}",
+        f"the lowest is {LABELS[best]}'s, {table[best]:g}",
+        best == "issa",
     )
 
 
 def rest_residual(motor: Sequence[float], U0: float = 1.0) -> float:
-    """The largest derivative of Eq. (1), as printed, in the state of Eq. (3); `motor` is T', X', C, M, T_m."""
+    """The largest derivative of Eq. (1), as printed, in the state of Eq. (3); `motor` is T', X', C,
+    M, T_m.
+    """
     T_prime, X_prime, C, M, T_m = motor
     delta = 0.5 * np.arcsin(-2 * T_m * X_prime / (C * U0**2))
     E = C * U0 * np.cos(delta)
@@ -214,18 +302,26 @@ class Sphere:
 
 
 def bias(budget: int = 10_000, seeds: int = 7) -> dict[str, tuple[float, float]]:
-    """Median error on the sphere in ten dimensions, its optimum at zero and one unit off in each coordinate.
+    """Median error on the sphere in ten dimensions, its optimum at zero and one unit off in each
+    coordinate.
 
-    Raw units and, for the sparrow searches, one scalar for A⁺L, as printed. An unbiased search has one size of error.
+    Raw units and, for the sparrow searches, one scalar for A⁺L, as printed. An unbiased search has
+    one size of error.
     """
     shift = np.where(np.arange(10) % 2 == 0, 1.0, -1.0)
     biases = {}
     for name in printed.COMPARED:
         settings = {"name": name, "space": "raw"} | ({} if name == "pso" else {"step": "scalar"})
         medians = [
-            np.median([search(Sphere(optimum), build("optimizer", settings), s, Limits(budget)).objective
-                       for s in range(seeds)])
+            np.median(
+                [
+                    search(
+                        Sphere(optimum), build("optimizer", settings), s, Limits(budget)
+                    ).objective
+                    for s in range(seeds)
+                ]
+            )
             for optimum in (np.zeros(10), shift)
-        ]  # fmt: skip
+        ]
         biases[name] = float(medians[0]), float(medians[1])
     return biases

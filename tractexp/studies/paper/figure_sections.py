@@ -14,7 +14,15 @@ from tractexp.studies.comparison.runs import SearchRun, Variant
 from tractexp.studies.paper import conclusion, figures, maps, why
 from tractexp.studies.paper.claims import middle, number
 from tractexp.studies.paper.printed import COMPARED, LABELS, label
-from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, RANDOM, TARGETS, TRADED, Study
+from tractexp.studies.paper.study import (
+    BUDGETS,
+    FLOOR_FACTOR,
+    LEVEL,
+    RANDOM,
+    TARGETS,
+    TRADED,
+    Study,
+)
 from tractexp.wording import as_sentence
 
 SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
@@ -22,22 +30,33 @@ SHOWN = ("0.3", "0.5", "0.7")  # alphas whose orbits are drawn
 
 def figure3(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 3: the tent map")
-    orbits = {f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0] for a in SHOWN}
+    orbits = {
+        f"alpha = {a}": maps.tent_orbit(float(a), 200, 1, np.random.default_rng(0))[:, 0]
+        for a in SHOWN
+    }
     where, flock = next(iter(study.uniformity.items()))
     sheet.chart(figures.orbits(orbits), "Orbits of Eq. (14).")
-    sheet.chart(figures.evenness(flock), f"How even a flock is: {where}, 200 flocks, median and 5 to 95 %.")
+    sheet.chart(
+        figures.evenness(flock), f"How even a flock is: {where}, 200 flocks, median and 5 to 95 %."
+    )
     sheet.table(
         ["way to scatter", *study.uniformity],
         [[way, *(middle(kind[way]) for kind in study.uniformity.values())] for way in flock],
-        "Centered discrepancy (Hickernell 1998), median (lowest .. highest). With alpha = 0.5 an orbit reaches 0 in"
+        "Centered discrepancy (Hickernell 1998), median (lowest .. highest). With alpha = 0.5 an"
+        " orbit reaches 0 in"
         " about 53 steps of binary arithmetic; it is then started anew.",
     )
 
 
 def figure4(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 4: Lévy flights")
-    sheet.chart(figures.flights(maps.flights("mantegna", 300, 3, seed=1)), "Steps of Eq. (15), three dimensions.")
-    sheet.chart(figures.tails(study.tails), "How large the steps of the two readings of Eq. (15) become.")
+    sheet.chart(
+        figures.flights(maps.flights("mantegna", 300, 3, seed=1)),
+        "Steps of Eq. (15), three dimensions.",
+    )
+    sheet.chart(
+        figures.tails(study.tails), "How large the steps of the two readings of Eq. (15) become."
+    )
     rows = []
     for formula, steps in study.tails.items():
         size = np.abs(steps)
@@ -56,9 +75,15 @@ def figure6(sheet: Report, study: Study) -> None:
 
 def _fit(sheet: Report, fit: Any, role: str) -> None:
     record = fit.event.record
-    caption = f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q {fit.epsilon_q:.2%}."
+    caption = (
+        f"{record.name} ({role}), ISSA, one run: epsilon_p {fit.epsilon_p:.2%}, epsilon_q"
+        f" {fit.epsilon_q:.2%}."
+    )
     curve = CalculatedCurve("calculated", np.stack((fit.P, fit.Q)), PALETTE[1])
-    sheet.chart(event_chart(fit.event, [curve]), " ".join([caption, CAPTION, *map(as_sentence, record.notes)]))
+    sheet.chart(
+        event_chart(fit.event, [curve]),
+        " ".join([caption, CAPTION, *map(as_sentence, record.notes)]),
+    )
 
 
 def figure8(sheet: Report, study: Study) -> None:
@@ -70,21 +95,31 @@ def figure9(sheet: Report, study: Study) -> None:
     sheet.heading("Figure 9: the searches")
     floor = Floor(study.floor, "")
     one = [_variant(study, name, "iterations", 1) for name in COMPARED]
-    sheet.chart(charts.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it.")
+    sheet.chart(
+        charts.fitness(one, "iterations", floor)[0], "One run, seed 0, as the paper shows it."
+    )
     for by in BUDGETS:
         all_ = [_variant(study, name, by, study.seeds) for name in COMPARED]
         sheet.chart(
             charts.fitness(all_, by, floor)[0],
-            f"Median and quartiles of {study.seeds} seeds, by {by}; the line is the lowest objective known.",
+            f"Median and quartiles of {study.seeds} seeds, by {by}; the line is the lowest"
+            " objective known.",
         )
     rows = []
     for name in LEVEL:
-        rows.append([label(name), *(number(study.running_time(name, t, by)) for by in BUDGETS for t in TARGETS)])
+        rows.append(
+            [
+                label(name),
+                *(number(study.running_time(name, t, by)) for by in BUDGETS for t in TARGETS),
+            ]
+        )
     sheet.table(
-        ["", *(f"{by} to {t:g} × floor" for by in BUDGETS for t in TARGETS)], rows,
-        "Expected running times: all that was spent until the target, per search that reached it; by simulations of"
+        ["", *(f"{by} to {t:g} × floor" for by in BUDGETS for t in TARGETS)],
+        rows,
+        "Expected running times: all that was spent until the target, per search that reached it;"
+        " by simulations of"
         f" the searches that are laid out for {study.equal:,}.",
-    )  # fmt: skip
+    )
     _reasons(sheet, study)
     if study.traded:
         _valleys(sheet, study)
@@ -92,9 +127,25 @@ def figure9(sheet: Report, study: Study) -> None:
 
 def _variant(study: Study, name: str, by: str, seeds: int) -> Variant:
     data = study.train[0].record.name
-    return Variant(label(name), name, {}, tuple(
-        SearchRun(name, data, seed, {}, "", f.objective, simulations=f.history.simulations, seconds=f.history.seconds,
-            history=f.history.objective) for seed, f in enumerate(study.searched(name, by)[:seeds])))  # fmt: skip
+    return Variant(
+        label(name),
+        name,
+        {},
+        tuple(
+            SearchRun(
+                name,
+                data,
+                seed,
+                {},
+                "",
+                f.objective,
+                simulations=f.history.simulations,
+                seconds=f.history.seconds,
+                history=f.history.objective,
+            )
+            for seed, f in enumerate(study.searched(name, by)[:seeds])
+        ),
+    )
 
 
 def _reasons(sheet: Report, study: Study) -> None:
@@ -103,25 +154,53 @@ def _reasons(sheet: Report, study: Study) -> None:
     rows = []
     for name in (*LEVEL, "random_search"):
         share = study.shares(name)
-        rows.append([label(name), *(f"{k} of {share.n}" for k in (share.valley, share.floor, share.done)),
-                     middle(study.above_bottom(name))])  # fmt: skip
+        rows.append(
+            [
+                label(name),
+                *(f"{k} of {share.n}" for k in (share.valley, share.floor, share.done)),
+                middle(study.above_bottom(name)),
+            ]
+        )
     control = study.control_shares
     rows.append(["a random point", f"{control.valley} of {control.n}", "-", "-", "-"])
     sheet.table(
-        ["300 iterations", "in the valley of the lowest objective", "at the floor", "at the bottom of its own valley",
-         "objective over that of the bottom"], rows,
-        f"In a valley is a search from whose end least squares reach its bottom; at a bottom or at the floor means"
-        f" within {FLOOR_FACTOR:g} times of it. The control: {RANDOM} random points of the bounds, and the best of"
+        [
+            "300 iterations",
+            "in the valley of the lowest objective",
+            "at the floor",
+            "at the bottom of its own valley",
+            "objective over that of the bottom",
+        ],
+        rows,
+        "In a valley is a search from whose end least squares reach its bottom; at a bottom or at"
+        " the floor means"
+        f" within {FLOOR_FACTOR:g} times of it. The control: {RANDOM} random points of the bounds,"
+        " and the best of"
         f" {study.equal:,} of them.",
-    )  # fmt: skip
+    )
     sheet.table(
-        ["beside PSO", "as deep in its own valley", "as often in the right valley", "as often there as random points",
-         "as often there as the best of them", "as low once least squares have ended both"],
-        [[LABELS[k.name], *(f"p = {t.p:.2g}" for t in (k.convergence, k.valley, k.random, k.best, k.polished))]
-         for k in why.lacks(study)],
-        "First and last Wilcoxon's test over paired seeds, the others Fisher's exact test; two-sided, all by Holm's"
+        [
+            "beside PSO",
+            "as deep in its own valley",
+            "as often in the right valley",
+            "as often there as random points",
+            "as often there as the best of them",
+            "as low once least squares have ended both",
+        ],
+        [
+            [
+                LABELS[k.name],
+                *(
+                    f"p = {t.p:.2g}"
+                    for t in (k.convergence, k.valley, k.random, k.best, k.polished)
+                ),
+            ]
+            for k in why.lacks(study)
+        ],
+        "First and last Wilcoxon's test over paired seeds, the others Fisher's exact test;"
+        " two-sided, all by Holm's"
         " correction. SD = 20, no velocity limit.",
-    )  # fmt: skip
+    )
 
 
 def _valleys(sheet: Report, study: Study) -> None:
@@ -134,11 +213,15 @@ def _valleys(sheet: Report, study: Study) -> None:
     if (static := conclusion.static_reactive(study, path.values)) is not None:
         shown["Q_s0 [pu]"] = static
     own = next(p.bounds for p in study.problem.parameters if p.name == TRADED)
-    bottoms = [(float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.grouped()[:2]]
+    bottoms = [
+        (float(v[index[TRADED]]), f / study.floor) for f, _, v in study.control.grouped()[:2]
+    ]
     sheet.chart(
         figures.along(TRADED, grid, shown, own, bottoms),
-        f"The best fit for each value of {TRADED}, all other parameters fitted again. Dots: the two valleys. Shaded:"
-        f" beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip to the static load.",
+        f"The best fit for each value of {TRADED}, all other parameters fitted again. Dots: the two"
+        " valleys. Shaded:"
+        f" beyond the bounds of {TRADED}. Q_s0 is what is left of Q before the dip to the static"
+        " load.",
     )
     names = study.problem.space.names
     every = {name: study.ends[name].grouped() for name in COMPARED}
@@ -149,19 +232,37 @@ def _valleys(sheet: Report, study: Study) -> None:
     sheet.table(
         ["valley: objective", *(LABELS[n] for n in every), "random points", *names],
         rows,
-        f"Where least squares lead the {study.seeds} searches of each and {RANDOM} random points; of the latter the"
+        f"Where least squares lead the {study.seeds} searches of each and {RANDOM} random points;"
+        " of the latter the"
         " lowest four.",
     )
     rows = []
     for (low, high), ends in study.rebounded.items():
         right = ends.objective <= FLOOR_FACTOR * study.floor
         second = ends.grouped()[1:2]
-        at = f"{number(second[0][0])} at {TRADED} = {number(float(second[0][2][index[TRADED]]))}" if second else "-"
-        rows.append([f"{low:g} .. {high:g}", f"{np.mean(right):.0%}", at, str(second[0][1]) if second else "0"])
+        at = (
+            f"{number(second[0][0])} at {TRADED} = {number(float(second[0][2][index[TRADED]]))}"
+            if second
+            else "-"
+        )
+        rows.append(
+            [
+                f"{low:g} .. {high:g}",
+                f"{np.mean(right):.0%}",
+                at,
+                str(second[0][1]) if second else "0",
+            ]
+        )
     sheet.table(
-        [f"bounds of {TRADED}", "random points in the right valley", "the next valley", "of them there"],
-        rows, f"{RANDOM} random points of each box, from which least squares descend.",
-    )  # fmt: skip
+        [
+            f"bounds of {TRADED}",
+            "random points in the right valley",
+            "the next valley",
+            "of them there",
+        ],
+        rows,
+        f"{RANDOM} random points of each box, from which least squares descend.",
+    )
 
 
 def held_out(figure: str, kind: str) -> Callable[..., None]:

@@ -13,20 +13,37 @@ SURVIVAL_POINTS = 400  # of a survival curve
 
 def orbits(values: Mapping[str, np.ndarray]) -> Chart:
     """Figure 3: orbits {label: (n,)} in [0, 1], one below the other."""
-    chart = Chart("iteration", [f"z, {label}" for label in values], legend=False, pixels=90 + 130 * len(values))
+    chart = Chart(
+        "iteration",
+        [f"z, {label}" for label in values],
+        legend=False,
+        pixels=90 + 130 * len(values),
+    )
     for k, (label, orbit) in enumerate(values.items()):
         shown = orbit[:ORBIT_ITERATIONS]
-        chart.line(label, np.arange(len(shown)), shown, PALETTE[k], k, width=0.8).limits(k, -0.03, 1.03)
+        chart.line(label, np.arange(len(shown)), shown, PALETTE[k], k, width=0.8).limits(
+            k, -0.03, 1.03
+        )
     return chart
 
 
 def evenness(spread: Mapping[str, np.ndarray]) -> Chart:
     """Figure 3: the discrepancies {way: (draws,)} of flocks, median and 5 to 95 %."""
-    chart = Chart("centered discrepancy", [""], legend=False, log_x=True, pixels=90 + 30 * len(spread), hover="closest")
+    chart = Chart(
+        "centered discrepancy",
+        [""],
+        legend=False,
+        log_x=True,
+        pixels=90 + 30 * len(spread),
+        hover="closest",
+    )
     rows = -np.arange(float(len(spread)))
-    low, middle, high = np.array([np.quantile(values, (0.05, 0.5, 0.95)) for values in spread.values()]).T
+    low, middle, high = np.array(
+        [np.quantile(values, (0.05, 0.5, 0.95)) for values in spread.values()]
+    ).T
     labels = [
-        f"{way}: {m:.3g}, 5 to 95 % {a:.3g} .. {b:.3g}" for way, a, m, b in zip(spread, low, middle, high, strict=True)
+        f"{way}: {m:.3g}, 5 to 95 % {a:.3g} .. {b:.3g}"
+        for way, a, m, b in zip(spread, low, middle, high, strict=True)
     ]
     chart.points("", middle, rows, PALETTE[0], hover=labels, spans=np.stack((low, high), axis=1))
     chart.ticks(None, [k * 10.0**n for n in range(-4, 1) for k in (1, 2, 5)])
@@ -62,12 +79,17 @@ def record(t: np.ndarray, U: np.ndarray, P: np.ndarray, Q: np.ndarray) -> Chart:
 
 
 def along(
-    name: str, grid: np.ndarray, panels: Mapping[str, np.ndarray], bounds: tuple[float, float],
+    name: str,
+    grid: np.ndarray,
+    panels: Mapping[str, np.ndarray],
+    bounds: tuple[float, float],
     valleys: Sequence[tuple[float, float]],
-) -> Chart:  # fmt: skip
-    """The best fit at each value (n,) of a parameter: its objective over the lowest first, then others {label: (n,)}.
+) -> Chart:
+    """The best fit at each value (n,) of a parameter: its objective over the lowest first, then
+    others {label: (n,)}.
 
-    What lies beyond the parameter's bounds is shaded; `valleys` are values and relative objectives of the two.
+    What lies beyond the parameter's bounds is shaded; `valleys` are values and relative objectives
+    of the two.
     """
     chart = Chart(name, list(panels), heights=[1.5] + [1.0] * (len(panels) - 1), legend=False)
     for k, (label, values) in enumerate(panels.items()):

@@ -1,6 +1,7 @@
 """Chaotic maps and Lévy flights: what Figures 3 and 4 show, and how even a flock they scatter.
 
-Tent orbits and flights are taken from the optimizer itself, so that what is measured is what searches.
+Tent orbits and flights are taken from the optimizer itself, so that what is measured is what
+searches.
 """
 
 import warnings
@@ -43,7 +44,9 @@ def sobol(n: int, d: int, rng: np.random.Generator) -> np.ndarray:
         return qmc.Sobol(d, rng=rng).random(n)
 
 
-def flocks(n: int, d: int, alphas: tuple[float, ...]) -> dict[str, Callable[[np.random.Generator], np.ndarray]]:
+def flocks(
+    n: int, d: int, alphas: tuple[float, ...]
+) -> dict[str, Callable[[np.random.Generator], np.ndarray]]:
     """The ways to scatter n sparrows over d coordinates, by name."""
     ways = {f"tent, alpha = {a:g}": lambda rng, a=a: tent_orbit(a, n, d, rng) for a in alphas}
     return ways | {
@@ -56,7 +59,9 @@ def flocks(n: int, d: int, alphas: tuple[float, ...]) -> dict[str, Callable[[np.
 def discrepancies(
     n: int, d: int, alphas: tuple[float, ...], draws: int = FLOCK_DRAWS, seed: int = 0
 ) -> Mapping[str, np.ndarray]:
-    """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source: Hickernell 1998."""
+    """Centered discrepancy of each way to scatter, (draws,) each: the lower, the more even. Source:
+    Hickernell 1998.
+    """
     from scipy.stats import qmc
 
     rng = np.random.default_rng(seed)

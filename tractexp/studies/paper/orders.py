@@ -18,13 +18,16 @@ from tractexp.model.operations import Cost, Operations, count
 from tractexp.plugin import build
 from tractexp.record import Event
 
-TIMED_CANDIDATES = 256  # simulated together when the time is taken: some milliseconds, less than a turn of a busy core
+# simulated together when the time is taken: some milliseconds, less than a turn of a busy core
+TIMED_CANDIDATES = 256
 TIMED_REPEATS = 60  # of which the fastest counts
 
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """One motor fitted to the records. `fits` are those of the fitted events, then of the held-out ones."""
+    """One motor fitted to the records. `fits` are those of the fitted events, then of the held-out
+    ones.
+    """
 
     motor: str
     values: dict[str, float]
@@ -52,8 +55,13 @@ class Order:
     @property
     def finite(self) -> int:
         """Parameters whose 95 % interval is finite and within the bounds."""
-        low, high = self.uncertainty.values - self.uncertainty.half, self.uncertainty.values + self.uncertainty.half
-        return int(np.count_nonzero((low > self.uncertainty.lower) & (high < self.uncertainty.upper)))
+        low, high = (
+            self.uncertainty.values - self.uncertainty.half,
+            self.uncertainty.values + self.uncertainty.half,
+        )
+        return int(
+            np.count_nonzero((low > self.uncertainty.lower) & (high < self.uncertainty.upper))
+        )
 
     @property
     def identified(self) -> int:
@@ -71,10 +79,18 @@ class Order:
         return float(P), float(Q)
 
 
-def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: Sequence[Event], seed: int) -> Order:
+def fit(
+    node: Mapping[str, Any],
+    motor: str,
+    train: Sequence[Event],
+    held_out: Sequence[Event],
+    seed: int,
+) -> Order:
     """Fit a model configuration with its motor replaced, by least squares from many starts."""
     model = compose(*parts({**node, "motor": {"name": motor}}))
-    bounds, fixed = ({n: v for n, v in node[key].items() if n in model.names} for key in ("bounds", "fixed"))
+    bounds, fixed = (
+        {n: v for n, v in node[key].items() if n in model.names} for key in ("bounds", "fixed")
+    )
     problem = Problem(model, train, bounds, fixed, node["substeps"])
     result = search(problem, build("optimizer", {"name": "multistart_least_squares"}), seed)
     values = problem.full(result.values)[0]
@@ -83,11 +99,22 @@ def fit(node: Mapping[str, Any], motor: str, train: Sequence[Event], held_out: S
     substeps = int(problem.step.substeps.max())
     parameters = dict(zip(model.names, values.tolist(), strict=True))
     uncertainty, cost = estimate(problem, result.values).uncertainty, count(model.source)
-    return Order(motor, parameters, result.objective, tuple(fits), uncertainty, duration(problem), substeps, cost)
+    return Order(
+        motor,
+        parameters,
+        result.objective,
+        tuple(fits),
+        uncertainty,
+        duration(problem),
+        substeps,
+        cost,
+    )
 
 
 def duration(problem: Problem) -> float:
-    """Nanoseconds per sample of one candidate's simulation, objective included: the fastest of some repeats."""
+    """Nanoseconds per sample of one candidate's simulation, objective included: the fastest of some
+    repeats.
+    """
     rng = np.random.default_rng(0)
     values = problem.space.from_unit(rng.random((TIMED_CANDIDATES, problem.space.dimension)))
     spent = []

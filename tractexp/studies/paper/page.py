@@ -1,4 +1,6 @@
-"""The paper beside our measurements: one section for each of its tables and figures, and a verdict for each claim."""
+"""The paper beside our measurements: one section for each of its tables and figures, and a verdict
+for each claim.
+"""
 
 from collections.abc import Callable, Sequence
 
@@ -7,16 +9,31 @@ import numpy as np
 from tractexp.blocks import Report
 from tractexp.studies.paper import conclusion, equations, printed
 from tractexp.studies.paper.claims import BOTH, Claim, count_verdicts, middle
-from tractexp.studies.paper.figure_sections import figure3, figure4, figure6, figure8, figure9, held_out
+from tractexp.studies.paper.figure_sections import (
+    figure3,
+    figure4,
+    figure6,
+    figure8,
+    figure9,
+    held_out,
+)
 from tractexp.studies.paper.printed import LABELS, READINGS
 from tractexp.studies.paper.study import Study
-from tractexp.studies.paper.table_sections import TO_THE_LETTER, add_generalization_table, table1, table2, table3
+from tractexp.studies.paper.table_sections import (
+    TO_THE_LETTER,
+    add_generalization_table,
+    table1,
+    table2,
+    table3,
+)
 
 TITLE = "The paper, table by table"
 
 LEAD = (
-    "Wu, Fan and Zou, “Traction Load Modeling and Parameter Identification Based on Improved Sparrow Search"
-    " Algorithm”, Energies 2022, 15(14), 5034: what it prints, and what we measure. Written by task=paper."
+    "Wu, Fan and Zou, “Traction Load Modeling and Parameter Identification Based on Improved"
+    " Sparrow Search"
+    " Algorithm”, Energies 2022, 15(14), 5034: what it prints, and what we measure. Written by"
+    " task=paper."
 )
 
 
@@ -40,15 +57,21 @@ def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     notes = dict.fromkeys(note for event in events for note in event.record.notes)
     names = ", ".join(event.record.name for event in events)
     seeds = f"{study.seeds} seeds; one run means seed 0." + (
-        f" Searches were stopped at {study.limits.simulations} simulations, so these are not the paper's 300"
-        " iterations." if study.limits and study.limits.simulations else ""
-    )  # fmt: skip
+        f" Searches were stopped at {study.limits.simulations} simulations, so these are not the"
+        " paper's 300"
+        " iterations."
+        if study.limits and study.limits.simulations
+        else ""
+    )
     sheet.text(
-        "The paper's record was never published. Our numbers are measured on other records, so no value can equal"
+        "The paper's record was never published. Our numbers are measured on other records, so no"
+        " value can equal"
         " the paper's: what can be checked is which statements hold, on data of this kind.",
         f"Records: {names}" + (f" ({'; '.join(notes)})" if notes else "") + ".",
-        f"{seeds} Where the text can be read in two ways, the tables follow section 4.3: 20 of 50 sparrows perceive"
-        " danger (section 4.2 has 10), and velocities of particles have no limit, for none is printed. The other"
+        f"{seeds} Where the text can be read in two ways, the tables follow section 4.3: 20 of 50"
+        " sparrows perceive"
+        " danger (section 4.2 has 10), and velocities of particles have no limit, for none is"
+        " printed. The other"
         " readings stand beside it, and a verdict that depends on the reading says so.",
     )
     if not claims:
@@ -57,8 +80,10 @@ def _top(sheet: Report, study: Study, claims: Sequence[Claim]) -> None:
     sheet.table(
         ["where", "the paper's claim", "verdict", "measured"],
         [[_place(c.part), c.text, c.verdict, c.measured] for c in claims],
-        "Where the paper does not say it in so many words, a claim is what its argument needs. p: Wilcoxon's"
-        " signed-rank test over paired seeds, by Holm's correction; A: the probability that the first ends lower"
+        "Where the paper does not say it in so many words, a claim is what its argument needs. p:"
+        " Wilcoxon's"
+        " signed-rank test over paired seeds, by Holm's correction; A: the probability that the"
+        " first ends lower"
         " (Vargha and Delaney).",
         words=(1, 2, 3),
     )
@@ -74,47 +99,68 @@ def equations_section(sheet: Report, study: Study) -> None:
     sheet.heading("What is printed, in the printed equations")
     sheet.table(
         ["where", "printed", "what the equation gives", "verdict"],
-        [[c.where, c.printed, c.gives, "agrees" if c.holds else "does not agree"] for c in equations.checks()],
-        "Table 2 is the first column of Table 3. Order: measured on an oscillator. Tail exponent: of 200,000 steps.",
+        [
+            [c.where, c.printed, c.gives, "agrees" if c.holds else "does not agree"]
+            for c in equations.checks()
+        ],
+        "Table 2 is the first column of Table 3. Order: measured on an oscillator. Tail exponent:"
+        " of 200,000 steps.",
         words=(1, 2, 3),
     )
     sheet.heading("What the model says to Table 3", 3)
     refusals = equations.refusals(study.problem.model, study.problem.drive)
-    sheet.items([f"{LABELS[name]}: {sentence or 'accepted'}" for name, sentence in refusals.items()])
+    sheet.items(
+        [f"{LABELS[name]}: {sentence or 'accepted'}" for name, sentence in refusals.items()]
+    )
     sheet.text(
-        "T_m is the motor's power before the event, in per unit of a load normalized to about 1; Table 3 has 3.38, 3.02"
-        " and 1.23. Mantegna's step and the classical Runge-Kutta method are used unless levy_formula=printed and"
+        "T_m is the motor's power before the event, in per unit of a load normalized to about 1;"
+        " Table 3 has 3.38, 3.02"
+        " and 1.23. Mantegna's step and the classical Runge-Kutta method are used unless"
+        " levy_formula=printed and"
         " model.integration=printed are chosen; experiment=to_the_letter takes all as printed."
     )
 
 
 def readings_section(sheet: Report, study: Study) -> None:
     sheet.heading("The readings of the text")
-    rows = [[READINGS[name].words, *(middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name))]
-            for name in BOTH]  # fmt: skip
+    rows = [
+        [
+            READINGS[name].words,
+            *(middle(study.objectives(n)) for n in (name.replace("issa", "ssa", 1), name)),
+        ]
+        for name in BOTH
+    ]
     alone = ("issa_by_stage", "issa_printed_levy")
     rows += [[READINGS[name].words, "", middle(study.objectives(name))] for name in alone]
     sheet.table(
-        ["reading", "SSA", "ISSA"], rows,
-        "Objective after 300 iterations [pu²], median (best .. worst). Unless said: unit cube, better-only,"
-        f" element-wise, SD = 20. {TO_THE_LETTER} A⁺L in Eq. (12) is one number as printed; step 5 chooses between"
-        " Gaussian variation and tent perturbation by fitness, section 3.2.3 by stage of the search.",
-    )  # fmt: skip
+        ["reading", "SSA", "ISSA"],
+        rows,
+        "Objective after 300 iterations [pu²], median (best .. worst). Unless said: unit cube,"
+        " better-only,"
+        f" element-wise, SD = 20. {TO_THE_LETTER} A⁺L in Eq. (12) is one number as printed; step 5"
+        " chooses between"
+        " Gaussian variation and tent perturbation by fitness, section 3.2.3 by stage of the"
+        " search.",
+    )
     sheet.heading("ISSA without one of its ingredients", 3)
     rows = [["ISSA", *_costs(study, "issa")]]
     for name, (_, label) in printed.INGREDIENTS.items():
         rows.append([f"without {label}", *_costs(study, f"issa_no_{name}")])
     sheet.table(
-        ["", "objective after 300 iterations [pu²]", "simulations"], rows,
-        "SD = 20. By iterations, an ingredient that costs simulations is paid for by nobody: experiment=ablation"
+        ["", "objective after 300 iterations [pu²]", "simulations"],
+        rows,
+        "SD = 20. By iterations, an ingredient that costs simulations is paid for by nobody:"
+        " experiment=ablation"
         " compares at equal simulations too, adds each to SSA, and crosses them.",
-    )  # fmt: skip
+    )
     sheet.heading("Drawn to zero", 3)
     sheet.table(
         ["sphere in ten dimensions, raw units", "optimum at zero", "one unit away"],
         [[LABELS[n], f"{near:.0e}", f"{far:.0e}"] for n, (near, far) in study.bias.items()],
-        "Median error of 7 seeds after 10,000 evaluations, the sparrow searches with one scalar for A⁺L, as printed."
-        " Eq. (11) multiplies by numbers below one, and half of the flock starves to Q (1, ..., 1).",
+        "Median error of 7 seeds after 10,000 evaluations, the sparrow searches with one scalar for"
+        " A⁺L, as printed."
+        " Eq. (11) multiplies by numbers below one, and half of the flock starves to"
+        " Q (1, ..., 1).",
     )
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 NAMES = ("T_prime", "X_prime", "C", "M", "T_m", "p_v", "q_v")
 
-# Tables 2 (the first column) and 3: parameters, relative errors of Eq. (20) as fractions, objective of Eq. (8).
+# Tables 2 (the first column) and 3: parameters, relative errors of Eq. (20) as fractions, objective
+# of Eq. (8).
 TABLE_3 = {
     "issa": (4.1354, 1.6654, -2.6241, 0.82, 3.378, 3.5867, 3.056),
     "ssa": (-3.8726, 1.8054, 1.8197, 0.3427, 3.0239, 1.9803, 2.128),
@@ -33,7 +34,8 @@ TABLE_1 = {
 COMPARED = ("issa", "ssa", "pso")
 LABELS = {"issa": "ISSA", "ssa": "SSA", "pso": "PSO", "random_search": "the best of random points"}
 ITERATIONS, POPULATION = 300, 50  # sections 4.2 and 4.3; the optimizers' defaults
-EQUAL = POPULATION * (ITERATIONS + 1)  # simulations of the thriftiest of the three, PSO, in so many iterations
+# simulations of the thriftiest of the three, PSO, in so many iterations
+EQUAL = POPULATION * (ITERATIONS + 1)
 TENT_ALPHA = 0.3  # of Eq. (14), section 3.2.1
 INGREDIENTS = {  # as the optimizers without it are called: the switch, and what it is
     "tent_init": ("tent_initialization", "tent initialization"),
@@ -45,8 +47,9 @@ INGREDIENTS = {  # as the optimizers without it are called: the switch, and what
 
 @dataclass(frozen=True)
 class Reading:
-    """An optimizer with what the text leaves open settled; a `literal` one searches the model that Eq. (4) integrates
-    as it is printed."""
+    """An optimizer with what the text leaves open settled; a `literal` one searches the model that
+    Eq. (4) integrates as it is printed.
+    """
 
     optimizer: str
     words: str
@@ -60,7 +63,8 @@ class Reading:
 
 LETTER = {"space": "raw", "step": "scalar", "acceptance": "all"}
 
-# By the names that the optimizers have in conf/optimizer. The first three are what Tables 2 to 5 show.
+# By the names that the optimizers have in conf/optimizer. The first three are what Tables 2 to 5
+# show.
 READINGS: dict[str, Reading] = {
     "issa": Reading("issa", "SD = 20 of 50 (4.3)"),
     "ssa": Reading("ssa", "SD = 20 of 50 (4.3)"),
@@ -68,26 +72,37 @@ READINGS: dict[str, Reading] = {
     "issa_10_perceivers": Reading("issa", "10 perceivers (4.2)", {"perceivers": 0.2}),
     "ssa_10_perceivers": Reading("ssa", "10 perceivers (4.2)", {"perceivers": 0.2}),
     "pso_limited": Reading("pso", "velocity limit 0.2", {"velocity_limit": 0.2}),
-    "issa_to_the_letter": Reading("issa", "to the letter", LETTER | {"levy_formula": "printed"}, literal=True),
+    "issa_to_the_letter": Reading(
+        "issa", "to the letter", LETTER | {"levy_formula": "printed"}, literal=True
+    ),
     "ssa_to_the_letter": Reading("ssa", "to the letter", LETTER, literal=True),
     "pso_to_the_letter": Reading("pso", "to the letter", literal=True),
     "issa_raw": Reading("issa", "raw units", {"space": "raw"}),
     "ssa_raw": Reading("ssa", "raw units", {"space": "raw"}),
-    "issa_raw_scalar": Reading("issa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}),
-    "ssa_raw_scalar": Reading("ssa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}),
+    "issa_raw_scalar": Reading(
+        "issa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}
+    ),
+    "ssa_raw_scalar": Reading(
+        "ssa", "raw units, one scalar for A⁺L", {"space": "raw", "step": "scalar"}
+    ),
     "issa_by_stage": Reading("issa", "perturbation by stage (3.2.3)", {"schedule": "stage"}),
     "issa_printed_levy": Reading("issa", "Eq. (15) as printed", {"levy_formula": "printed"}),
-    **{f"issa_no_{name}": Reading("issa", f"without {label}", {switch: False})
-       for name, (switch, label) in INGREDIENTS.items()},
+    **{
+        f"issa_no_{name}": Reading("issa", f"without {label}", {switch: False})
+        for name, (switch, label) in INGREDIENTS.items()
+    },
     "random_search": Reading("random_search", "the best of random points"),
-}  # fmt: skip
+}
 
 
 def label(name: str) -> str:
-    """ "issa_10_perceivers" -> "ISSA, 10 perceivers (section 4.2)"; the three of the tables are named alone."""
+    """ "issa_10_perceivers" -> "ISSA, 10 perceivers (section 4.2)"; the three of the tables are
+    named alone.
+    """
     reading = READINGS[name]
     return LABELS[name] if name in LABELS else f"{LABELS[reading.optimizer]}, {reading.words}"
 
 
-TEN = {"issa": "issa_10_perceivers", "ssa": "ssa_10_perceivers"}  # section 4.2's reading of the same optimizer
+# section 4.2's reading of the same optimizer
+TEN = {"issa": "issa_10_perceivers", "ssa": "ssa_10_perceivers"}
 LITERAL = {name: f"{name}_to_the_letter" for name in COMPARED}

@@ -1,6 +1,8 @@
-"""Searches in the store: read back where the same code searched the same problem before, and never otherwise.
+"""Searches in the store: read back where the same code searched the same problem before, and never
+otherwise.
 
-The paper's tables and figures show the same searches over and over, and each has a command of its own.
+The paper's tables and figures show the same searches over and over, and each has a command of its
+own.
 """
 
 import contextlib
@@ -22,13 +24,18 @@ ARRAYS = ("simulations", "objective", "values", "seconds")  # of a history
 class SearchStore:
     """The searches of one problem under some limits, by optimizer and seed.
 
-    The key of a search is the code, the libraries and the processor, the records, the model with its bounds, the loss,
-    the optimizer's settings, the seed and the limits. A search with a limit in seconds depends on
-    more, and a plugin that stands in no installed file may change unseen: these are not stored.
+    The key of a search is the code, the libraries and the processor, the records, the model with
+    its bounds, the loss, the optimizer's settings, the seed and the limits. A search with a limit
+    in seconds depends on more, and a plugin that stands in no installed file may change unseen:
+    these are not stored.
     """
 
     def __init__(self, problem: Problem, limits: Limits, on: bool = True):
-        stored = on and limits.seconds is None and all(map(store.is_installed, (*_parts(problem), problem.loss)))
+        stored = (
+            on
+            and limits.seconds is None
+            and all(map(store.is_installed, (*_parts(problem), problem.loss)))
+        )
         self.problem = _key(problem, limits) if stored else ""
 
     def get(self, settings: Mapping[str, Any], seed: int) -> SearchResult | None:
@@ -37,22 +44,34 @@ class SearchStore:
             return None
         with contextlib.suppress(*DAMAGED):
             history = History(**{name: entry[name] for name in ARRAYS})
-            return SearchResult(**json.loads(str(entry["ending"])), values=entry["found"], history=history)
+            return SearchResult(
+                **json.loads(str(entry["ending"])), values=entry["found"], history=history
+            )
         return None
 
     def put(self, settings: Mapping[str, Any], seed: int, result: SearchResult) -> None:
         ending = {k: v for k, v in vars(result).items() if k not in ("values", "history")}
         arrays = {name: getattr(result.history, name) for name in ARRAYS}
         key = self._key(settings, seed)
-        SEARCHES.write_arrays(key, ending=np.array(json.dumps(files.plain(ending))), found=result.values, **arrays)
+        SEARCHES.write_arrays(
+            key, ending=np.array(json.dumps(files.plain(ending))), found=result.values, **arrays
+        )
 
-    def arrays(self, what: str, compute: Callable[[], tuple[np.ndarray, ...]]) -> tuple[np.ndarray, ...]:
-        """Arrays of something else that is computed for this problem, as `what` says, or of its entry."""
+    def arrays(
+        self, what: str, compute: Callable[[], tuple[np.ndarray, ...]]
+    ) -> tuple[np.ndarray, ...]:
+        """Arrays of something else that is computed for this problem, as `what` says, or of its
+        entry.
+        """
         return SEARCHES.arrays(self.problem and store.key(self.problem, what), compute)
 
     def _key(self, settings: Mapping[str, Any], seed: int) -> str:
         optimizer = build("optimizer", dict(settings))
-        return store.key(self.problem, repr(optimizer), seed) if self.problem and store.is_installed(optimizer) else ""
+        return (
+            store.key(self.problem, repr(optimizer), seed)
+            if self.problem and store.is_installed(optimizer)
+            else ""
+        )
 
 
 def _parts(problem: Problem) -> tuple[Any, ...]:
@@ -60,5 +79,9 @@ def _parts(problem: Problem) -> tuple[Any, ...]:
 
 
 def _key(problem: Problem, limits: Limits) -> str:
-    """The key of all that a search of this problem depends on, but for the optimizer and the seed."""
-    return store.key(store.environment(), repr((_parts(problem), problem.loss, limits)), problem.digest())
+    """The key of all that a search of this problem depends on, but for the optimizer
+    and the seed.
+    """
+    return store.key(
+        store.environment(), repr((_parts(problem), problem.loss, limits)), problem.digest()
+    )

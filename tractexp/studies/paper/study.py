@@ -21,12 +21,15 @@ from tractexp.studies.paper.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
-FLOOR_FACTOR = 1.1  # a search within so many times the floor has found it; one so near the bottom of its valley is done
+# a search within so many times the floor has found it; one so near the bottom of its valley is done
+FLOOR_FACTOR = 1.1
 RANDOM = 200  # points from which the control descends
 TRADED = "C"  # the parameter along which the valleys lie
-WIDE, NARROW = (0.06, 0.99), (0.75, 0.99)  # other bounds of it; below the first X' meets its own bound
+# other bounds of it; below the first X' meets its own bound
+WIDE, NARROW = (0.06, 0.99), (0.75, 0.99)
 BUDGETS = ("iterations", "simulations")  # by which searches are compared
-LEVEL = (*COMPARED, *TEN.values(), "pso_limited")  # the readings that search one objective, by 300 iterations
+# the readings that search one objective, by 300 iterations
+LEVEL = (*COMPARED, *TEN.values(), "pso_limited")
 EQUALLY = ("issa", "ssa", *TEN.values())  # those whose searches are made anew at equal simulations
 
 # The searches that each part shows, {by what they end: readings}.
@@ -42,7 +45,9 @@ SHOWN: Mapping[str, Mapping[str, Sequence[str]]] = {
 
 @dataclass(frozen=True)
 class OptimizerPair:
-    """One optimizer against another over paired seeds: two-sided p of Wilcoxon's test, and the Vargha-Delaney A."""
+    """One optimizer against another over paired seeds: two-sided p of Wilcoxon's test, and the
+    Vargha-Delaney A.
+    """
 
     p: float
     A: float
@@ -60,7 +65,8 @@ class Shares:
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The paper's experiments on one fitted event and those held out; `recipe` makes the identification problem.
+    """The paper's experiments on one fitted event and those held out; `recipe` makes the
+    identification problem.
 
     `literal` makes the same problem with the model integrated by Eq. (4) as printed.
     """
@@ -76,7 +82,8 @@ class Study:
     literal: Callable[[], Problem] | None = None
     tell: Callable[[str], None] = lambda line: None
     count: Callable[[int, int], None] = lambda done, total: None
-    seen: dict[tuple[str, str], list[SearchResult]] = field(default_factory=dict)  # by reading and budget
+    # by reading and budget
+    seen: dict[tuple[str, str], list[SearchResult]] = field(default_factory=dict)
 
     @functools.cached_property
     def problem(self) -> Problem:
@@ -90,7 +97,10 @@ class Study:
     @functools.cached_property
     def orders(self) -> dict[str, orders.Order]:
         self.tell("Table 1: fitting three orders of the motor")
-        return {m: orders.fit(self.node, m, self.train, self.held_out, self.seed) for m in printed.TABLE_1}
+        return {
+            m: orders.fit(self.node, m, self.train, self.held_out, self.seed)
+            for m in printed.TABLE_1
+        }
 
     @functools.cached_property
     def reference(self) -> SearchResult:
@@ -101,11 +111,15 @@ class Study:
     def prepare(self, parts: Sequence[str]) -> None:
         """Make all searches that the parts show, so that they are told of together."""
         for by in BUDGETS:
-            wanted = dict.fromkeys(name for part in parts for name in SHOWN.get(part, {}).get(by, ()))
+            wanted = dict.fromkeys(
+                name for part in parts for name in SHOWN.get(part, {}).get(by, ())
+            )
             self._gather([name for name in wanted if (name, by) not in self.seen], by)
 
     def searched(self, name: str, by: str = "iterations") -> list[SearchResult]:
-        """The searches of a reading, one for each seed: of 300 "iterations", or laid out for equal "simulations"."""
+        """The searches of a reading, one for each seed: of 300 "iterations", or laid out for equal
+        "simulations".
+        """
         if by == "simulations" and READINGS[name].optimizer == "pso":
             by = "iterations"  # its 300 iterations are what is equal
         if (name, by) not in self.seen:
@@ -113,7 +127,9 @@ class Study:
         return self.seen[name, by]
 
     def first(self, name: str) -> list[Fit]:
-        """The one run that the paper's figures show, seed 0: the fits of the fitted events, then of those held out."""
+        """The one run that the paper's figures show, seed 0: the fits of the fitted events, then of
+        those held out.
+        """
         results = self.seen.get((name, "iterations"))
         return self.respond(results[0] if results else self._run([name], "iterations", 1)[name][0])
 
@@ -136,11 +152,15 @@ class Study:
         self.tell(f"searches of {', '.join(names)}: {several}, {ends} of {printed.POPULATION}")
         recipe = self.literal if literal and self.literal else self.recipe
         variants = {name: READINGS[name].node | own for name in names}
-        return searches.run(recipe, variants, seeds, limits, self.workers, self.count, note=self.tell)
+        return searches.run(
+            recipe, variants, seeds, limits, self.workers, self.count, note=self.tell
+        )
 
     @property
     def equal(self) -> int:
-        """The simulations at which searches are compared: what PSO, the thriftiest of the three, spends."""
+        """The simulations at which searches are compared: what PSO, the thriftiest of the three,
+        spends.
+        """
         most = self.limits.simulations if self.limits else None
         return min(EQUAL, most or EQUAL)
 
@@ -159,12 +179,16 @@ class Study:
         return OptimizerPair(wilcoxon(a, b)[0], vargha_delaney(a, b))
 
     def spent(self, name: str, target: float, by: str) -> tuple[np.ndarray, np.ndarray]:
-        """What each search spent until `target` times the floor or in all (seeds,), and whether it got there."""
+        """What each search spent until `target` times the floor or in all (seeds,), and whether it
+        got there.
+        """
         spent, reached = [], []
         for search in self.searched(name, by):
             hit = search.history.objective <= target * self.floor
             at = int(hit.argmax()) if hit.any() else -1
-            spent.append(range(len(hit))[at] if by == "iterations" else int(search.history.simulations[at]))
+            spent.append(
+                range(len(hit))[at] if by == "iterations" else int(search.history.simulations[at])
+            )
             reached.append(bool(hit.any()))
         return np.array(spent), np.array(reached)
 
@@ -181,17 +205,28 @@ class Study:
         self.tell("Figure 9: descending from where the searches ended, and from random points")
         names = (*LEVEL, "random_search")
         starts = np.array([search.values for name in names for search in self.searched(name)])
-        ends = self._descents(self.problem, starts, lambda: valleys.run_descents(self.problem, starts, self.floor))
+        ends = self._descents(
+            self.problem, starts, lambda: valleys.run_descents(self.problem, starts, self.floor)
+        )
         parts = {name: slice(k * self.seeds, (k + 1) * self.seeds) for k, name in enumerate(names)}
-        return {name: valleys.Ends(ends.objective[part], ends.values[part]) for name, part in parts.items()}
+        return {
+            name: valleys.Ends(ends.objective[part], ends.values[part])
+            for name, part in parts.items()
+        }
 
     def random_ends(self, problem: Problem) -> valleys.Ends:
         """The control: where least squares lead from random points of the bounds."""
         points = valleys.draw_uniform_points(problem, RANDOM, self.seed)
-        return self._descents(problem, points, lambda: valleys.run_descents(problem, points, self.floor))
+        return self._descents(
+            problem, points, lambda: valleys.run_descents(problem, points, self.floor)
+        )
 
-    def _descents(self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]) -> valleys.Ends:
-        """Where descents from these starts (n, free) end, read back where the same code made them before."""
+    def _descents(
+        self, problem: Problem, starts: np.ndarray, descend: Callable[[], valleys.Ends]
+    ) -> valleys.Ends:
+        """Where descents from these starts (n, free) end, read back where the same code made them
+        before.
+        """
         text = f"descents {self.floor!r} {hashlib.sha256(starts.tobytes()).hexdigest()}"
 
         def compute() -> tuple[np.ndarray, ...]:
@@ -205,12 +240,18 @@ class Study:
         return self.random_ends(self.problem)
 
     def above_bottom(self, name: str) -> np.ndarray:
-        """(seeds,) where the searches of a reading end, over the bottom of the valley that each is in."""
+        """(seeds,) where the searches of a reading end, over the bottom of the valley that each is
+        in.
+        """
         return self.objectives(name) / self.ends[name].objective
 
     def shares(self, name: str) -> Shares:
         at, bottom = self.objectives(name), self.ends[name].objective
-        counts = (bottom <= FLOOR_FACTOR * self.floor, at <= FLOOR_FACTOR * self.floor, at <= FLOOR_FACTOR * bottom)
+        counts = (
+            bottom <= FLOOR_FACTOR * self.floor,
+            at <= FLOOR_FACTOR * self.floor,
+            at <= FLOOR_FACTOR * bottom,
+        )
         return Shares(self.seeds, *(int(np.count_nonzero(count)) for count in counts))
 
     @property
@@ -220,7 +261,9 @@ class Study:
 
     @property
     def traded(self) -> bool:
-        """Whether the model has the parameter along which the paper's valleys lie, and leaves it free."""
+        """Whether the model has the parameter along which the paper's valleys lie, and leaves it
+        free.
+        """
         return TRADED in self.problem.space.names and not self.problem.per_event
 
     @functools.cached_property
@@ -229,13 +272,18 @@ class Study:
         wide = valleys.within(self.problem, TRADED, *WIDE)
         grid = np.linspace(*WIDE, 63)
         low = np.array([values for _, _, values in self.control.grouped()[:2]])
-        return grid, self._descents(wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor))
+        return grid, self._descents(
+            wide, low, lambda: valleys.along(wide, low, TRADED, grid, self.floor)
+        )
 
     @functools.cached_property
     def rebounded(self) -> dict[tuple[float, float], valleys.Ends]:
         """{bounds of C: where random points descend within them}."""
         own = next(p.bounds for p in self.problem.parameters if p.name == TRADED)
-        others = {bounds: self.random_ends(valleys.within(self.problem, TRADED, *bounds)) for bounds in (WIDE, NARROW)}
+        others = {
+            bounds: self.random_ends(valleys.within(self.problem, TRADED, *bounds))
+            for bounds in (WIDE, NARROW)
+        }
         return {own: self.control, **others}
 
     @functools.cached_property
@@ -255,7 +303,9 @@ class Study:
         whole = problem.full(search.values)[0]
         roles = ["train"] * len(self.train) + ["validate"] * len(self.held_out)
         events = (*self.train, *self.held_out)
-        return [respond(problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)]
+        return [
+            respond(problem.model, whole, e, role) for e, role in zip(events, roles, strict=True)
+        ]
 
     def held(self, kind: str) -> list[int]:
         """Which of `fitted` are the held-out events of an "interpolation" or "extrapolation"."""
@@ -264,28 +314,38 @@ class Study:
         if not chosen:
             which = "no deeper" if kind == "interpolation" else "deeper"
             raise UserError(
-                f"there is no held-out event for the {kind}: a dip {which} than the fitted one is needed;"
+                f"there is no held-out event for the {kind}: a dip {which} than the fitted one is"
+                " needed;"
                 f" name one in {DATA.validate}, or leave the table out with {TASK.parts}"
             )
         return chosen
 
     def residuals(self, kind: str) -> dict[str, np.ndarray]:
-        """Eq. (21) of P and Q, {reading: (seeds, 2)} [pu], a mean over the held-out events of one kind."""
+        """Eq. (21) of P and Q, {reading: (seeds, 2)} [pu], a mean over the held-out events of one
+        kind.
+        """
         events = self.held(kind)
 
         def residual(fits: list[Fit], channel: str) -> float:
-            each = [(getattr(fits[e].event.record, channel), getattr(fits[e], channel)) for e in events]
+            each = [
+                (getattr(fits[e].event.record, channel), getattr(fits[e], channel)) for e in events
+            ]
             return float(np.mean([mean_residual(*powers) for powers in each]))
 
         names = (*COMPARED, *TEN.values())
-        return {name: np.array([[residual(fits, c) for c in "PQ"] for fits in self.fits(name)]) for name in names}
+        return {
+            name: np.array([[residual(fits, c) for c in "PQ"] for fits in self.fits(name)])
+            for name in names
+        }
 
     @functools.cached_property
     def uniformity(self) -> dict[str, dict[str, np.ndarray]]:
         """{"50 points in 7 dimensions": {way: discrepancies}}."""
         self.tell("Figures 3 and 4: maps and flights")
         n, d = printed.POPULATION, len(printed.NAMES)
-        return {f"{n} points in {k} dimensions": dict(maps.discrepancies(n, k, ALPHAS)) for k in (d, 2)}
+        return {
+            f"{n} points in {k} dimensions": dict(maps.discrepancies(n, k, ALPHAS)) for k in (d, 2)
+        }
 
     @functools.cached_property
     def tails(self) -> dict[str, np.ndarray]:

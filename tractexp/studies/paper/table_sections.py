@@ -12,7 +12,8 @@ from tractexp.studies.paper.printed import COMPARED, LABELS, LITERAL, READINGS, 
 from tractexp.studies.paper.study import BUDGETS, FLOOR_FACTOR, LEVEL, Study
 
 TO_THE_LETTER = (
-    "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD = 20, one step per"
+    "To the letter: Eqs. (4), (12) and (15) as they are printed, in raw units, every move taken, SD"
+    " = 20, one step per"
     " sample; the objective is that of this model."
 )
 
@@ -22,56 +23,111 @@ THREE = ("paper", "one", "median")
 def table1(sheet: Report, study: Study) -> None:
     sheet.heading("Table 1: three orders of the motor")
     sheet.text(
-        "The paper grades the models in words and shows no numbers. Here each is fitted to the same record by least"
-        " squares from many starts, with the same static load, and judged on the dips it has not seen."
+        "The paper grades the models in words and shows no numbers. Here each is fitted to the same"
+        " record by least"
+        " squares from many starts, with the same static load, and judged on the dips it has not"
+        " seen."
     )
     rows, sizes = [], []
     for motor, order in study.orders.items():
-        fitted, held = (", ".join(f"{100 * e:.3g} %" for e in order.spread(role)) for role in ("train", "validate"))
-        rows.append([
-            motor, ", ".join(printed.TABLE_1[motor][:4]), fitted, held if study.held_out else "-",
-            f"{order.condition:.1e}", f"{order.finite} of {order.free}", f"{order.identified} of {order.free}",
-        ])  # fmt: skip
+        fitted, held = (
+            ", ".join(f"{100 * e:.3g} %" for e in order.spread(role))
+            for role in ("train", "validate")
+        )
+        rows.append(
+            [
+                motor,
+                ", ".join(printed.TABLE_1[motor][:4]),
+                fitted,
+                held if study.held_out else "-",
+                f"{order.condition:.1e}",
+                f"{order.finite} of {order.free}",
+                f"{order.identified} of {order.free}",
+            ]
+        )
         micro = f"{order.nanoseconds * study.problem.drive.samples / 1000:.3g}"
-        sizes.append([motor, printed.TABLE_1[motor][4], f"{order.step.total:.0f}", str(order.substeps),
-                      f"{order.per_sample.total:.0f}", micro])  # fmt: skip
+        sizes.append(
+            [
+                motor,
+                printed.TABLE_1[motor][4],
+                f"{order.step.total:.0f}",
+                str(order.substeps),
+                f"{order.per_sample.total:.0f}",
+                micro,
+            ]
+        )
     sheet.table(
-        ["motor", "the paper: P, Q, stability, identifiability", "epsilon_p, epsilon_q", "held out", "condition",
-         "finite intervals", "identified"],
+        [
+            "motor",
+            "the paper: P, Q, stability, identifiability",
+            "epsilon_p, epsilon_q",
+            "held out",
+            "condition",
+            "finite intervals",
+            "identified",
+        ],
         rows,
-        "Condition: of the information matrix, parameters in units of their ranges. Finite intervals: 95 %, inside the"
+        "Condition: of the information matrix, parameters in units of their ranges. Finite"
+        " intervals: 95 %, inside the"
         " bounds. Identified: within ± 20 %.",
         words=(1,),
-    )  # fmt: skip
+    )
     sheet.table(
-        ["motor", "the paper: calculation size", "operations per step", "steps per sample", "operations per sample",
-         "µs per simulation"],
+        [
+            "motor",
+            "the paper: calculation size",
+            "operations per step",
+            "steps per sample",
+            "operations per sample",
+            "µs per simulation",
+        ],
         sizes,
-        "Operations: additions, multiplications, divisions and others of the compiled equations for one candidate, four"
-        " stages and the powers of the static load included; a step is as short as the accuracy asks for. The time, on"
+        "Operations: additions, multiplications, divisions and others of the compiled equations for"
+        " one candidate, four"
+        " stages and the powers of the static load included; a step is as short as the accuracy"
+        " asks for. The time, on"
         " this machine and among many candidates at once, decides nothing.",
-    )  # fmt: skip
-    verdicts = [f"{m}: {n} {v}" for m, o in study.orders.items() for n, v in o.uncertainty.verdicts.items()
-                if v.word != "identified"]  # fmt: skip
+    )
+    verdicts = [
+        f"{m}: {n} {v}"
+        for m, o in study.orders.items()
+        for n, v in o.uncertainty.verdicts.items()
+        if v.word != "identified"
+    ]
     if verdicts:
         sheet.items(verdicts)
 
 
 def _rows_of_parameters(study: Study, columns: Sequence[tuple[str, str]]) -> list[list[str]]:
-    """One row for each parameter and error; a column is a reading and "paper", "one" (seed 0) or "median" of it."""
+    """One row for each parameter and error; a column is a reading and "paper", "one" (seed 0) or
+    "median" of it.
+    """
     index = {n: k for k, n in enumerate(study.problem.space.names)}
     bounds = {p.name: f"{p.bounds[0]:g} .. {p.bounds[1]:g}" for p in study.problem.parameters}
     rows = []
     for k, parameter in enumerate(printed.NAMES):
         row = [parameter, bounds[parameter] if parameter in index else "-"]
         for name, what in columns:
-            values = [f.values[index[parameter]] for f in study.searched(name)] if parameter in index else []
+            values = (
+                [f.values[index[parameter]] for f in study.searched(name)]
+                if parameter in index
+                else []
+            )
             row.append(f"{printed.TABLE_3[name][k]:g}" if what == "paper" else _one(values, what))
         rows.append(row)
     for error, table in (("epsilon_p", printed.EPSILON_P), ("epsilon_q", printed.EPSILON_Q)):
-        errors = [_one([getattr(fits[0], error) for fits in study.fits(n)], w, table, n) for n, w in columns]
+        errors = [
+            _one([getattr(fits[0], error) for fits in study.fits(n)], w, table, n)
+            for n, w in columns
+        ]
         rows.append([error, "", *errors])
-    rows.append(["Obj.E [pu²]", "", *(_one(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns)])
+    rows.append(
+        [
+            "Obj.E [pu²]",
+            "",
+            *(_one(study.objectives(n), w, printed.OBJECTIVE, n) for n, w in columns),
+        ]
+    )
     return rows
 
 
@@ -82,7 +138,9 @@ def _one(values: Any, what: str, table: Any = None, name: str = "") -> str:
     return number(float(values[0] if what == "one" else np.median(values))) if len(values) else "-"
 
 
-def _parameters(sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str) -> None:
+def _parameters(
+    sheet: Report, study: Study, columns: Sequence[tuple[str, str]], caption: str
+) -> None:
     captions = {"paper": "the paper", "one": "one run", "median": "median"}
     heads = [f"{label(name)}, {captions[what]}" for name, what in columns]
     sheet.table(["", "bounds", *heads], _rows_of_parameters(study, columns), caption)
@@ -92,31 +150,50 @@ def table2(sheet: Report, study: Study) -> None:
     sheet.heading("Table 2: what ISSA identifies")
     others = [(name, "median") for name in (TEN["issa"], LITERAL["issa"])]
     _parameters(
-        sheet, study, [*(("issa", what) for what in THREE), *others],
-        f"The lowest objective known on this record is {number(study.reference.objective)} pu², found by least squares"
-        f" from many starts in {study.reference.simulations:,} simulations. Errors are fractions. Bounds are ours, in"
+        sheet,
+        study,
+        [*(("issa", what) for what in THREE), *others],
+        f"The lowest objective known on this record is {number(study.reference.objective)} pu²,"
+        " found by least squares"
+        f" from many starts in {study.reference.simulations:,} simulations. Errors are fractions."
+        " Bounds are ours, in"
         " s, pu, 1, pu s²/rad, pu, 1 and 1: the paper prints none. " + TO_THE_LETTER,
-    )  # fmt: skip
+    )
 
 
 def table3(sheet: Report, study: Study) -> None:
     sheet.heading("Table 3: ISSA, SSA and PSO")
     _parameters(
-        sheet, study, [(name, what) for name in COMPARED for what in THREE],
-        "SD = 20, no velocity limit. Medians are taken for each row by itself, over searches that end in different"
+        sheet,
+        study,
+        [(name, what) for name in COMPARED for what in THREE],
+        "SD = 20, no velocity limit. Medians are taken for each row by itself, over searches that"
+        " end in different"
         " valleys (see Figure 9). Bounds are ours; the paper prints none.",
-    )  # fmt: skip
+    )
     others = (*TEN.values(), "pso_limited", *LITERAL.values())
-    _parameters(sheet, study, [(name, "median") for name in others], f"The other readings. {TO_THE_LETTER}")
+    _parameters(
+        sheet, study, [(name, "median") for name in others], f"The other readings. {TO_THE_LETTER}"
+    )
     sheet.table(
-        ["", "objective after 300 iterations", "simulations", "per iteration", "at the floor",
-         f"objective after {study.equal:,} simulations", "s per search"],
+        [
+            "",
+            "objective after 300 iterations",
+            "simulations",
+            "per iteration",
+            "at the floor",
+            f"objective after {study.equal:,} simulations",
+            "s per search",
+        ],
         [_spent(study, name) for name in (*LEVEL, *LITERAL.values())],
-        f"Median (best .. worst) of {study.seeds} seeds. The floor is {number(study.floor)} pu²; at the floor means"
-        f" within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in an iteration: by iterations it has twice"
-        f" the means. Searches of {study.equal:,} simulations are laid out for them, so that every schedule runs"
+        f"Median (best .. worst) of {study.seeds} seeds. The floor is {number(study.floor)} pu²; at"
+        " the floor means"
+        f" within {FLOOR_FACTOR:g} times. ISSA simulates its flock about twice in an iteration: by"
+        " iterations it has twice"
+        f" the means. Searches of {study.equal:,} simulations are laid out for them, so that every"
+        " schedule runs"
         " whole.",
-    )  # fmt: skip
+    )
     rows = []
     for by in BUDGETS:
         for a, b in PAIRS:
@@ -131,14 +208,19 @@ def _spent(study: Study, name: str) -> list[str]:
     ends = study.objectives(name)
     each = np.median([f.simulations / max(f.iterations, 1) for f in searches])
     return [
-        label(name), middle(ends), f"{np.median([f.simulations for f in searches]):,.0f}", f"{each:.0f}",
+        label(name),
+        middle(ends),
+        f"{np.median([f.simulations for f in searches]):,.0f}",
+        f"{each:.0f}",
         "-" if literal else f"{np.mean(ends <= FLOOR_FACTOR * study.floor):.0%}",
         "-" if literal else middle(study.objectives(name, "simulations")),
         f"{np.median([f.seconds for f in searches]):.2f}",
-    ]  # fmt: skip
+    ]
 
 
-def add_generalization_table(number_: str, kind: str, table: dict[str, tuple[float, float]]) -> Callable[..., None]:
+def add_generalization_table(
+    number_: str, kind: str, table: dict[str, tuple[float, float]]
+) -> Callable[..., None]:
     def section(sheet: Report, study: Study) -> None:
         residuals = study.residuals(kind)
         names = ", ".join((*study.train, *study.held_out)[e].record.name for e in study.held(kind))
@@ -146,16 +228,29 @@ def add_generalization_table(number_: str, kind: str, table: dict[str, tuple[flo
         rows = []
         for name, ours in residuals.items():
             own = table.get(name)
-            cells = [cell for c in (0, 1)
-                     for cell in (f"{own[c]:g}" if own else "", number(ours[0, c]), middle(ours[:, c]))]  # fmt: skip
+            cells = [
+                cell
+                for c in (0, 1)
+                for cell in (f"{own[c]:g}" if own else "", number(ours[0, c]), middle(ours[:, c]))
+            ]
             rows.append([label(name), *cells])
         sheet.table(
-            ["", *(f"{c}, {what}" for c in "PQ" for what in ("the paper", "one run", "median (lowest .. highest)"))],
+            [
+                "",
+                *(
+                    f"{c}, {what}"
+                    for c in "PQ"
+                    for what in ("the paper", "one run", "median (lowest .. highest)")
+                ),
+            ],
             rows,
             f"Mean absolute residual of Eq. (21) [pu] on {names}, with the parameters identified on"
             f" {', '.join(e.record.name for e in study.train)}.",
         )
         if kind == "extrapolation":
-            sheet.text("Section 4.4.2 says “less than 50 %” of the dip to extrapolate to; a deeper one must be meant.")
+            sheet.text(
+                "Section 4.4.2 says “less than 50 %” of the dip to extrapolate to; a deeper one"
+                " must be meant."
+            )
 
     return section

@@ -1,4 +1,6 @@
-"""The valleys of the objective: where searches and random points descend to, and the way along a parameter between."""
+"""The valleys of the objective: where searches and random points descend to, and the way along a
+parameter between.
+"""
 
 from dataclasses import dataclass
 
@@ -26,13 +28,17 @@ class Ends:
         while len(rest):
             lowest = rest[0]
             same = self.objective[rest] <= SAME_VALLEY_RATIO * self.objective[lowest]
-            groups.append((float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest]))
+            groups.append(
+                (float(self.objective[lowest]), int(np.count_nonzero(same)), self.values[lowest])
+            )
             rest = rest[~same]
         return groups
 
 
 def run_descents(problem: Problem, values: np.ndarray, floor: float, held: str = "") -> Ends:
-    """Least squares from each of the values (n, free), all at once, with one parameter `held` where it is."""
+    """Least squares from each of the values (n, free), all at once, with one parameter `held` where
+    it is.
+    """
     space, scale = problem.space, 1 / np.sqrt(GAIN * floor)
 
     def rows(unit: np.ndarray, lanes: np.ndarray) -> np.ndarray:
@@ -57,11 +63,15 @@ def within(problem: Problem, name: str, low: float, high: float) -> Problem:
     """The same problem with other bounds of one parameter, and the same Runge-Kutta step."""
     bounds = {p.name: p.bounds for p in problem.parameters} | {name: (low, high)}
     step = int(problem.step.substeps.max())
-    return Problem(problem.model, problem.events, bounds, problem.fixed, step, problem.per_event, problem.loss)
+    return Problem(
+        problem.model, problem.events, bounds, problem.fixed, step, problem.per_event, problem.loss
+    )
 
 
 def along(problem: Problem, starts: np.ndarray, name: str, grid: np.ndarray, floor: float) -> Ends:
-    """The lowest objective at each value of a parameter, all others fitted: followed from each start both ways."""
+    """The lowest objective at each value of a parameter, all others fitted: followed from each
+    start both ways.
+    """
     column = problem.space.names.index(name)
     best, values = np.full(len(grid), np.inf), np.empty((len(grid), problem.space.dimension))
     for start in starts:

@@ -1,16 +1,25 @@
-"""Why the searches rank as they do: do they miss the right valley, or do they not get to the bottom of theirs?"""
+"""Why the searches rank as they do: do they miss the right valley, or do they not get to the bottom
+of theirs?
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tractexp.studies.comparison.statistics import SIGNIFICANCE_LEVEL, holm, vargha_delaney, wilcoxon
+from tractexp.studies.comparison.statistics import (
+    SIGNIFICANCE_LEVEL,
+    holm,
+    vargha_delaney,
+    wilcoxon,
+)
 from tractexp.studies.paper.study import OptimizerPair, Shares, Study
 
 SPARROWS, RIVAL = ("issa", "ssa"), "pso"
 
 
 def fisher(a: Shares, b: Shares, of: str) -> float:
-    """Two-sided p of Fisher's exact test: as many searches of both reach the "valley" or the "floor"."""
+    """Two-sided p of Fisher's exact test: as many searches of both reach the "valley" or the
+    "floor".
+    """
     from scipy.stats import fisher_exact
 
     rows = [[getattr(s, of), s.n - getattr(s, of)] for s in (a, b)]
@@ -24,7 +33,9 @@ def significant(pairs: Sequence[OptimizerPair], k: int) -> bool:
 
 @dataclass(frozen=True)
 class Test:
-    """p of no difference, corrected, and whether what is tested has less than what it is compared with."""
+    """p of no difference, corrected, and whether what is tested has less than what it is compared
+    with.
+    """
 
     p: float
     less: bool
@@ -39,7 +50,8 @@ class Lack:
     """What a sparrow search lacks beside PSO and beside random points."""
 
     name: str
-    convergence: Test  # depth in its own valley, paired with PSO's: the objective over that of the bottom
+    # depth in its own valley, paired with PSO's: the objective over that of the bottom
+    convergence: Test
     valley: Test  # searches in the right valley, beside PSO's
     random: Test  # searches in the right valley, beside random points that descend there
     best: Test  # the same, beside searches for the best of as many random points
@@ -76,7 +88,14 @@ def _tests(study: Study, name: str) -> list[Test]:
 
 def answer(searches: Sequence[Lack]) -> str:
     """Whether "convergence at the end, not exploration, is what the sparrows lack" holds."""
-    converging, exploring = all(lack.convergence.lacks for lack in searches), any(lack.exploration for lack in searches)
+    converging, exploring = (
+        all(lack.convergence.lacks for lack in searches),
+        any(lack.exploration for lack in searches),
+    )
     if converging:
         return "holds only in half, for they lack both" if exploring else "holds"
-    return "does not hold: it is exploration" if exploring else "is not shown: neither test is significant"
+    return (
+        "does not hold: it is exploration"
+        if exploring
+        else "is not shown: neither test is significant"
+    )

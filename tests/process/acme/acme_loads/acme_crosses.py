@@ -7,7 +7,8 @@ from tractexp.extend import Optimizer, check_range, plugin
 
 @plugin
 class AcmeCrosses(Optimizer):
-    """x' = best of x and x +- a e_k over all coordinates k; the arm a is halved when none is better.
+    """x' = best of x and x +- a e_k over all coordinates k; the arm a is halved when none is
+    better.
 
     Source: ACME handbook 2026, section 3.
     Departures: the first point is the best of ten drawn at random.

@@ -9,7 +9,8 @@ HANDBOOK = "ACME handbook 2026, section 5"
 class AcmeLamps(Effect):
     """A share d of the static load goes out below a voltage and strikes again slowly.
 
-        lit(t) = min(1, lit(t - dt) + dt/T_d) above u_d, 0 below;   P_s -> P_s (1 - d (1 - lit)), likewise Q_s
+        lit(t) = min(1, lit(t - dt) + dt/T_d) above u_d, 0 below;
+        P_s -> P_s (1 - d (1 - lit)), likewise Q_s
 
     The edge at u_d is a ramp of 2 % of voltage, so that derivatives exist.
 
@@ -17,8 +18,12 @@ class AcmeLamps(Effect):
     Departures: the lamps strike along a ramp, not one by one.
     """
 
-    lamp_share = Parameter(0.0, (0.0, 0.5), "1", "share of the static load that is lamps", HANDBOOK, "d", null=0.0)
-    lamp_level = Parameter(0.7, (0.4, 0.9), "1", "voltage below which they go out, over U_0", HANDBOOK, "u_d")
+    lamp_share = Parameter(
+        0.0, (0.0, 0.5), "1", "share of the static load that is lamps", HANDBOOK, "d", null=0.0
+    )
+    lamp_level = Parameter(
+        0.7, (0.4, 0.9), "1", "voltage below which they go out, over U_0", HANDBOOK, "u_d"
+    )
     lamp_time = Parameter(0.5, (0.1, 5.0), "s", "time in which they strike again", HANDBOOK, "T_d")
 
     places, kind = ("static P", "static Q"), "trip"

@@ -13,7 +13,9 @@ class AcmeMixed(Static):
     Departures: none.
     """
 
-    current_share = Parameter(0.3, (0.0, 1.0), "1", "share of constant current in P_s", HANDBOOK, "c")
+    current_share = Parameter(
+        0.3, (0.0, 1.0), "1", "share of constant current in P_s", HANDBOOK, "c"
+    )
     frequency_slope = Parameter(1.0, (-2.0, 2.0), "1", "exponent of the frequency", HANDBOOK, "k")
 
     reads = ("f",)
@@ -22,4 +24,8 @@ class AcmeMixed(Static):
         return ((1 - current_share) * u**2 + current_share * u) * f**frequency_slope, u**2
 
     def require(self, current_share):
-        yield 1 - current_share, "the share of constant current exceeds 1: it is {value:g}", current_share
+        yield (
+            1 - current_share,
+            "the share of constant current exceeds 1: it is {value:g}",
+            current_share,
+        )
