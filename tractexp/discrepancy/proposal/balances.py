@@ -55,7 +55,7 @@ def torque(eq, g, size):
     eq.edit(sites.load_torque, lambda T: T + size * g)
 
 
-def edit_coupling(eq, g, size):
+def coupling(eq, g, size):
     """c -> c (1 + k g)."""
     eq.edit(sites.coupling, lambda c: c * (1 + size * g))
 
@@ -67,7 +67,7 @@ def decay(eq, g, size):
     eq.edit(sites.time_constant, lambda tau: tau / sympy.Max(0.05, 1 + size * g))
 
 
-def edit_magnetization(eq, g, size):
+def magnetizing(eq, g, size):
     """c -> c/(1 + k g), tau' -> tau'/(1 + k g)."""
     import sympy
 

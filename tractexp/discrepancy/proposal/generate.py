@@ -14,7 +14,7 @@ from tractexp.discrepancy.proposal.library import Term
 
 NAME = "proposed_effect"  # of the file, and so of the effect
 PREFIX = "proposed_"  # of the parameters, which share a model with others
-HELPERS = ("decided", "rounded", "reached")
+HELPERS = ("step_at_zero", "round_corner", "step_at_instant")
 CONSTANTS = ("SHARP", "FALLEN", "RISEN")
 HEAD = '''"""{headline}, as the data propose it."""
 
