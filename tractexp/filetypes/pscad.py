@@ -8,7 +8,7 @@ Source: PSCAD's manual, EMTDC output files.
 """
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from tractexp import files
@@ -71,6 +71,10 @@ class Results(TableFile):
                 f"{self.source}: its .out files have {counts} rows: they are not of one run"
             )
         return cells
+
+    def cells(self, number: int) -> Sequence[str]:
+        part, own = self.columns[number - 1] if number else (self.parts[0], 0)
+        return part.cells(own)
 
     def place(self, row: int) -> str:
         return self.parts[0].place(row)

@@ -86,6 +86,10 @@ class TableFile(ABC):
         """
 
     @abstractmethod
+    def cells(self, number: int) -> Sequence[Any]:
+        """The cells (N,) of a column as they stand in the file."""
+
+    @abstractmethod
     def place(self, row: int) -> str:
         """Where a row of values, from 0, stands in the file: "line 17"."""
 
@@ -143,6 +147,9 @@ class Rows(TableFile):
             "sample",
             notes,
         )
+
+    def cells(self, number: int) -> Sequence[Any]:
+        return self.columns(number)
 
     def place(self, row: int) -> str:
         return f"{self.word} {self.first + row}"

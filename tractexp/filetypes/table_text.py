@@ -130,6 +130,9 @@ class TextTable(TableFile):
         self.notes += (f"{said}: it is not used" if shorter else said,)
         self.data = head + line_end if shorter else self.data
 
+    def cells(self, number: int) -> list[str]:
+        return [row[number] for _, row in self._rows(number)]
+
     def place(self, row: int) -> str:
         if self._lines is not None and row < len(self._lines):
             return f"line {self._lines[row]}"

@@ -19,6 +19,7 @@ from tractexp.filetypes.mapping import (
     map_columns,
 )
 from tractexp.filetypes.moments import times_of
+from tractexp.filetypes.row_quality import find_bad_rows
 from tractexp.filetypes.sidecar import Sidecar, read_sidecar
 from tractexp.filetypes.table import TableFile, TableForm, instrument_of, open_table
 from tractexp.record.phasor import sequences
@@ -133,7 +134,7 @@ def _tune_nominal_frequency(result: Powers, declared: float, source: MappedColum
         else columns["f"] * declared
     )
     alive = LEAST_LIVE_VOLTAGE * np.nanmedian(U) < U
-    level = float(np.median(f[alive])) if alive.any() else declared
+    level = float(np.nanmedian(f[alive])) if np.isfinite(f[alive]).any() else declared
     if level < SLOWEST:
         del columns["f"]
         note = (
@@ -239,12 +240,8 @@ def _read(
     """The values (N,) by key, in s, kV, MW, Hz, and angles as they are; the moment of t = 0, and
     notes on the times.
     """
-    kinds = {"t": "time", **{key: "gaps" for key in mapping.columns if key[0] in "PQ"}}
-    if mapping.kind == "powers":
-        kinds |= {key: "gaps" for key in mapping.columns if key[0] == "I"}
-    cells = table.read(
-        {one.number: kinds.get(key, "number") for key, one in mapping.columns.items()}
-    )
+    kinds = {"t": "time", "frac": "number"}
+    cells = table.read({one.number: kinds.get(key, "gaps") for key, one in mapping.columns.items()})
     values = {key: cells[one.number].values for key, one in mapping.columns.items()}
     values |= {
         key: values[key] * by
@@ -256,7 +253,10 @@ def _read(
     values.pop("frac", None)
     read = times_of(table, mapping, cells)
     values["t"] = read.t
-    return values, read.start, read.notes
+    bad, said = find_bad_rows(table, len(read.t))
+    for key in values.keys() - {"t"}:
+        values[key] = np.where(bad, np.nan, values[key])
+    return values, read.start, (*read.notes, *said)
 
 
 def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
@@ -285,12 +285,23 @@ def _of_phasors(table: TableFile, mapping: Mapped, nominal: float) -> Powers:
     notes = [*mapping.notes, *note, *angle_notes, *turned, *sort, source]
     if "f" in values:
         columns["f"] = (
-            values["f"] if np.median(values["f"]) > nominal / 2 else nominal + values["f"]
+            values["f"] if np.nanmedian(values["f"]) > nominal / 2 else nominal + values["f"]
         )
     else:
-        columns["f"] = nominal + np.gradient(np.unwrap(np.angle(V1)), values["t"]) / (2 * np.pi)
+        columns["f"] = nominal + _measure_turning(V1, values["t"])
         notes.append(f"f from the angle of the voltage, which stands still at {nominal:g} Hz")
     return Powers(columns, {"U": absolute, "P": absolute}, (*table.notes, *notes), start=start)
+
+
+def _measure_turning(V: np.ndarray, t: np.ndarray) -> np.ndarray:
+    """How fast phasors (N,) turn [Hz] at times t (N,) [s]; over a gap as from one side to the
+    other.
+    """
+    there = np.isfinite(V)
+    if np.count_nonzero(there) < 2:
+        return np.full(len(t), np.nan)
+    angle = np.interp(t, t[there], np.unwrap(np.angle(V[there])))
+    return np.gradient(angle, t) / (2 * np.pi)
 
 
 def _forward(V: np.ndarray, sources: Sequence[MappedColumn]) -> tuple[np.ndarray, list[str]]:
@@ -380,12 +391,12 @@ def _radians(
     unit = next((one.role.unit for one in angles.values() if one.role.unit), "")
     if unit:
         return factor(unit), []
-    widest = max(float(np.abs(values[key]).max()) for key in angles)
+    widest = max(float(np.nanmax(np.abs(values[key]), initial=0.0)) for key in angles)
     if widest > 2 * np.pi:
         return np.pi / 180, ["angles taken as degrees, for they exceed 2 pi"]
     phases = [values[key] for key in angles if key[0] == "U" and len(key) == len("Ua_angle")]
     if len(phases) == 3:
-        apart = np.median(np.abs(np.mod(phases[1] - phases[0] + np.pi, 2 * np.pi) - np.pi))
+        apart = np.nanmedian(np.abs(np.mod(phases[1] - phases[0] + np.pi, 2 * np.pi) - np.pi))
         if abs(apart - 2 * np.pi / 3) < 0.3:
             return 1.0, ["angles taken as rad, for the phases are 2 pi/3 apart"]
     raise UserError(

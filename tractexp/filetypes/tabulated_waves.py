@@ -12,6 +12,12 @@ from tractexp.filetypes.comtrade_samples import HUGE
 from tractexp.filetypes.mapping import LINES, PHASES, Mapped
 from tractexp.filetypes.moments import times_of
 from tractexp.filetypes.table import TableFile
+from tractexp.record.gap import (
+    find_single_gaps,
+    find_single_lost_rows,
+    insert_missing,
+    insert_times,
+)
 from tractexp.record.record import LARGEST_JITTER
 from tractexp.recording.recording import Channel, Recording, Segment
 from tractexp.recording.unit import in_units
@@ -32,7 +38,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
         )
     times = {mapping.columns[key].number for key in ("t", "frac") if key in mapping.columns}
     named = [k for k, name in enumerate(table.heading.names) if name and k not in times]
-    numbers = {k: "number" for k in named if all(_numbers_of(table, k))}
+    numbers = {k: "gaps" for k in named if _is_sampled(_numbers_of(table, k))}
     others = [
         one.number for one in mapping.columns.values() if one.number not in (*numbers, *times)
     ]
@@ -41,7 +47,7 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
         {**dict.fromkeys(times, "number"), mapping.columns["t"].number: "time", **numbers}
     )
     for k in numbers:
-        wild = ~(np.abs(cells[k].values) <= HUGE)
+        wild = np.abs(cells[k].values) > HUGE
         if wild.any():
             i = int(np.argmax(wild))
             raise table.refuse(
@@ -51,9 +57,13 @@ def recording(table: TableFile, mapping: Mapped, nominal: float) -> Recording:
                 " correct it",
             )
     read = times_of(table, mapping, cells)
-    segments, odd = _segments(table, read.t)
+    lost = find_single_lost_rows(read.t)
+    segments, odd = _segments(table, insert_times(read.t, lost))
     named = {one.number: key for key, one in mapping.columns.items()}
-    channels = [_channel(table, mapping, k, cells[k].values, named.get(k, "")) for k in numbers]
+    channels = [
+        _channel(table, mapping, k, insert_missing(cells[k].values, lost), named.get(k, ""))
+        for k in numbers
+    ]
     notes = [*table.notes, *read.notes, *odd]
     return in_units(
         Recording(table.source, channels, segments, nominal, start=read.start, notes=notes), {}, {}
@@ -64,6 +74,14 @@ def _numbers_of(table: TableFile, number: int) -> list[bool]:
     """Which of a column's first cells are numbers."""
     cells = [row[number] if number < len(row) else "" for row in table.sample[:20]]
     return [is_number(cell) or is_number(cell, ",") for cell in cells]
+
+
+def _is_sampled(numbers: Sequence[bool]) -> bool:
+    """Whether a column whose first cells are numbers or not has one in each row, but for single
+    ones.
+    """
+    lacking = ~np.array(numbers, dtype=bool)
+    return not lacking.any() or len(find_single_gaps(lacking)) == np.count_nonzero(lacking)
 
 
 def _refuse_other_rates(table: TableFile, numbers: Sequence[int]) -> None:

@@ -61,6 +61,24 @@ def cut_dips(
     return file_dips
 
 
+def leave_out(record: Record, times: Sequence[float], reach: float) -> Record:
+    """The record without P and Q (nan) where, in a dip, a sample within `reach` [s] was bridged.
+
+    `times` (K,) [s] are those of bridged samples, ascending.
+
+    Before and after it what is bridged differs from what was by less than noise does.
+    """
+    if not len(times):
+        return record
+    t, inside = record.t, np.zeros(record.samples, dtype=bool)
+    for start, end in find_dips(t, record.U):
+        inside[start:end] = True
+    first, stop = (np.searchsorted(times, t + side) for side in (-reach, reach))
+    at = stop > first
+    P, Q = (np.where(inside & at, np.nan, x) for x in (record.P, record.Q))
+    return replace(record, P=P, Q=Q)
+
+
 def around(event: Event) -> Event:
     """The event in the part of its record about its dip; itself where the record is hardly longer.
 

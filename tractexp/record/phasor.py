@@ -199,6 +199,7 @@ class Phasors:
     f: np.ndarray  # (M,) Hz, at which the (positive-sequence) voltage turns
     # (M,) each: P_3, ..., P_H [MW], THD_u, THD_i
     more: Mapping[str, np.ndarray] = field(default_factory=dict)
+    bridged: tuple[float, ...] = ()  # s: single samples that were missing in the waveforms
 
     @property
     def V1(self) -> NDArray[np.complex128]:
@@ -265,7 +266,7 @@ def join_phasors(parts: Sequence[Phasors]) -> Phasors:
 
     more = {name: join([part.more[name] for part in turned]) for name in turned[0].more}
     V, I, f = (join([getattr(part, name) for part in turned]) for name in ("V", "I", "f"))
-    return Phasors(t, V, I, f, more)
+    return Phasors(t, V, I, f, more, tuple(each for part in turned for each in part.bridged))
 
 
 def measure(

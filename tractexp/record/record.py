@@ -6,6 +6,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tractexp.errors import DATA, UserError
+from tractexp.record.gap import (
+    bridge_values,
+    describe_bridged,
+    find_single_gaps,
+    find_single_lost_rows,
+    insert_missing,
+    insert_times,
+)
 from tractexp.record.waves import Waves
 from tractexp.record.window import Window
 
@@ -25,6 +33,8 @@ GREATEST_CURRENT = 50.0  # kA, of a load before a dip
 # of a base [kV, MVA, Hz]
 SIZES = {"voltage": (1e-6, 1500.0), "power": (1e-6, 1e7), "frequency": (0.1, 1e4)}
 
+
+ONLY_SINGLE = "; only P and Q may have gaps (nan), a single sample of the others is bridged"
 
 DECLARATION, LOAD = "given", "load"
 
@@ -151,11 +161,47 @@ class Record:
         """The record on a uniform time grid; a note says so where more than `JITTER` of a step was
         moved.
 
-        Jitter, and the event instants and steps of a simulator, are resampled linearly; of two rows
-        of one time the second holds from then on. Raises `UserError` for missing rows: steps that
-        are multiples of the usual one.
+        Single missing rows and voltages are bridged. Jitter, and the event instants and steps of a
+        simulator, are resampled linearly; of two rows of one time the second holds from then on.
+        Raises `UserError` for more missing rows: steps that are multiples of the usual one.
         """
-        place = place or self._place
+        given = place or self._place
+        if any(values.shape != self.t.shape for values in self.channels.values()):
+            self._check_values(given)
+        rows = find_single_lost_rows(self.t)
+        return (
+            self._with_rows(rows)
+            ._bridge()
+            ._even_out(lambda i: given(i - int(np.searchsorted(rows + np.arange(len(rows)), i))))
+        )
+
+    def _with_rows(self, rows: np.ndarray) -> "Record":
+        """The record with a row that is missing (nan) before each of `rows` (K,)."""
+        if not len(rows):
+            return self
+        channels = {name: insert_missing(x, rows) for name, x in self.channels.items()}
+        channels["t"] = insert_times(self.t, rows)
+        more = {name: insert_missing(x, rows) for name, x in self.more.items()}
+        return replace(self, **channels, more=more)
+
+    def _bridge(self) -> "Record":
+        """The record with what drives a model bridged where a single sample of it is missing.
+
+        P and Q are not invented: of these samples they are in no sum.
+        """
+        drives = {name: x for name, x in self.channels.items() if name in ("U", "f", "U2")}
+        at = find_single_gaps(np.isnan([*drives.values()]).any(axis=0))
+        if not len(at):
+            return self
+        lacking = {name: x for name, x in drives.items() if np.isnan(x[at]).any()}
+        channels = {name: bridge_values(x, at) for name, x in lacking.items()}
+        gaps = np.isin(np.arange(self.samples), at)
+        channels |= {name: np.where(gaps, np.nan, self.channels[name]) for name in "PQ"}
+        note = f"{describe_bridged(self.t[at])}: bridged, and in no sum of P and Q"
+        return replace(self, **channels, notes=(*self.notes, note))
+
+    def _even_out(self, place: Callable[[int], str]) -> "Record":
+        """The record on a uniform grid."""
         self._check_values(place, still=True)
         grid = np.linspace(self.t[0], self.t[-1], len(self.t))
         off = float(np.abs(self.t - grid).max() / self.step)
@@ -243,7 +289,7 @@ class Record:
             bad = np.isinf(values) if name in ("P", "Q") else ~np.isfinite(values)
             if bad.any():
                 i = int(np.argmax(bad))
-                gap = "" if name in ("P", "Q") else "; only P and Q may have gaps (nan)"
+                gap = "" if name in ("P", "Q") else ONLY_SINGLE
                 raise UserError(
                     f"{self.where}: {place(i)}: {name} = {values[i]} is not a finite number{gap}"
                 )

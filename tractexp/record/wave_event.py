@@ -222,6 +222,7 @@ def in_waves(event: Event) -> WaveEvent:
     calm = np.stack([residual.real, residual.imag, i_zero[steady]])  # no fundamental
     compared = _choose_compared_components(currents[:, start:], calm, K)
     currents[~compared] = np.nan
+    currents[:, _find_bridged_of_dip(waves, event, lead)] = np.nan
     levels = (
         (noise.mean() * np.sqrt(2 / 3),) * 2 + (noise.mean() / np.sqrt(3),)
         if K == 3
@@ -266,6 +267,16 @@ def in_waves(event: Event) -> WaveEvent:
         phases=K,
         weights=noise_filter.weights,
     )
+
+
+def _find_bridged_of_dip(waves: Waves, event: Event, lead: int) -> list[int]:
+    """The samples, `lead` after those of the waves, that were bridged within the dip, and a cycle
+    about it.
+    """
+    cycle = 1 / event.record.base.frequency
+    first, last = event.t_start - cycle, event.t_end + cycle
+    within = [t for t in waves.bridged if max(first, waves.start) <= t <= min(last, waves.end)]
+    return [lead + round((t - waves.start) * waves.rate) for t in within]
 
 
 def describe_smearing(duration: float, U2: float, frequency: float) -> str:

@@ -16,8 +16,8 @@ class Waves:
 
     `samples` (2 K, M), K three or one, begins at `start` [s] of the record's time; an array, or
     what is read when it is sliced like one. `late` (2 K,) [s] is how much later than stamped each
-    channel is sampled. `estimator` names what phasors were measured by, so that those of calculated
-    waveforms compare with them.
+    channel is sampled; at the times `bridged` [s] a single sample was missing. `estimator` names
+    what phasors were measured by, so that those of calculated waveforms compare with them.
     """
 
     samples: Any
@@ -25,6 +25,7 @@ class Waves:
     rate: float  # samples per second
     estimator: Any = None
     late: np.ndarray | None = None
+    bridged: tuple[float, ...] = ()
 
     @property
     def phases(self) -> int:
@@ -48,6 +49,7 @@ class Waves:
         """As plain data."""
         late = None if self.late is None else self.late.tolist()
         fields = {"start": self.start, "rate": self.rate, "estimator": self.estimator, "late": late}
+        fields |= {"bridged": list(self.bridged)} if self.bridged else {}
         return {"samples": np.asarray(self.samples[:, :]), **fields}
 
     @classmethod
@@ -55,4 +57,5 @@ class Waves:
         """From the content of `to_dict`."""
         late = content["late"] if content["late"] is None else np.array(content["late"])
         samples = np.array(content["samples"], dtype=float)
-        return cls(samples, content["start"], content["rate"], content["estimator"], late)
+        bridged = tuple(content.get("bridged", ()))
+        return cls(samples, content["start"], content["rate"], content["estimator"], late, bridged)

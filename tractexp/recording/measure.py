@@ -9,6 +9,7 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.plugin import chosen
 from tractexp.record.phasor import Phasors, measure
+from tractexp.recording.bridge import find_bridged
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder
 from tractexp.recording.recording import Recording, Segment
@@ -63,6 +64,12 @@ class FeederWaves:
         return waves
 
     @property
+    def bridged(self) -> tuple[float, ...]:
+        """Times [s] of single samples that were missing in some channel."""
+        at = find_bridged(self.recording, self.numbers, self.segment)
+        return tuple((self.segment.start + at / self.segment.rate).tolist())
+
+    @property
     def late(self) -> np.ndarray:
         """Time (2 K,) [s] by which each is sampled later than stamped.
 
@@ -107,7 +114,7 @@ def phasors_of(
             )
     waves = FeederWaves.of(recording, feeder, segment)
     try:
-        return measure(
+        phasors = measure(
             waves,
             segment.rate,
             recording.frequency,
@@ -117,6 +124,7 @@ def phasors_of(
             harmonics=harmonics,
             tracked=tracked,
         )
+        return replace(phasors, bridged=waves.bridged)
     except UserError as error:
         raise UserError(
             f"{recording.source}: segment from {segment.start:.3f} s: {error}"

@@ -10,10 +10,19 @@ from tractexp import plugin, quoting
 from tractexp.errors import DATA, UserError, check_range, setting
 from tractexp.overrides import format_assignment
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
-from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut_dips, level
+from tractexp.record.dips import (
+    FileDip,
+    check_load,
+    check_numbers,
+    chosen,
+    cut_dips,
+    leave_out,
+    level,
+)
 from tractexp.record.phasor import Phasors, join_phasors
 from tractexp.record.record import LOAD
 from tractexp.recording.arrangement import arrange_feeder, tune_frequency
+from tractexp.recording.bridge import bridge_recording
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
 from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized, propose
@@ -59,7 +68,7 @@ class WaveformReader(Reader):
 
     def opened(self) -> Recording:
         """The file, its units and the nominal frequency that its voltages really have."""
-        recording = self.recording()
+        recording = bridge_recording(self.recording())
         keys = {"U": "voltages", "I": "currents"}
         numbers = {
             x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
@@ -141,7 +150,8 @@ class WaveformReader(Reader):
     def _whole(self, feeder: Feeder, stream: Stream, frequency: float) -> Record:
         """All of one segment, in kV, MW and Mvar."""
         phasors, waves = stream
-        return Record(
+        window = estimator_of(self.estimator).window(frequency)
+        whole = Record(
             name=Path(self.path).stem,
             t=phasors.t,
             U=phasors.U,
@@ -152,10 +162,11 @@ class WaveformReader(Reader):
             base=Base(frequency=frequency),
             source=self.path,
             notes=plugin.chosen("connection", feeder.connection).notes,
-            window=estimator_of(self.estimator).window(frequency),
+            window=window,
             more=phasors.more,
             waves=waves[0] if len(waves) == 1 else None,
         )
+        return leave_out(whole, phasors.bridged, window.length / 2)
 
     def feeder(self, recording: Recording) -> Feeder:
         """The chosen channels, or those of the only load that the file shows."""
@@ -269,7 +280,9 @@ class WaveformReader(Reader):
                     continue
                 waves = FeederWaves.of(recording, feeder, segment)
                 late = waves.late if self.skew else None
-                several.append(Waves(waves, segment.start, segment.rate, self.estimator, late))
+                several.append(
+                    Waves(waves, segment.start, segment.rate, self.estimator, late, waves.bridged)
+                )
             if parts:
                 streams.append((join_phasors(parts), several))
         if not streams:

@@ -46,6 +46,8 @@ CYRILLIC = str.maketrans("вВаАкКмМ", "vVaAkKmM")  # кВ, А
 UNBROKEN = 1.0  # cycle: a shorter hole between two sampling rates leaves one record
 FEWEST_PER_CYCLE = 10  # samples: a slower segment holds no waveform but magnitudes
 
+NOTHING_BRIDGED = (np.empty(0, dtype=int), np.empty(0))
+
 
 def unit_of(text: str) -> tuple[str, float]:
     """(quantity, factor to kV or kA) of a unit as a file writes it; ("", 1.0) for another."""
@@ -115,6 +117,8 @@ class Channel:
     # S: secondary values whose ratio the file does not give; ?: the file cannot say which they are
     side: str = ""
     form: str = "waveform"  # or magnitude (RMS), peak, angle, value: samples that are no waveform
+    # numbers (K,) of single missing samples, and what is put there, in `unit`
+    bridged: tuple[np.ndarray, np.ndarray] = NOTHING_BRIDGED
 
     def values(self, first: int = 0, stop: int | None = None) -> np.ndarray:
         """Primary values (M,) in kV, kA, MW, Mvar, Hz or rad (another quantity in its own unit);
@@ -133,6 +137,11 @@ class Channel:
         values += self.offset
         if self.missing is not None:
             values[raw == self.missing] = np.nan
+        at, estimates = self.bridged
+        if len(at):
+            begin, end, _ = slice(first, stop).indices(len(self.raw))
+            inside = (begin <= at) & (at < end)
+            values[at[inside] - begin] = estimates[inside]
         return values
 
     @property

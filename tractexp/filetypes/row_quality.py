@@ -1,0 +1,71 @@
+"""Rows that a table itself marks as bad: by a word, by the data error of a synchrophasor's status
+word (IEEE C37.118.2, bits 15 and 14 of STAT), or by OPC's quality code.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from tractexp.filetypes.table import TableFile
+from tractexp.record.gap import find_single_gaps
+
+NAMED = re.compile(
+    r"quality|qual\b|\bstat(us)?\b|valid|flag|qualität|güte|gültig|calidad|qualité"
+    r"|качеств|достоверн|质量|品质|有效",
+    re.IGNORECASE,
+)
+BAD = {
+    *("bad", "invalid", "questionable", "suspect", "uncertain", "missing", "lost", "error"),
+    *("false", "schlecht", "ungültig", "mala", "malo", "inválido", "mauvais", "invalide"),
+    *("плохое", "недостоверно", "坏", "无效"),
+}
+DATA_ERROR = 0xC000  # of STAT: any of these bits says that the values are not to be used
+HEX_WORD = re.compile(r"(0x)?[0-9a-f]{4}h?", re.IGNORECASE)
+OPC_GOOD, OPC_QUALITY = 192, 0xC0  # the code of good values; the bits that are 0 of bad ones
+
+
+def find_bad_rows(table: TableFile, count: int) -> tuple[np.ndarray, tuple[str, ...]]:
+    """(which of the table's `count` rows are marked bad and stand alone, what is said of marks).
+
+    Rows marked in a row are used as they stand: what they are worth, nobody but the reader knows.
+    """
+    bad, said = np.zeros(count, dtype=bool), list[str]()
+    for number, name in enumerate(table.heading.names):
+        if not NAMED.search(name):
+            continue
+        marked = _read_marks(table.cells(number), name)
+        if marked is None or len(marked) != count or not marked.any():
+            continue
+        alone = np.zeros(len(marked), dtype=bool)
+        alone[find_single_gaps(marked)] = True
+        rest = int(np.count_nonzero(marked & ~alone))
+        if alone.any():
+            said.append(f"'{name}' marks {np.count_nonzero(alone)} single rows as bad: left out")
+        if rest:
+            said.append(f"'{name}' marks {rest} rows as bad, one after another: used as they stand")
+        bad |= alone
+    return bad, tuple(said)
+
+
+def _read_marks(cells: Sequence[Any], name: str) -> np.ndarray | None:
+    """Which cells (N,) mark their row as bad; None where they are no marks."""
+    texts = [str(cell).strip().lower() for cell in cells]
+    if not any(text[:1].isdigit() for text in texts):
+        return np.array([text in BAD for text in texts])
+    if "stat" in name.lower():
+        words = [_read_word(text, texts) for text in texts]
+        return np.array([word is not None and bool(word & DATA_ERROR) for word in words])
+    codes = [int(float(text)) if re.fullmatch(r"\d+(\.0*)?", text) else None for text in texts]
+    if Counter(codes).most_common(1)[0][0] != OPC_GOOD:
+        return None
+    return np.array([code is not None and not code & OPC_QUALITY for code in codes])
+
+
+def _read_word(text: str, texts: Sequence[str]) -> int | None:
+    """A status word, written in decimal digits or as four hexadecimal ones."""
+    if all(HEX_WORD.fullmatch(each) for each in texts):
+        return int(text.removeprefix("0x").removesuffix("h"), 16)
+    return int(float(text)) if re.fullmatch(r"\d+(\.0*)?", text) else None
