@@ -33,6 +33,7 @@ if TYPE_CHECKING:  # for editors and type checkers; a test holds it to PUBLIC
     from tractexp.studies.api.benchmark import benchmark as benchmark
     from tractexp.studies.api.compare import compare as compare
     from tractexp.studies.api.paper import paper as paper
+    from tractexp.studies.api.search import search as search
 
     __version__: str
 
@@ -59,6 +60,7 @@ PUBLIC = {
     "posterior": "tractexp.api.posterior",
     "profile": "tractexp.api.profile",
     "read": "tractexp.api.read",
+    "search": "tractexp.studies.api.search",
     "simulate": "tractexp.api.simulate",
     "sites": "tractexp.model.site_table",
     "survey": "tractexp.api.survey",

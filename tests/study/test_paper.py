@@ -16,8 +16,9 @@ from tractexp.blocks import Report
 from tractexp.blocks.markdown import markdown
 from tractexp.errors import UserError
 from tractexp.identification.generalization import by_depth, mean_residual
+from tractexp.studies import searches
 from tractexp.studies.api.paper import PARTS
-from tractexp.studies.paper import claims, equations, maps, printed, searches, valleys, why
+from tractexp.studies.paper import claims, equations, maps, printed, valleys, why
 from tractexp.studies.paper.study import Shares, Study
 from tractexp.studies.paper.valleys import Ends
 

@@ -76,7 +76,14 @@ def compared(tmp_path_factory):
     return tractexp.compare(folder, targets=[2, 1.1], floor=1e-6)
 
 
-KINDS = ["compared", "benchmarked", "generalised", "replicated"]
+@pytest.fixture(scope="module")
+def compared_searches(dips):
+    brief = {"brief": {"name": "pso", "population": 10}}
+    made = tractexp.search(dips[1], optimizers=brief, seeds=2, budget=60, cores=1, progress=False)
+    return tractexp.compare(made, progress=False)
+
+
+KINDS = ["compared", "compared_searches", "benchmarked", "generalised", "replicated"]
 
 
 @pytest.mark.parametrize("name", KINDS)

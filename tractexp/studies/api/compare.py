@@ -14,6 +14,7 @@ from tractexp.errors import TASK, UserError, check_choice, check_range
 from tractexp.outcome import Written
 from tractexp.plugin import plugin
 from tractexp.progress import say
+from tractexp.studies.api.search import Searches
 
 if TYPE_CHECKING:
     from tractexp.studies.comparison.comparison import Comparison
@@ -39,11 +40,12 @@ class ComparisonResult(Written):
     source: str  # where the runs are from, in words
     content: Mapping[str, Any]
     computed: "Comparison | Several | None" = None  # None in a loaded result
+    searches: Searches | None = None  # what was compared, where that was made by a call
 
     @functools.cached_property
     def comparison(self) -> "Comparison | Several":
         """What stands behind the page. A loaded result reads the runs again."""
-        return self.computed or _compare_gathered_runs(**self.call)[1]
+        return self.computed or _compare_gathered_runs(self.searches, **self.call)[1]
 
     @property
     def comparisons(self) -> "Mapping[str, Comparison]":
@@ -54,8 +56,8 @@ class ComparisonResult(Written):
 
     @property
     def folder(self) -> Path | None:
-        """The sweep's folder; None where the runs are from MLflow."""
-        return Path(self.call["sweep"]) if self.call["filter"] is None else None
+        """The sweep's folder; None where the runs are from elsewhere."""
+        return None if self.call["sweep"] is None else Path(self.call["sweep"])
 
     @property
     def answer(self) -> str:
@@ -133,19 +135,21 @@ class ComparisonResult(Written):
         return _report(self.comparison).report(self.comparison, self.source)
 
     def to_dict(self) -> dict[str, Any]:
-        return {"call": dict(self.call), **self.content}
+        made = {} if self.searches is None else {"searches": self.searches.to_dict()}
+        return {"call": dict(self.call), **self.content, **made}
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        own = {
-            key: value for key, value in content.items() if key not in ("call", "kind", "tractexp")
-        }
-        return cls(content["call"], content["source"], own)
+        beside = ("call", "kind", "tractexp", "searches")
+        own = {key: value for key, value in content.items() if key not in beside}
+        made = content.get("searches")
+        searches = None if made is None else Searches.from_dict(made)
+        return cls(content["call"], content["source"], own, searches=searches)
 
 
 @public
 def compare(
-    sweep: Path | str | None = None,
+    sweep: Path | str | Searches | None = None,
     *,
     filter: str | None = None,
     uri: str | None = None,
@@ -161,7 +165,7 @@ def compare(
     progress: Any = None,
 ) -> ComparisonResult:
     """Compare the variants in a sweep's folder (None: the newest under outputs/sweeps), or what a
-    `filter` finds.
+    `filter` finds, or what `tractexp.search` found.
 
     The filter is MLflow's, over the store at `uri` (None: the current folder's) and one
     `experiment` (None: all). `data` keeps the runs on one choice of data; runs on several are
@@ -175,12 +179,9 @@ def compare(
     a callable is told. Raises `UserError` where no runs are found, or their models differ.
     """
     check(sweep, filter, targets, ties, floor, apart, bbob)
-    if filter is None:
-        from tractexp.studies.comparison import load
-
-        sweep = str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
+    searches = sweep if isinstance(sweep, Searches) else None
     call = {
-        "sweep": sweep,
+        "sweep": _find_folder(sweep, filter),
         "filter": filter,
         "uri": uri,
         "experiment": experiment,
@@ -192,10 +193,18 @@ def compare(
         "apart": list(apart),
         "bbob": bbob,
     }
-    source, comparison = _compare_gathered_runs(**call, cores=cores, progress=progress)
-    return ComparisonResult(
-        call, source, _report(comparison).content(comparison, source), comparison
-    )
+    source, comparison = _compare_gathered_runs(searches, **call, cores=cores, progress=progress)
+    content = _report(comparison).content(comparison, source)
+    return ComparisonResult(call, source, content, comparison, searches)
+
+
+def _find_folder(sweep: Path | str | Searches | None, filter: str | None) -> str | None:
+    """The folder of the sweep that is compared; None where the runs are from elsewhere."""
+    from tractexp.studies.comparison import load
+
+    if filter is not None or isinstance(sweep, Searches):
+        return None
+    return str(sweep if sweep is not None else load.newest_sweep(SWEEPS))
 
 
 def check(
@@ -238,6 +247,7 @@ def _hardest(targets: Sequence[float]) -> int:
 
 
 def _compare_gathered_runs(
+    searches: Searches | None,
     *,
     sweep: str | None,
     filter: str | None,
@@ -256,12 +266,13 @@ def _compare_gathered_runs(
     from tractexp.studies.comparison import runs as gathering
     from tractexp.studies.comparison.judging import compare_runs, several
 
-    runs, source = _runs(sweep, filter, uri, experiment)
+    problem = searches and searches.setup.problem
+    runs, source = _runs(searches, sweep, filter, uri, experiment)
     if data is not None:
         runs = gathering.select_runs_on(runs, source, data)
     groups = gathering.part_runs(runs, apart)
     if len(groups) == 1 and not bbob:
-        return source, compare_runs(gathering.gather(runs, source), progress, judging)
+        return source, compare_runs(gathering.gather(runs, source), progress, judging, problem)
     if judging["floor"] is not None and len(groups) > 1:
         raise UserError(
             f"{TASK.floor}={judging['floor']:g} is the floor of one problem, and {source} has"
@@ -269,16 +280,22 @@ def _compare_gathered_runs(
             f" out, or choose one by {TASK.data}"
         )
     return source, several(
-        groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress
+        groups, source, judging, Path(sweep) if sweep else None, bbob, cores, progress, problem
     )
 
 
 def _runs(
-    sweep: str | None, filter: str | None, uri: str | None, experiment: str | None
+    searches: Searches | None,
+    sweep: str | None,
+    filter: str | None,
+    uri: str | None,
+    experiment: str | None,
 ) -> "tuple[list[SearchRun], str]":
     """The runs, and where they are from in words."""
     from tractexp.studies.comparison import load
 
+    if searches is not None:
+        return list(searches.runs), searches.source
     if filter is None:
         assert sweep is not None
         return load.from_sweep(Path(sweep)), f"the sweep {Path(sweep)}"

@@ -27,11 +27,15 @@ DIMENSION, EVALUATIONS = 5, 15_000
 BBOB = "bbob.json"
 
 
-def compare_runs(gathered: Gathered, progress: Any, judging: Mapping[str, Any]) -> Comparison:
+def compare_runs(
+    gathered: Gathered, progress: Any, judging: Mapping[str, Any], problem: Problem | None = None
+) -> Comparison:
     """The runs of one problem compared; `judging` are the arguments of `comparison.compare` that a
     user chooses.
+
+    Without the `problem` it is put again from the configuration of the runs.
     """
-    polished, why_not = _polish_described_problem(gathered, progress)
+    polished, why_not = _polish_described_problem(gathered, progress, problem)
     return compare(gathered, plain=plain(), polished=polished, why_not=why_not, **judging)
 
 
@@ -43,6 +47,7 @@ def several(
     bbob: int,
     cores: int | None,
     progress: Any,
+    problem: Problem | None = None,
 ) -> Several:
     """Each problem by itself, what they come to under the same terms, and the variants on BBOB."""
     comparisons: dict[str, Comparison] = {}
@@ -50,7 +55,8 @@ def several(
     for (data, *_), runs in groups.items():
         terms = terms_of(runs)
         label = f"{data}, {terms}" if terms else data
-        comparisons[label] = compare_runs(gather(runs, f"{source} on {label}"), progress, judging)
+        gathered = gather(runs, f"{source} on {label}")
+        comparisons[label] = compare_runs(gathered, progress, judging, problem)
         by_terms.setdefault(terms, {})[label] = comparisons[label]
     without = plain()
     overall = [on_records(terms, comparisons, without) for terms, comparisons in by_terms.items()]
@@ -123,13 +129,15 @@ def _load_stored_runs(folder: Path, settings: Mapping[str, Any]) -> BenchmarkRes
     return None
 
 
-def _polish_described_problem(gathered: Gathered, progress: Any) -> tuple[Polished | None, str]:
+def _polish_described_problem(
+    gathered: Gathered, progress: Any, problem: Problem | None
+) -> tuple[Polished | None, str]:
     """What polishing found on the problem that the runs' configuration describes; None, and why,
     where it cannot.
     """
     runs = [run for variant in gathered.variants for run in variant.runs]
     try:
-        problem = _problem(next(run for run in runs if run.finished))
+        problem = problem or _problem(next(run for run in runs if run.finished))
     except UserError as error:
         return None, f"the problem cannot be put again ({str(error).rstrip('.')})"
     except (KeyError, TypeError, ValueError) as error:

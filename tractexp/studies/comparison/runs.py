@@ -7,10 +7,11 @@ What is compared is where each search ended, before the estimate was polished.
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
+from tractexp import files
 from tractexp.errors import TASK, UserError, among
 
 # The parts of a configuration. Every key belongs to one of them, so that nothing swept is pooled
@@ -19,6 +20,7 @@ PROBLEM = ("data", "model", "objective")  # one comparison has one of each
 # what differs in these makes a variant
 SETTINGS = ("optimizer", "task", "budget", "time_limit", "target")
 REST = ("seed", "tracking", "sweep")  # what differs in these does not
+ARRAYS = ("simulations", "seconds", "history")  # of a run
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,21 @@ class SearchRun:
     @property
     def finished(self) -> bool:
         return not (self.failure or self.interruption)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The run as plain data."""
+        return files.plain(vars(self))
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """What `to_dict` gave: plain data have no numbers that are not finite."""
+        arrays = {name: np.array(content[name], dtype=float) for name in ARRAYS}
+        unknown = {"objective": np.inf, "epsilon_p": np.nan, "epsilon_q": np.nan}
+        numbers = {
+            name: instead if content[name] is None else content[name]
+            for name, instead in unknown.items()
+        }
+        return cls(**{**content, **arrays, **numbers})
 
     def spent(self, target: float, cost: str) -> float:
         """Simulations or seconds (`cost`) by the end of the iteration that reached `target`; inf
@@ -183,6 +200,12 @@ def _settings(run: SearchRun) -> Settings:
 
 def _identity(run: SearchRun) -> tuple[Settings, int]:
     return _settings(run), run.seed
+
+
+def name_variants(runs: Sequence[SearchRun]) -> list[str]:
+    """What the variant of each run is called."""
+    names = _names(runs)
+    return [names[_settings(run)] for run in runs]
 
 
 def _names(runs: Sequence[SearchRun]) -> dict[Settings, str]:

@@ -14,10 +14,11 @@ from tractexp.identification.result import Fit, respond
 from tractexp.identification.search import Limits, SearchResult
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
+from tractexp.studies import searches
 from tractexp.studies.comparison.statistics import expected_running_time, vargha_delaney, wilcoxon
-from tractexp.studies.paper import equations, maps, orders, printed, searches, valleys
+from tractexp.studies.paper import equations, maps, orders, printed, valleys
 from tractexp.studies.paper.printed import COMPARED, EQUAL, ITERATIONS, LITERAL, READINGS, TEN
-from tractexp.studies.paper.search_store import SearchStore
+from tractexp.studies.search_store import SearchStore
 
 ALPHAS = (0.1, 0.3, 0.5, 0.7, 0.9)  # of the tent map
 TARGETS = (10.0, 2.0)  # of running times, times the floor
