@@ -179,11 +179,11 @@ class Report:
     """Blocks in order, below a title and a lead. Every method that adds one returns the report.
 
     A terminal shows what can be read there: no charts, figures and folded blocks, and no columns of
-    detail.
+    detail. A page with `reload` loads itself again after so many seconds.
     """
 
-    def __init__(self, title: str = "", lead: str = ""):
-        self.title, self.lead = title, lead
+    def __init__(self, title: str = "", lead: str = "", reload: int | None = None):
+        self.title, self.lead, self.reload = title, lead, reload
         self.blocks: list[Block] = []
 
     def add(self, *blocks: Block) -> "Report":

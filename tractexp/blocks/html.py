@@ -27,6 +27,8 @@ def page(report: Report) -> str:
         '<meta charset="utf-8"><meta name="viewport"'
         f' content="width=device-width"><title>{title}</title>'
     )
+    if report.reload is not None:
+        head += f'<meta http-equiv="refresh" content="{report.reload}">'
     style = files.read_packaged_text("blocks/page.css")
     top = f"<h1>{title}</h1>" + (f'<p class="lead">{lead}</p>' if lead else "")
     draws = f"<script>{script()}</script>" if any(map(_draws, report.blocks)) else ""

@@ -2,6 +2,7 @@
 cluster.
 """
 
+import atexit
 import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, work
+from tractexp.sweep.live import LivePage, keep_live
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import is_finished, place
 from tractexp.sweep.progress import progress
@@ -55,7 +57,9 @@ class Cores(Launcher):
             Workers(n_jobs, SPELLINGS.get(backend, backend), address, apart=True),
             tries,
         )
-        self.launched: dict[Path, SweepJob] = {}  # for a sweeper that is not ours
+        # for a sweeper that is not ours
+        self.launched: dict[Path, SweepJob] = {}
+        self.page: LivePage | None = None
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.hydra_context, self.config = hydra_context, config
@@ -79,12 +83,27 @@ class Cores(Launcher):
         jobs = place([SweepJob.of(compose(texts, k), texts) for k, texts in numbered], folder)
         self.launched |= {job.folder: job for job in jobs}
         asked: Any = OmegaConf.to_container(self.config.hydra.overrides.task)
-        with parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder:
-            self.run(
-                [job for job in {job.folder: job for job in jobs}.values() if not is_finished(job)],
-                recorder,
-            )
+        of_batch = {job.folder: job for job in jobs}.values()
+        remaining = [job for job in of_batch if not is_finished(job)]
+        page = self._show(folder, jobs, remaining)
+        with (
+            parent_run(folder, [*self.launched.values()], asked, afresh=False) as recorder,
+            keep_live(page, more=True),
+        ):
+            self.run(remaining, recorder)
         return [_build_job_return(job, status.read(job.folder)) for job in jobs]
+
+    def _show(
+        self, folder: Path, jobs: Sequence[SweepJob], remaining: Sequence[SweepJob]
+    ) -> LivePage:
+        """The page of all batches so far. Which is the last nobody tells a launcher: the page says
+        so when the process ends.
+        """
+        if self.page is None:
+            self.page = LivePage(folder)
+            atexit.register(self.page.write, "ended")
+        self.page.add(jobs, remaining)
+        return self.page
 
     def run(self, jobs: Sequence[SweepJob], recorder: Recorder) -> list[Status]:
         """Run all jobs, have each logged, and return how they ended, in their order."""

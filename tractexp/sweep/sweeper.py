@@ -30,6 +30,7 @@ from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
 from tractexp.sweep.job import SweepJob, find_shared_overrides
 from tractexp.sweep.launcher import Cores
+from tractexp.sweep.live import PAGE, LivePage, keep_live
 from tractexp.sweep.parent import parent_run
 from tractexp.sweep.placing import is_finished, place, placement, settle
 from tractexp.sweep.recorder import Recorder
@@ -69,6 +70,7 @@ class Grid(Sweeper):
     ):
         self.params, self.redo, self.open = params or {}, redo, open
         self.comparison = {**comparison} if compare else None
+        self.page: LivePage | None = None  # None where there is nothing to run
 
     def setup(self, *, hydra_context: Any, task_function: Any, config: Any) -> None:
         self.loader = hydra_context.config_loader
@@ -98,7 +100,13 @@ class Grid(Sweeper):
                 for name in PAGES:
                     (folder / name).unlink(missing_ok=True)
             files.write(folder / MULTIRUN, OmegaConf.to_yaml(self.config))
-            with parent_run(folder, jobs, arguments, afresh=self.redo) as recorder:
+            say(f"  to watch it: {folder / PAGE}")
+            self.page = LivePage(folder)
+            self.page.add(jobs, remaining)
+            with (
+                parent_run(folder, jobs, arguments, afresh=self.redo) as recorder,
+                keep_live(self.page),
+            ):
                 self._run(remaining, recorder)
 
     def _composed(self, arguments: list[str]) -> list[SweepJob]:
@@ -131,6 +139,8 @@ class Grid(Sweeper):
             folder = jobs[0].sweep
             say()
             comparison.run(Job(jobs[0].config, jobs[0].choices, folder))
+            if self.page is not None:
+                self.page.write("ended")  # and leads to the comparison
             self._opened(folder / "comparison.html")
         if failed := failures(jobs):
             raise UserError(failed)
