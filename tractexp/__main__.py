@@ -39,7 +39,7 @@ COMMANDS = {  # beside the tasks: where each is
     "look": "tractexp.cli.look:look",
     "sync": "tractexp.cli.sync:sync",
     "doctor": "tractexp.cli.doctor:doctor",
-    "list": "tractexp.usage:listed",
+    "list": "tractexp.usage:print_choices",
     "new": "tractexp.cli.new:new",
 }
 FULL_ERROR = "HYDRA_FULL_ERROR"  # Hydra's own switch: set it to see tracebacks

@@ -2,10 +2,13 @@
 
 import ast
 import functools
+import importlib
 import re
 from pathlib import Path
 
 import pytest
+
+from tractexp.__main__ import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "tractexp"
@@ -130,3 +133,9 @@ def test_one_module_quotes():
         if name.split(".")[0] in ("html", "shlex") and path != PACKAGE / "quoting.py"
     }
     assert imports == set()
+
+
+@pytest.mark.parametrize(("command", "place"), COMMANDS.items())
+def test_a_command_beside_the_tasks_is_where_the_program_looks_for_it(command, place):
+    module, _, function = place.partition(":")
+    assert callable(getattr(importlib.import_module(module), function)), command
