@@ -22,7 +22,10 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from tractexp import zip_archive
 from tractexp.errors import UserError
+from tractexp.zip_archive import is_archive as is_archive
+from tractexp.zip_archive import is_called_archive as is_called_archive
 
 PACKAGE = "pkg://"  # starts the path of a file inside an installed package
 PART = ".tractexp.part"  # ends the name of a file that is being written
@@ -75,7 +78,8 @@ def there(path: Path | str) -> bool:
     except (FileNotFoundError, NotADirectoryError):
         if os.path.islink(path):
             raise UserError(f"{name} is a link that leads nowhere; give the file itself") from None
-        return False
+        packed = zip_archive.locate(path)
+        return packed is not None and packed[1] in zip_archive.members(packed[0])
     except (OSError, ValueError) as error:
         raise UserError(
             f"{name:.200} cannot be read: {getattr(error, 'strerror', None) or error}"
@@ -103,10 +107,11 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
     """
     try:
         with open_ordinary_file(path) as file:
-            size = os.fstat(file.fileno()).st_size
-            if limit is None and size > largest:
+            bytes_there = size(path)
+            if limit is None and bytes_there > largest:
                 size_and_most = (
-                    f"{size / 1e6:.4g} MB, and a file of its kind at most {largest / 1e6:.4g} MB"
+                    f"{bytes_there / 1e6:.4g} MB, and a file of its kind at most"
+                    f" {largest / 1e6:.4g} MB"
                 )
                 raise UserError(f"{path} has {size_and_most}: give a part")
             return file.read(-1 if limit is None else limit)
@@ -118,15 +123,63 @@ def read(path: Path | str, limit: int | None = None, *, largest: int = LARGEST) 
 
 @contextlib.contextmanager
 def open_ordinary_file(path: Path | str) -> Iterator[IO[bytes]]:
-    """An ordinary file, open to be read. Raises `UserError` for what only seems to be one,
-    `OSError` as `open`.
+    """An ordinary file, or one in a .zip, open to be read. Raises `UserError` for what only seems
+    to be one, `OSError` as `open`.
     """
     there(path)
+    if packed := zip_archive.locate(path):
+        with zip_archive.open_member(*packed) as file:
+            yield file
+        return
     with open(path, "rb", opener=_open_at_once) as file:
         kind = stat.S_IFMT(os.fstat(file.fileno()).st_mode)
         if kind in ODD:  # put in the place of a file meanwhile
             raise UserError(f"{path} is {ODD[kind]}, no ordinary file")
         yield file
+
+
+def size(path: Path | str) -> int:
+    """Bytes of a file, or of one in a .zip. Raises `OSError` where it is missing."""
+    packed = zip_archive.locate(path)
+    return zip_archive.size(*packed) if packed else os.stat(path).st_size
+
+
+def list_folder(folder: Path) -> list[Path]:
+    """What lies in a folder, or the files of one in a .zip, in order of name; [] where it is none.
+
+    Raises `UserError` for a .zip that cannot be read.
+    """
+    packed = zip_archive.locate(folder / "file")
+    if packed is None:
+        return sorted(folder.iterdir()) if folder.is_dir() else []
+    return [path for path in list_packed(packed[0]) if path.parent == folder]
+
+
+def list_packed(archive: Path) -> list[Path]:
+    """All files in a .zip, in order of name. Raises `UserError` for one that cannot be read."""
+    return sorted(archive / name for name in zip_archive.members(archive))
+
+
+def state(path: Path | str) -> tuple[int, int]:
+    """(bytes, time of the last change [ns]) of a file; of one in a .zip, when that was changed.
+
+    Raises `OSError` where it is missing.
+    """
+    packed = zip_archive.locate(path)
+    return size(path), os.stat(packed[0] if packed else path).st_mtime_ns
+
+
+def is_packed(path: Path | str) -> bool:
+    """Whether a path leads into a .zip, so that nothing can be mapped from the disk."""
+    return zip_archive.locate(path) is not None
+
+
+def exists(path: Path | str) -> bool:
+    """Whether there is a file or a folder of that name, also in a .zip; raises nothing."""
+    try:
+        return os.path.exists(path) or there(path)
+    except (UserError, OSError, ValueError):
+        return False
 
 
 def _open_at_once(path: str, flags: int) -> int:

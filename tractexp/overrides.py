@@ -258,10 +258,7 @@ def _read_by_hydra(argument: str, value: str) -> bool:
 
 
 def _names_a_file(value: str) -> bool:
-    try:
-        return bool(value) and Path(value).exists()
-    except (OSError, ValueError):
-        return False
+    return bool(value) and files.exists(value)
 
 
 def _parses(argument: str) -> bool:

@@ -25,7 +25,7 @@ class COMTRADE(WaveformReader):
     endings = parts = (".cfg", ".cff", ".dat")
 
     @classmethod
-    def takes(cls, path: str) -> bool:
+    def takes(cls, path: str, *join: str) -> bool:
         return kind_of(path) == "waves"
 
     # of the .cfg; null: found from its letters among utf-8, gbk, cp1251 and latin-1

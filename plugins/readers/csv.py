@@ -4,7 +4,17 @@ from dataclasses import field, replace
 from pathlib import Path
 from typing import Any
 
-from tractexp.extend import DATA, Base, Events, Reader, Record, UserError, check_range, plugin
+from tractexp.extend import (
+    DATA,
+    Base,
+    Events,
+    Reader,
+    Record,
+    UserError,
+    check_distinct,
+    check_range,
+    plugin,
+)
 from tractexp.extend.files import (
     DECLARATION,
     ENDINGS,
@@ -21,6 +31,7 @@ from tractexp.extend.files import (
     count_noun,
     cut_dips,
     estimator_of,
+    event_paths,
     kind_of,
     level,
     powers,
@@ -54,7 +65,9 @@ class CSV(Tabular, Reader):
 
     endings = (*ENDINGS, ".pqd", ".pqdif", ".cev", ".cfg", ".cff", ".dat")
 
-    path: str = ""  # one table with several dips
+    path: str = ""  # one table with several dips, or a .zip that holds it
+    # further tables of the same event, whose columns are put beside those of `path`
+    join: list[str] = field(default_factory=list)
     train: list[Any] = field(default_factory=list)  # files to fit; with path, dips by number
     # files held out; with path, dips by number, null: every other one
     validate: list[Any] | None = None
@@ -70,12 +83,15 @@ class CSV(Tabular, Reader):
     estimator: Any = None
 
     @classmethod
-    def takes(cls, path: str) -> bool:
-        return kind_of(path) != "waves"
+    def takes(cls, path: str, *join: str) -> bool:
+        return kind_of(path, *join) != "waves"
 
     def check(self) -> None:
         if self.path:
             self._check_numbers()
+            check_distinct(f"{DATA.path} and {DATA.join}", [self.path, *map(str, self.join)])
+        elif self.join:
+            raise UserError(f"{DATA.join} goes with {DATA.path}: name the first file there")
         elif not self.train:
             raise UserError(
                 f"{DATA.train} is empty: name at least one CSV file to fit, e.g."
@@ -145,8 +161,9 @@ class CSV(Tabular, Reader):
 
     def _record(self, path: str, base: Base | None = None) -> Record:
         """The whole of one table; `base` is that of the first one read, which all share."""
-        sidecar = read_sidecar(path)
-        table, mapping = self.table_of(path, sidecar)
+        inside, *join = event_paths(path, self.join if self.path else [], self.endings)
+        sidecar = read_sidecar(inside)
+        table, mapping = self.table_of(inside, sidecar, join)
         given = self.base_voltage or (sidecar.base and sidecar.base.voltage)
         declared = sidecar.base.frequency if sidecar.base else table.frequency or self.frequency
         quantities = powers(

@@ -24,7 +24,7 @@ class PQDIF(WaveformReader):
     encoding: str | None = None  # of its texts; null: found from their letters
 
     @classmethod
-    def takes(cls, path: str) -> bool:
+    def takes(cls, path: str, *join: str) -> bool:
         return kind_of(path) == "waves"
 
     def recording(self) -> Recording:

@@ -24,7 +24,7 @@ class SEL(WaveformReader):
     encoding: str | None = None  # of the file; null: found from its letters
 
     @classmethod
-    def takes(cls, path: str) -> bool:
+    def takes(cls, path: str, *join: str) -> bool:
         return kind_of(path) == "waves"
 
     def recording(self) -> Recording:

@@ -33,16 +33,19 @@ class Waveforms(Tabular, WaveformReader):
     frequency: float = 50.0  # Hz, nominal
 
     @classmethod
-    def takes(cls, path: str) -> bool:
-        return kind_of(path) == "waves"
+    def takes(cls, path: str, *join: str) -> bool:
+        return kind_of(path, *join) == "waves"
 
     def check(self) -> None:
         super().check()
         check_range("data.frequency", self.frequency, *SIZES["frequency"])
         self.check_table()
 
+    def joined(self) -> Recording:
+        return self.recording()  # the columns of all files are those of one table
+
     def recording(self) -> Recording:
         sidecar = read_sidecar(self.path)
-        if sidecar.recording is not None:
+        if sidecar.recording is not None and not self.join:
             return restore_recording(self.path, sidecar.recording)
-        return recording(*self.table_of(self.path, sidecar), self.frequency)
+        return recording(*self.table_of(self.path, sidecar, self.join), self.frequency)

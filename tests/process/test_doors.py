@@ -6,12 +6,15 @@ is there.
 """
 
 import contextlib
+import functools
+import io
 import json
 import os
 import resource
 import shutil
 import signal
 import socket
+import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -58,6 +61,23 @@ def cycled(path: Path) -> None:
     path.symlink_to(path.name)
 
 
+@functools.cache
+def packed(content: bytes = b"t,U,P,Q\n" * 10, encrypted: bool = False) -> bytes:
+    """A .zip of one table."""
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.csv", content)
+    data = bytearray(made.getvalue())
+    if encrypted:
+        data[6] |= 1
+        data[data.index(b"PK\x01\x02") + 8] |= 1
+    return bytes(data)
+
+
+def bomb() -> bytes:
+    return packed(bytes(100 << 20))
+
+
 SHAPES: dict[str, Callable[[Path], object]] = {
     "pipe": lambda path: (path.unlink(), os.mkfifo(path)),
     "link to nowhere": lambda path: (path.unlink(), path.symlink_to("absent")),
@@ -81,6 +101,11 @@ SHAPES: dict[str, Callable[[Path], object]] = {
         '{"a": {"b": null}, "task": [], "hydra": 5, "run": {}}'
     ),
     "zeros": lambda path: path.write_bytes(bytes(5000)),
+    "bomb": lambda path: path.write_bytes(bomb()),
+    "archive with a password": lambda path: path.write_bytes(packed(encrypted=True)),
+    "archive within an archive": lambda path: path.write_bytes(packed().replace(b".csv", b".zip")),
+    "archive with nothing": lambda path: path.write_bytes(b"PK\x05\x06" + bytes(18)),
+    "archive with a lie": lambda path: path.write_bytes(packed()[:-12] + b"\xff" * 12),
     "no text": lambda path: path.write_bytes(bytes(range(128, 256)) * 50),
 }
 
@@ -180,6 +205,23 @@ def modeled(folder: Path) -> object:
     return read_choice("model", str(folder / "m.yaml"))
 
 
+def zipped(folder: Path) -> Path:
+    """A .zip of a record and a table."""
+    folder.mkdir(parents=True)
+    with zipfile.ZipFile(folder / "r.zip", "w", zipfile.ZIP_DEFLATED) as archive:
+        for name in ("tibet_30pct.csv", "tibet_50pct.cfg", "tibet_50pct.dat"):
+            archive.write(DATA / name, name)
+    return folder
+
+
+def unzipped(folder: Path) -> object:
+    return tractexp.read(str(folder / "r.zip" / "tibet_50pct.cfg"))
+
+
+def surveyed(folder: Path) -> object:
+    return tractexp.survey(str(folder), cores=1, progress=False)
+
+
 def loaded(folder: Path) -> object:
     from tractexp.identification.result import load
 
@@ -212,6 +254,8 @@ DOORS = [  # the file, the folder that holds it as it should be, and what reads 
     ("tibet_30pct.json", records, read_table),
     ("tibet_50pct.cfg", records, looked),
     ("tibet_50pct.dat", records, looked),
+    ("r.zip", zipped, unzipped),
+    ("r.zip", zipped, surveyed),
 ]
 
 

@@ -339,10 +339,10 @@ READ = {  # {module: {call: why it may}}; all else that is read goes through `tr
         "loadtxt": "a text that `files` has read",
         "json.loads": "a parameter",
     },
-    "tractexp/filetypes/comtrade.py": {
+    "tractexp/filetypes/comtrade_samples.py": {
         "memmap": "numbers of a file that `files` has found to be ordinary"
     },
-    "tractexp/filetypes/comtrade_samples.py": {"memmap": "the same", "fromfile": "the same"},
+    "tractexp/zip_archive.py": {"open": "files within an archive, for `files` alone"},
     "tractexp/filetypes/table_text.py": {"loadtxt": "a text that `files` has read"},
     "tractexp/filetypes/workbook.py": {"pickle.load": "the process that it started"},
     "tractexp/tracking/owner.py": {"read_text": "the system's own files"},

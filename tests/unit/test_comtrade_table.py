@@ -140,8 +140,8 @@ def test_several_feeders_are_asked_about_once_and_the_answer_helps(saved):
 
 
 def test_a_folder_lists_such_a_record_once(saved, tmp_path):
-    from tractexp.recording import archive
+    from tractexp.recording.record_files import find_records
 
     _, *columns = values(50.0)
     saved([*zip(("U", "P", "Q", "f"), ("kV", "MW", "Mvar", "Hz"), columns, strict=True)], 50.0)
-    assert [path.name for path in archive.files(tmp_path)] == ["swing.cfg"]
+    assert [path.name for path in find_records(tmp_path)] == ["swing.cfg"]

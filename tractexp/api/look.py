@@ -4,7 +4,7 @@ what to fit.
 
 import functools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, fields
+from dataclasses import MISSING, asdict, dataclass, fields, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any, Self
@@ -21,6 +21,7 @@ from tractexp.overrides import build_typed_command
 from tractexp.progress import Progress, tell_late_stages
 from tractexp.record import Event, Record
 from tractexp.record.wave_event import COARSEST, describe_smearing
+from tractexp.recording.event_views import join_event, propose_joining
 from tractexp.recording.feeder import can_be_named, explain_unrecognized
 from tractexp.recording.overview import LoadEvent, Sight, View, sight_of, view_of
 from tractexp.recording.recording import unit_of
@@ -244,6 +245,8 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
     distinct = list(dict.fromkeys(map(_source, flat)))
     with tell_late_stages(progress) as stage:
         views = []
+        if together := _join_given(distinct, settings):
+            distinct, settings = [together["path"]], {**settings, "join": together["join"]}
         for k, source in enumerate(distinct, start=1):
             of = f"{k} of {len(distinct)}: " * (len(distinct) > 1)
             stage(f"reading {of}{source if isinstance(source, str) else source.name}")
@@ -260,7 +263,7 @@ def _source(given: Any) -> str | Record:
     record: Any = given.record if isinstance(given, Event) else given
     if isinstance(record, Record):
         path = record.source.rpartition(" dip ")[0]
-        return path if path and Path(path).is_file() else record
+        return path if path and files.exists(path) else record
     if isinstance(record, Mapping) or hasattr(record, "columns"):
         names = record if isinstance(record, Mapping) else record.columns
         return table({str(name): record[name] for name in names}, "frame", {})
@@ -269,10 +272,27 @@ def _source(given: Any) -> str | Record:
     )
 
 
+def _join_given(
+    sources: Sequence[str | Record], settings: Mapping[str, Any]
+) -> dict[str, Any] | None:
+    """How the files that were given are read as those of one event; None where they are not."""
+    paths = [source for source in sources if isinstance(source, str)]
+    alone = settings or len(paths) < len(sources) or any(map(files.is_archive, paths))
+    return None if alone else join_event(paths)
+
+
 def _view(source: str | Record, settings: Mapping[str, Any]) -> View:
     if isinstance(source, Record):
         return View(source.name, {}, [sight_of(source)])
-    return view_of(source, node_of(source, settings))
+    if settings.get("join"):
+        return view_of(source, node_of(source, settings))
+    try:
+        view = view_of(source, node_of(source, settings))
+    except UserError as error:
+        if proposed := propose_joining(source):
+            raise UserError(f"{error}; {proposed}") from None
+        raise
+    return view if files.is_archive(source) else replace(view, proposed=propose_joining(source))
 
 
 def series(shown: Sight) -> dict[str, np.ndarray]:
@@ -327,7 +347,12 @@ def event_row(event: LoadEvent, begun: datetime | None = None) -> dict[str, Any]
 def _content(view: View) -> dict[str, Any]:
     """What `look.json` holds of a file."""
     recording = view.recording
-    content: dict[str, Any] = {"file": view.source, "reader": view.node.get("name", "")}
+    content: dict[str, Any] = {
+        "file": view.source,
+        "reader": view.node.get("name", ""),
+        "joined": list(view.node.get("join", ())),
+        "proposed": view.proposed,
+    }
     if recording is None:
         record = view.sights[0].record
         assert record is not None
@@ -341,7 +366,7 @@ def _content(view: View) -> dict[str, Any]:
             "segments": [
                 {"rate": record.rate, "start": float(record.t[0]), "samples": record.samples}
             ],
-            "notes": list(record.notes),
+            "notes": [*record.notes, *filter(None, [view.proposed])],
             "channels": [],
         }
     else:
@@ -360,6 +385,7 @@ def _content(view: View) -> dict[str, Any]:
                 for s in recording.segments
             ],
             "notes": [
+                *filter(None, [view.proposed]),
                 *recording.notes,
                 *([f"no load was recognised: {lacks}"] if lacks else []),
             ],

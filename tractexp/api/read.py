@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tractexp import plugin
+from tractexp import files, plugin
 from tractexp.api.arguments import Choice, check_kind, public
 from tractexp.blocks import Report, Table
 from tractexp.composition import choices
@@ -22,9 +22,9 @@ from tractexp.record import (
     describe,
     detect,
     on_own_base,
-    reader_of,
 )
 from tractexp.record.dips import around
+from tractexp.recording.event_views import settings_of
 from tractexp.wording import count_noun
 
 REQUIRED, OPTIONAL = ("t", "U", "P", "Q"), ("f", "U2")
@@ -224,7 +224,7 @@ def _file(path: str, settings: Mapping[str, Any]) -> list[Record]:
 
 def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
     """The reader that a path, or a choice of `conf/data`, asks for, with its settings."""
-    if not Path(path).exists():
+    if not files.exists(path):
         shipped = choices(GROUP, files=True)
         if path in shipped:
             return {**Choice.of(GROUP, path).node, **settings}
@@ -233,8 +233,9 @@ def node_of(path: str, settings: Mapping[str, Any]) -> dict[str, Any]:
                 f"{path} is neither a file with an ending nor a shipped"
                 f" record{among(path, shipped)}"
             )
-    cls = reader_of(path)
-    return {"name": cls.name, **cls.of(path), **settings}
+    join = settings.get("join") or []
+    given = {**settings, "join": [join]} if isinstance(join, str) else settings
+    return {**settings_of(path, *given.get("join") or ()), **given}
 
 
 def record_to_dict(record: Record) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from tractexp.plugin import discover, get, plugin
 from tractexp.progress import Progress, count_parts, tell_late_stages
 from tractexp.record import detect
 from tractexp.recording import archive
+from tractexp.recording.record_files import find_records
 from tractexp.report import survey as shown
 from tractexp.report.survey import UNREAD
 from tractexp.store import Store
@@ -149,7 +150,7 @@ def survey(
     check_range("task.informative", informative, 1)
     check_range("task.cores", cores, 1)
     place = Path(folder)
-    paths = list(archive.files(place))
+    paths = list(find_records(place))
     if not paths:
         raise UserError(f"{DATA.path}={folder} holds no file that can be read")
     store, names = Store(ROWS, folder=Path(keep or "")), keys(place, paths)

@@ -13,6 +13,7 @@ from tractexp import files
 from tractexp.api.look import command, event_row, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
+from tractexp.recording.event_views import list_within
 from tractexp.recording.overview import LoadEvent, Sight, View
 from tractexp.report.survey import QUIET, UNEXAMINED, UNREAD
 from tractexp.store import key
@@ -57,7 +58,23 @@ def rows_of(folder: str, file: str) -> Rows:
     """The rows of one file, `file` being its path within the folder. Nothing that happens in here
     is an error.
     """
-    row: dict[str, Any] = dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
+    try:
+        return [
+            row
+            for path in list_within(Path(folder, file))
+            for row in _rows_of_one(folder, path.relative_to(folder).as_posix())
+        ]
+    except UserError as error:
+        return [_blank(file) | {"kind": UNREAD, "why": str(error)}]
+
+
+def _blank(file: str) -> dict[str, Any]:
+    return dict.fromkeys(COLUMNS) | {"file": file, "worth": False, "why": ""}
+
+
+def _rows_of_one(folder: str, file: str) -> Rows:
+    """The rows of one file that is no .zip, or of a .zip that holds the files of one event."""
+    row = _blank(file)
     try:
         view = archive.look_at_file(Path(folder, file))
         rows = [
@@ -174,7 +191,7 @@ def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
     # by folder and stem: each folder is listed once
     beside: dict[Path, list[Path]] = defaultdict(list)
     for place in {path.parent for path in paths}:
-        for path in sorted(place.iterdir()):
+        for path in files.list_folder(place):
             beside[place / path.stem].append(path)
     names = {path: path.relative_to(folder).as_posix() for path in paths}
     return {
@@ -184,5 +201,4 @@ def keys(folder: Path, paths: Sequence[Path]) -> dict[str, str]:
 
 
 def _states(paths: Sequence[Path]) -> list[Any]:
-    there = [(path, path.stat()) for path in paths if path.is_file()]
-    return [[path.name, state.st_size, state.st_mtime_ns] for path, state in there]
+    return [[path.name, *files.state(path)] for path in paths if files.exists(path)]

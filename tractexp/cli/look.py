@@ -39,9 +39,9 @@ def look(arguments: list[str]) -> int:
     )
     chosen = parser.parse_args(arguments)
     settings = [
-        s for each in chosen.file if not Path(each).exists() and (s := SETTING.fullmatch(each))
+        s for each in chosen.file if not files.exists(each) and (s := SETTING.fullmatch(each))
     ]
-    paths = [each for each in chosen.file if Path(each).exists() or not SETTING.fullmatch(each)]
+    paths = [each for each in chosen.file if files.exists(each) or not SETTING.fullmatch(each)]
     if not paths:
         raise UserError(
             "tractexp look: give a file beside the settings, e.g. tractexp look station.cfg"

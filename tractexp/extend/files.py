@@ -15,6 +15,7 @@ from tractexp.record.dips import FileDip, check_load, check_numbers, chosen, cut
 from tractexp.record.record import DECLARATION, LOAD, SIZES
 from tractexp.recording.archive import records
 from tractexp.recording.estimator import estimator_of
+from tractexp.recording.event_files import event_paths
 from tractexp.wording import count_noun
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "count_noun",
     "cut_dips",
     "estimator_of",
+    "event_paths",
     "kind_of",
     "level",
     "locate_file",

@@ -177,9 +177,9 @@ class _Opened:
 def _open_report(path: Path, encoding: str | None) -> _Opened:
     path = Path(path)
     files.check_there(path)
-    if path.stat().st_size > LARGEST:
+    if files.size(path) > LARGEST:
         raise UserError(
-            f"{path}: {path.stat().st_size} bytes are no event report; the limit is {LARGEST}"
+            f"{path}: {files.size(path)} bytes are no event report; the limit is {LARGEST}"
         )
     text, encoding = decode(files.read(path), str(path), encoding)
     remarks = Remarks(str(path))

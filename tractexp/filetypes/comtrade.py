@@ -73,7 +73,7 @@ def read_header(path: Path, encoding: str | None = None) -> Header:
 
 
 def _whole(path: Path) -> ByteRange:
-    return ByteRange(path, 0, path.stat().st_size)
+    return ByteRange(path, 0, files.size(path))
 
 
 def _read_pair(path: Path, encoding: str | None) -> Recording:
@@ -107,7 +107,7 @@ def _read_combined(path: Path, encoding: str | None) -> Recording:
 def _sections(path: Path) -> dict[str, ByteRange]:
     """Where the sections of a .cff lie; bytes of binary data are not searched for headings."""
     sections: dict[str, ByteRange] = {}
-    content: Any = np.memmap(path, np.uint8, "r") if path.stat().st_size else np.empty(0, np.uint8)
+    content: Any = ByteRange(path, 0, files.size(path)).numbers(np.dtype(np.uint8))
     counted, line, at = 0, 1, 0
     while (match := _SECTION.search(content, at)) is not None:
         name, length = match[1].decode().upper(), match[3]
@@ -303,7 +303,7 @@ def _extra(header: Header, samples: Samples, stretches: list[Stretch]) -> dict[s
 
 def _find_existing_path(path: Path) -> Path:
     if not files.there(path):
-        names = [item.name for item in path.parent.iterdir()] if path.parent.is_dir() else []
+        names = [item.name for item in files.list_folder(path.parent)]
         raise UserError(f"{path}: there is no such file{nearest(path.name, names)}")
     return path
 
@@ -342,8 +342,8 @@ def _find_companion(path: Path, ending: str) -> Path | None:
     return next(
         (
             item
-            for item in sorted(path.parent.iterdir())
-            if item.name.casefold() == wanted and item.is_file()
+            for item in files.list_folder(path.parent)
+            if item.name.casefold() == wanted and files.there(item)
         ),
         None,
     )

@@ -43,9 +43,18 @@ class ByteRange:
             file.seek(self.first)
             return file.read(self.size if length is None else min(length, self.size))
 
+    def numbers(self, kind: np.dtype, count: int | None = None) -> np.ndarray:
+        """Its first `count` values of a kind, all by default; those of a large file on the disk are
+        mapped.
+        """
+        count = self.size // kind.itemsize if count is None else count
+        if self.size > LARGE and not files.is_packed(self.path):
+            return np.memmap(self.path, kind, "r", self.first, (count,))
+        return np.frombuffer(self.content(), kind, count)
+
     def ends_a_line(self) -> bool:
         """Whether its last line ends as the others do."""
-        with self.path.open("rb") as file:
+        with files.open_ordinary_file(self.path) as file:
             file.seek(max(self.first, self.stop - 4096))
             return file.read(min(self.size, 4096)).rstrip(b" \t\0\x1a").endswith((b"\n", b"\r"))
 
@@ -102,10 +111,7 @@ def _binary(place: ByteRange, header: Header, remarks: Remarks) -> Samples:
             f"{place.path.name} holds {over} bytes more than whole samples of {one.itemsize} bytes"
         )
     count = header.samples
-    if place.size > LARGE:
-        table = np.memmap(place.path, one, "r", place.first, (count,))
-    else:
-        table = np.fromfile(place.path, one, count, offset=place.first)
+    table = place.numbers(one, count)
     _check_sample_numbers(place, header, table["n"])
     return Samples(
         table["n"], table["t"], [table["a"][:, k] for k in range(len(header.analogs))], table["d"]

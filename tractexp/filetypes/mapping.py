@@ -59,6 +59,7 @@ class Mapped:
     columns: Mapping[str, MappedColumn]
     notes: tuple[str, ...]
     day: dt.date | None = None  # of the first row, where dates stand in a column of their own
+    beside: tuple[int, ...] = ()  # the columns of such dates
 
 
 def map_columns(
@@ -95,6 +96,19 @@ def map_columns(
     return Mapped(
         kind, chosen, tuple(_notes(table, chosen, days, other_columns)), _first_day(table, days)
     )
+
+
+def map_times(table: TableFile) -> Mapped:
+    """Which columns of a table say when its rows were taken, and nothing else. Raises `UserError`
+    where none does.
+    """
+    options = _options(table, {})
+    if "t" not in options:
+        raise UserError(_describe_missing_columns(table, options, {"times": ()}))
+    columns = {key: options[key][0] for key in ("t", "frac") if key in options}
+    days = [one for one in options.get("day", []) if one.number != columns["t"].number][:1]
+    beside = tuple(one.number for one in days)
+    return Mapped("waves", columns, (), _first_day(table, days), beside)
 
 
 def _check_ambiguity(

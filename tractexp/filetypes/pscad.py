@@ -87,7 +87,7 @@ def table(path: Path, form: TableForm) -> Results:
     files.check_there(path)
     number = _NUMBERED.fullmatch(path.stem)
     case = number[1] if number else path.stem
-    beside = sorted(path.parent.iterdir())
+    beside = files.list_folder(path.parent)
     names = next((each for each in beside if each.name.lower() == f"{case}.inf".lower()), None)
     if names is None:
         raise UserError(

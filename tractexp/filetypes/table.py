@@ -4,7 +4,7 @@ are wanted.
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from types import ModuleType
@@ -46,6 +46,7 @@ class TableForm:
     header: int | None = None  # line of the names, from 1
     sheet: str | int | None = None  # of a workbook: name, or number from 1
     encoding: str | None = None
+    join: tuple[str, ...] = ()  # further files of the same event
 
     def check(self) -> None:
         check_choice("data.decimal", self.decimal, ("", ".", ","))
@@ -196,6 +197,12 @@ def open_table(path: str, form: TableForm, whole: bool = True) -> TableFile:
     from tractexp.filetypes import pscad
     from tractexp.filetypes.table_text import HEAD, open_text
 
+    if form.join:
+        from tractexp.filetypes.joined_table import JoinedTable
+
+        alone, paths = replace(form, join=()), (path, *form.join)
+        return JoinedTable([open_table(one, alone) for one in paths], paths)
+
     if instrument := instrument_of(locate_file(path)):
         return instrument.table(locate_file(path), form.encoding)
     if Path(path).suffix.lower() == pscad.ENDING:
@@ -225,9 +232,10 @@ def content(path: str, limit: int | None = None) -> bytes:
                 f"{path} is a folder, not a file; give a file in it, or task=survey"
                 f" data.path={path}"
             )
+        there = folder.is_dir() or files.is_archive(folder)
         names = (
-            [item.name for item in folder.iterdir() if not item.is_dir()]
-            if folder.is_dir()
+            [item.name for item in files.list_folder(folder) if not item.is_dir()]
+            if there
             else None
         )
         hint = "; that folder does not exist" if names is None else nearest(file.name, names)

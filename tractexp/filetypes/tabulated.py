@@ -59,18 +59,20 @@ class Tabular:
     def _form(self) -> TableForm:
         return TableForm(self.decimal, self.header, self.sheet, self.encoding)
 
-    def table_of(self, path: str, sidecar: Sidecar) -> tuple[TableFile, Mapped]:
-        """A table and what its columns are; raises `UserError` for what is no table,
-        or ambiguous.
+    def table_of(
+        self, path: str, sidecar: Sidecar, join: Sequence[str] = ()
+    ) -> tuple[TableFile, Mapped]:
+        """A table, with those of the same event, and what its columns are; raises `UserError` for
+        what is no table, or ambiguous.
         """
-        table = open_table(path, self._form)
+        table = open_table(path, replace(self._form, join=tuple(join)))
         columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
         return table, map_columns(table, columns, units, sidecar.more)
 
 
-def kind_of(path: str) -> str:
-    """What the table in a file holds: "powers", "phasors" or "waves"; "powers" where it is
-    ambiguous.
+def kind_of(path: str, *join: str) -> str:
+    """What the table in a file, or in those of one event, holds: "powers", "phasors" or "waves";
+    "powers" where it is ambiguous.
     """
     try:
         sidecar, instrument = read_sidecar(path), instrument_of(locate_file(path))
@@ -79,7 +81,7 @@ def kind_of(path: str) -> str:
         ):
             return "waves"
         return map_columns(
-            open_table(path, TableForm(), whole=False), sidecar.columns, sidecar.units
+            open_table(path, TableForm(join=join), whole=False), sidecar.columns, sidecar.units
         ).kind
     except UserError:
         return "powers"  # whose reader says what is wrong

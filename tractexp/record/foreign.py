@@ -5,7 +5,7 @@ from pathlib import Path
 COMPANION = (
     "a companion of a record that holds no samples: give the .cfg beside it, or the .out of PSCAD"
 )
-ARCHIVE = "an archive: unpack it, and give a file of it, or its folder to task=survey"
+ARCHIVE = "an archive: unpack it, or pack it as .zip, which is read as it is"
 DOCUMENT = "a document: give the record's data"
 RECORDER = "a recorder's own format: export it as COMTRADE or CSV with the recorder's software"
 FOREIGN = {
@@ -13,7 +13,6 @@ FOREIGN = {
     ".inf": COMPANION,
     ".dmf": COMPANION,
     ".rio": COMPANION,
-    ".zip": ARCHIVE,
     ".rar": ARCHIVE,
     ".7z": ARCHIVE,
     ".gz": ARCHIVE,

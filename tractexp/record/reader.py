@@ -41,9 +41,9 @@ class Reader(Plugin):
         return {"path": path}
 
     @classmethod
-    def takes(cls, path: str) -> bool:
-        """Whether a file with one of its endings is meant for it: readers that share an ending look
-        inside.
+    def takes(cls, path: str, *join: str) -> bool:
+        """Whether a file with one of its endings, and those of the same event, are meant for it:
+        readers that share an ending look inside.
         """
         return True
 
@@ -60,8 +60,9 @@ class Reader(Plugin):
         return None
 
 
-def reader_of(path: str) -> type[Any]:
-    """The reader of a file, by its ending and, where several share it, by what is inside.
+def reader_of(path: str, *join: str) -> type[Any]:
+    """The reader of a file, or of the files of one event, by the ending and, where several share
+    it, by what is inside.
 
     Raises `UserError` for a folder, and for an ending that no reader takes.
     """
@@ -75,7 +76,7 @@ def reader_of(path: str) -> type[Any]:
     if not readers:
         reason = foreign.sentence(path) or f"{path}: no reader takes files ending in '{ending}'"
         raise UserError(f"{reason}; endings that can be read: {', '.join(endings())}")
-    return next((cls for cls in readers if cls.takes(path)), readers[0])
+    return next((cls for cls in readers if cls.takes(path, *join)), readers[0])
 
 
 def endings() -> list[str]:

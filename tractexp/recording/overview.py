@@ -146,6 +146,8 @@ class View:
     node: Mapping[str, Any]  # the choice of `data` that reads it; {} for a record
     sights: Sequence[Sight]
     recording: Recording | None = None
+    # that files beside it are of the same event, with the command; "" where none are
+    proposed: str = ""
 
     @property
     def begun(self) -> datetime | None:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from tractexp import plugin, quoting
-from tractexp.errors import DATA, UserError, check_range, setting
+from tractexp.errors import DATA, UserError, check_distinct, check_range, setting
 from tractexp.overrides import format_assignment
 from tractexp.record import Base, Events, Reader, Record, Waves, detect
 from tractexp.record.dips import (
@@ -25,7 +25,9 @@ from tractexp.recording.arrangement import arrange_feeder, tune_frequency
 from tractexp.recording.bridge import bridge_recording
 from tractexp.recording.connection import usual
 from tractexp.recording.estimator import estimator_of
+from tractexp.recording.event_files import event_paths
 from tractexp.recording.feeder import Feeder, can_be_named, explain_unrecognized, propose
+from tractexp.recording.joined import join_recordings
 from tractexp.recording.label import order, shared_name
 from tractexp.recording.measure import FeederWaves, phasors_of
 from tractexp.recording.recording import Recording
@@ -47,7 +49,9 @@ class WaveformReader(Reader):
 
     quantities: ClassVar[Sequence[str]] = ("U", "I")  # that `units` may name
 
-    path: str = ""  # the file
+    path: str = ""  # the file, or a .zip that holds it
+    # further files of the same event, whose channels are put beside those of the first
+    join: list[str] = field(default_factory=list)
     # channels in the order a, b, c: numbers from 0, or names
     voltages: list[Any] = field(default_factory=list)
     currents: list[Any] = field(default_factory=list)  # channels, counted positive into the load
@@ -67,8 +71,9 @@ class WaveformReader(Reader):
     skew: bool = False  # true: correct the time skew of each channel that the file states
 
     def opened(self) -> Recording:
-        """The file, its units and the nominal frequency that its voltages really have."""
-        recording = bridge_recording(self.recording())
+        """The files, their units and the nominal frequency that their voltages really have."""
+        path, *join = event_paths(self.path, self.join, self.parts[:1] or self.endings)
+        recording = bridge_recording(replace(self, path=path, join=join).joined())
         keys = {"U": "voltages", "I": "currents"}
         numbers = {
             x: [recording.number(i, f"data.{key}") for i in getattr(self, key)]
@@ -82,6 +87,13 @@ class WaveformReader(Reader):
         ]
         return tune_frequency(recording, chosen or every)
 
+    def joined(self) -> Recording:
+        """The files of one event as one recording. Raises `UserError` as `recording`, and where
+        their times do not overlap.
+        """
+        parts = [replace(self, path=path, join=[]) for path in (self.path, *self.join)]
+        return join_recordings([part.recording() for part in parts])
+
     @abstractmethod
     def recording(self) -> Recording:
         """The file as it was recorded, all channels; raises `UserError` naming the file, the place
@@ -93,6 +105,7 @@ class WaveformReader(Reader):
             raise UserError(
                 f"{DATA.path} is missing: give the file, e.g. {DATA.path}=station{self.endings[0]}"
             )
+        check_distinct(f"{DATA.path} and {DATA.join}", [self.path, *map(str, self.join)])
         check_units(self.units, self.quantities)
         check_numbers(self.train, self.validate)
         check_range("data.pre", self.pre, 0.05)

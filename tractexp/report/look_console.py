@@ -87,6 +87,12 @@ def _answer(files: Sequence[Entry]) -> str:
         secondary = f"; {SECONDARY}" if best.get("secondary") else ""
         worth = f"is worth fitting{_reservation(first['why'])}{secondary}"
         return f"{_event(first)} of {best['name']} {worth}{command}"
+    return "; ".join([_refuse(files), *filter(None, (entry.get("proposed") for entry in files))])
+
+
+def _refuse(files: Sequence[Entry]) -> str:
+    """Why nothing is worth fitting."""
+    feeders = [feeder for entry in files for feeder in entry["feeders"]]
     happened = [(feeder, event) for feeder in feeders for event in feeder["events"]]
     unexamined = [quiet(feeder) for feeder in feeders if feeder.get("unexamined")]
     if not happened and unexamined:

@@ -1,0 +1,132 @@
+"""One table of the files of one event: their columns beside one time."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+from tractexp.errors import UserError
+from tractexp.filetypes.columns import role
+from tractexp.filetypes.heading import TableHeading
+from tractexp.filetypes.mapping import map_times
+from tractexp.filetypes.moments import TableTimes, times_of
+from tractexp.filetypes.table import TableColumn, TableFile
+from tractexp.recording.event_files import SampledFile, align, move_samples, tell_apart
+
+Place = tuple[int, int]  # the number of a part, and of a column in it
+
+
+class JoinedTable(TableFile):
+    """The columns of several tables at the instants that all have, by the times of the first."""
+
+    def __init__(self, parts: Sequence[TableFile], paths: Sequence[str]) -> None:
+        """Raises `UserError` for other rates, and for times that do not overlap."""
+        self.parts, self.source = parts, parts[0].source
+        read = [_times(part) for part in parts]
+        self.aligned = align(
+            [_sampled(part, times) for part, (times, _) in zip(parts, read, strict=True)]
+        )
+        first, count = self.aligned.first[0], self.aligned.count
+        times = read[0][0]
+        t = times.t[first : first + count]
+        if times.start is not None:
+            self.start, t = times.start + timedelta(seconds=float(t[0] - times.t[0])), t - t[0]
+        self.t, self.frequency = t, parts[0].frequency
+        taken = [used for _, used in read]
+        self.columns, names, said = _columns(parts, taken, tell_apart(paths))
+        self.heading = TableHeading(
+            ("t", *(name for name, _ in names)), ("s", *(unit for _, unit in names)), 0, 0
+        )
+        rows = zip(*(part.sample for part in parts), strict=False)
+        self.sample = [
+            [float(moment), *(_cell(row[k], number) for k, number in self.columns)]
+            for moment, row in zip(t, rows, strict=False)
+        ]
+        notes = [
+            f"{Path(path).name}: {note}"
+            for path, part in zip(paths, parts, strict=True)
+            for note in part.notes
+        ]
+        self.notes = (*self.aligned.notes, *said, *dict.fromkeys(notes))
+
+    def read(self, wanted: Mapping[int, str]) -> dict[int, TableColumn]:
+        read: dict[int, TableColumn] = {0: TableColumn(self.t)} if 0 in wanted else {}
+        for k, part in enumerate(self.parts):
+            own = {self.columns[n - 1][1]: n for n in wanted if n and self.columns[n - 1][0] == k}
+            cells = part.read({number: wanted[n] for number, n in own.items()}) if own else {}
+            for number, n in own.items():
+                values = move_samples(
+                    cells[number].values,
+                    self.aligned.first[k],
+                    self.aligned.count,
+                    self.aligned.late[k],
+                )
+                read[n] = replace(cells[number], values=values)
+        return read
+
+    def place(self, row: int) -> str:
+        return self.parts[0].place(row + self.aligned.first[0])
+
+
+def _cell(row: Sequence[object], number: int) -> object:
+    return row[number] if number < len(row) else ""
+
+
+def _times(part: TableFile) -> tuple[TableTimes, set[int]]:
+    """When the rows of a table were taken, and the columns that say it."""
+    mapping = map_times(part)
+    numbers = {one.number for one in mapping.columns.values()}
+    kinds = {number: "number" for number in numbers} | {mapping.columns["t"].number: "time"}
+    return times_of(part, mapping, part.read(kinds)), numbers | set(mapping.beside)
+
+
+def _sampled(part: TableFile, times: TableTimes) -> SampledFile:
+    if len(times.t) < 3:
+        raise UserError(f"{part.source}: only {len(times.t)} rows; a part of an event needs more")
+    step = float(times.t[-1] - times.t[0]) / (len(times.t) - 1)
+    if not step > 0:
+        raise UserError(f"{part.source}: its times do not increase, so nothing can be joined to it")
+    return SampledFile(part.source, 1 / step, len(times.t), float(times.t[0]), times.start)
+
+
+def _columns(
+    parts: Sequence[TableFile], times: Sequence[set[int]], told: Sequence[str]
+) -> tuple[list[tuple[int, int]], list[tuple[str, str]], list[str]]:
+    """(part, number) of each column but times, its name and unit, and notes on those left out.
+
+    A name that several files have, or that says nothing, is made of what the files' names say.
+    """
+    every = [
+        (k, number, name.strip(), part.heading.units[number])
+        for k, part in enumerate(parts)
+        for number, name in enumerate(part.heading.names)
+        if number not in times[k]
+    ]
+    columns, names, notes = [], [], []
+    for k, number, name, unit in every:
+        alike = [one for one in every if one[2].lower() == name.lower() and one[0] != k]
+        if any(one[0] < k and _same(parts, one[:2], (k, number)) for one in alike):
+            notes.append(f"column '{name}' of {parts[k].source} is that of an earlier file")
+            continue
+        columns.append((k, number))
+        names.append((_tell(name, unit, told[k]) if alike or not role(name, unit) else name, unit))
+    return columns, names, notes
+
+
+def _same(
+    parts: Sequence[TableFile], one: tuple[int, int, str, str], other: tuple[int, int]
+) -> bool:
+    """Whether two columns begin with the same cells."""
+    rows = zip(parts[one[0]].sample, parts[other[0]].sample, strict=False)
+    pairs = [(_cell(a, one[1]), _cell(b, other[1])) for a, b in rows]
+    return bool(pairs) and all(a == b for a, b in pairs)
+
+
+def _tell(name: str, unit: str, told: str) -> str:
+    """A column's name with what its file's name says; that alone where the column says nothing."""
+    options = [f"{name} {told}", f"{told} {name}", told]
+    known = [(option, one) for option in options if (one := role(option, unit))]
+    if not role(name, unit) and role(told, unit):
+        return told
+    with_phase = [option for option, one in known if len(one.key) > 1]
+    return next(iter((*with_phase, *(option for option, _ in known))), f"{name} {told}".strip())

@@ -1,0 +1,114 @@
+"""How files are read that belong together: those of one event, and what a .zip holds."""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from tractexp import files
+from tractexp.errors import UserError
+from tractexp.overrides import format_assignment
+from tractexp.quoting import shell
+from tractexp.record import endings, reader_of
+from tractexp.recording.event_files import MOST_FILES, PART, name_one_event, say_several
+from tractexp.recording.overview import view_of
+from tractexp.recording.record_files import find_packed
+from tractexp.wording import join_words
+
+MOST_UNNAMED = 6  # files that are tried together although their names do not say so
+
+
+def settings_of(path: str, *join: str) -> dict[str, Any]:
+    """The reader, and its settings, that reads all of a file, or of the files of one event, or of
+    what a .zip holds.
+
+    Raises `UserError` for a folder, for an ending that no reader takes, and for a .zip of none or
+    several records.
+    """
+    if files.is_archive(path):
+        return _settings_of_archive(Path(path))
+    if files.is_called_archive(path):
+        files.check_there(Path(path))
+    cls = reader_of(path, *join)
+    return {"name": cls.name, **cls.of(path)} | ({"join": list(join)} if join else {})
+
+
+def _settings_of_archive(archive: Path) -> dict[str, Any]:
+    inside = [str(path) for path in find_packed(archive)]
+    if not inside:
+        names = [str(path.relative_to(archive)) for path in files.list_packed(archive)]
+        more = " and more" if len(names) > 5 else ""
+        held = f"it holds {join_words(names[:5])}{more}" if names else "it is empty"
+        raise UserError(
+            f"there is no record in {archive}: {held}; endings that can be read:"
+            f" {', '.join(endings())}"
+        )
+    together = settings_of(*inside) if len(inside) == 1 else join_event(inside)
+    if together is None:
+        raise UserError(say_several(str(archive), inside))
+    return together
+
+
+def join_event(paths: Sequence[str]) -> dict[str, Any] | None:
+    """How files are read as those of one event; None where they are not.
+
+    They are where their names say so, or where each of them alone shows no load, and they show one
+    together.
+    """
+    alike = len({Path(path).suffix.lower() for path in paths}) == 1
+    named = name_one_event(paths)
+    if not (alike and 1 < len(paths) <= (MOST_FILES if named else MOST_UNNAMED)):
+        return None
+    if not named and any(_shows_load(path) for path in paths):
+        return None
+    return settings_of(*paths) if _shows_load(*paths) else None
+
+
+def _shows_load(*paths: str) -> bool:
+    """Whether files show a load by themselves: voltages with currents, or a table of powers."""
+    try:
+        view = view_of(paths[0], settings_of(*paths))
+    except UserError:
+        return False
+    return any(s.record is not None or (s.feeder and s.feeder.currents) for s in view.sights)
+
+
+def propose_joining(path: str) -> str:
+    """That files beside one belong to its event, with the command that looks at them together; ""
+    where none do.
+    """
+    for group in _named_alike(path):
+        node = join_event(group)
+        if node is not None:
+            names = join_words([Path(one).name for one in node["join"]])
+            command = shell("tractexp", "look", path, format_assignment("join", node["join"]))
+            return f"with {names} beside it, of the same event, it shows a load: {command}"
+    return ""
+
+
+def _named_alike(path: str) -> Iterator[list[str]]:
+    """The file, first, with those of its folder whose names differ from its own in one word alone;
+    for each word.
+    """
+    own = Path(path)
+    words = PART.findall(own.stem)
+    try:
+        beside = files.list_folder(own.parent)
+    except (UserError, OSError):
+        return
+    others = [
+        (str(each), PART.findall(each.stem))
+        for each in beside
+        if each.suffix.lower() == own.suffix.lower() and each != own
+    ]
+    for k in range(len(words)):
+        rest = words[:k] + words[k + 1 :]
+        group = [o for o, w in others if len(w) == len(words) and w[:k] + w[k + 1 :] == rest]
+        if group:
+            yield [path, *group]
+
+
+def list_within(path: Path) -> list[Path]:
+    """The paths by which a file is looked at: its own; of a .zip with several records, theirs."""
+    inside = find_packed(path) if files.is_archive(path) else []
+    together = len(inside) < 2 or join_event([str(one) for one in inside])
+    return [path] if together else inside

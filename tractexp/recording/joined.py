@@ -1,0 +1,135 @@
+"""One recording of the files of one event: their channels side by side, at the same instants."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+
+from tractexp.errors import UserError
+from tractexp.recording.event_files import (
+    SAME_INSTANT,
+    Alignment,
+    SampledFile,
+    align,
+    move_samples,
+    name_files,
+    tell_apart,
+)
+from tractexp.recording.recording import Channel, Recording, Segment
+
+
+def join_recordings(recordings: Sequence[Recording]) -> Recording:
+    """The recordings of one event as one; the first says station, device and times.
+
+    Raises `UserError` for rates that differ and times that do not overlap.
+    """
+    first, *others = recordings
+    if not others:
+        return first
+    aligned = _align(recordings)
+    cut = [_cut(each, aligned, k) for k, each in enumerate(recordings)]
+    channels, said = _name_channels(cut)
+    notes = [
+        note if note in first.notes else f"{Path(each.source).name}: {note}"
+        for each in recordings
+        for note in each.notes
+    ]
+    return replace(
+        cut[0],
+        channels=channels,
+        status=[status for each in cut for status in each.status],
+        trigger=next((each.trigger for each in cut if each.trigger is not None), None),
+        notes=list(dict.fromkeys([*aligned.notes, *said, *notes])),
+        extra={},
+    )
+
+
+def _align(recordings: Sequence[Recording]) -> Alignment:
+    """Where recordings have the same instants: those of several segments where all are alike."""
+    first = recordings[0]
+    if all(len(each.segments) == 1 for each in recordings):
+        return align([_sampled(each) for each in recordings])
+    for each in recordings:
+        if [*map(_shape, each.segments)] != [*map(_shape, first.segments)]:
+            raise UserError(
+                f"{each.source} has other stretches of samples than {first.source}: files of one"
+                " event that have several rates, or gaps, are joined where all have the same; read"
+                " each by itself"
+            )
+        step = timedelta(seconds=1 / first.segments[0].rate)
+        if each.start and first.start and abs(each.start - first.start) > step / 2:
+            raise UserError(
+                f"{each.source} begins at {each.start} and {first.source} at {first.start}: files"
+                " of one event that have several rates, or gaps, are joined where they begin"
+                " together; read each by itself"
+            )
+    count = len(recordings)
+    said = f"{name_files(each.source for each in recordings)} are joined sample by sample"
+    return Alignment([0] * count, [0.0] * count, first.samples, (said,))
+
+
+def _shape(segment: Segment) -> tuple[float, ...]:
+    return segment.first, segment.stop, round(segment.rate, 3), round(segment.start, 6)
+
+
+def _sampled(recording: Recording) -> SampledFile:
+    (segment,) = recording.segments
+    begun = recording.start and recording.start + timedelta(seconds=segment.start)
+    count = segment.stop - segment.first
+    return SampledFile(recording.source, segment.rate, count, segment.start, begun)
+
+
+def _cut(recording: Recording, aligned: Alignment, k: int) -> Recording:
+    """File k at the instants that all files have."""
+    if len(recording.segments) > 1:
+        return recording
+    (segment,) = recording.segments
+    first, late = segment.first + aligned.first[k], aligned.late[k]
+    gone = segment.start + (aligned.first[k] + late) / segment.rate
+    part = slice(first, first + aligned.count)
+    return replace(
+        recording,
+        channels=[_move(channel, first, aligned.count, late) for channel in recording.channels],
+        status=[replace(status, raw=status.raw[part]) for status in recording.status],
+        segments=[Segment(0, aligned.count, segment.rate, 0.0)],
+        start=recording.start and recording.start + timedelta(seconds=gone),
+        trigger=None if recording.trigger is None else recording.trigger - gone,
+    )
+
+
+def _move(channel: Channel, first: int, count: int, late: float) -> Channel:
+    """A channel at other instants: as it was stored, where these are those of samples."""
+    if abs(late) <= SAME_INSTANT:
+        return replace(channel, raw=channel.raw[first : first + count])
+    values = move_samples(channel.recorded(), first, count, late)
+    return replace(channel, raw=values, gain=1.0, offset=0.0, missing=None, limits=None)
+
+
+def _name_channels(recordings: Sequence[Recording]) -> tuple[list[Channel], list[str]]:
+    """The channels of all, each with a name of its own; notes on those that several files have.
+
+    A name that several files have gets what their own names tell them apart by.
+    """
+    told = tell_apart([each.source for each in recordings])
+    kept: list[tuple[int, Channel]] = []
+    notes: list[str] = []
+    for k, recording in enumerate(recordings):
+        for channel in recording.channels:
+            if any(j < k and _same(channel, one) for j, one in kept):
+                name, source = channel.name.strip(), Path(recording.source).name
+                notes.append(f"channel '{name}' of {source} is that of an earlier file")
+            else:
+                kept.append((k, channel))
+    names = [channel.name.strip() for _, channel in kept]
+    return [
+        channel if names.count(name) == 1 else replace(channel, name=f"{name} {told[k]}".strip())
+        for name, (k, channel) in zip(names, kept, strict=True)
+    ], notes
+
+
+def _same(one: Channel, other: Channel) -> bool:
+    """Whether two files hold the same samples under the same name."""
+    alike = other.name.strip() == one.name.strip() and len(other.raw) == len(one.raw)
+    return alike and bool(np.array_equal(one.values(), other.values(), equal_nan=True))
