@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 from tractexp.errors import UserError
 from tractexp.filetypes.columns import role
@@ -63,6 +64,13 @@ class JoinedTable(TableFile):
                 )
                 read[n] = replace(cells[number], values=values)
         return read
+
+    def cells(self, number: int) -> Sequence[Any]:
+        if not number:
+            return self.t.tolist()
+        part, own = self.columns[number - 1]
+        first = self.aligned.first[part]
+        return self.parts[part].cells(own)[first : first + self.aligned.count]
 
     def place(self, row: int) -> str:
         return self.parts[0].place(row + self.aligned.first[0])
