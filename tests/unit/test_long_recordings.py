@@ -33,7 +33,7 @@ def long():
 def mapped(array):
     """Whether an array is a view of a file."""
     while array is not None and not isinstance(array, np.memmap):
-        array = array.base
+        array = getattr(array, "base", None)  # a small file is a view of its bytes
     return array is not None
 
 
