@@ -287,3 +287,19 @@ def test_the_basis_of_a_port_is_as_wide_as_what_is_unknown():
     assert basis(port, POLES).shape == (1600, 4)
     assert basis(replace(port, steady=1.0), POLES).shape == (1600, 3)
     assert basis(replace(port, series=True), POLES[:0]).shape == (1600, 0)
+
+
+def test_the_networks_of_records_are_fitted_once_and_the_same_for_the_next_model(
+    tmp_path, monkeypatch
+):
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path))
+    v = voltage()
+    train = in_waves(v, planted(v, POLES, SHARES))
+    first = black_boxes(WAVES, [train], most=2)
+    monkeypatch.setattr(Projection, "optimum", None)  # is not called again
+    for one, again in zip(first, black_boxes(WAVES, [train], most=2), strict=True):
+        np.testing.assert_array_equal(again.networks[0].poles, one.networks[0].poles)
+        np.testing.assert_array_equal(again.networks[0].coefficients, one.networks[0].coefficients)
+    other = in_waves(v, planted(v, POLES, 1.01 * SHARES))
+    with pytest.raises(TypeError):
+        black_boxes(WAVES, [other], most=2)

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tractexp import store
 from tractexp.domain import Domain, Playback
 from tractexp.domain.port import Complex, Port
 from tractexp.errors import UserError
@@ -125,7 +126,20 @@ def selection(
 
 
 def networks(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
-    """The best network of no pole, one, and so on, up to `most` or to what the samples allow."""
+    """The best network of no pole, one, and so on, up to `most` or to what the samples allow.
+
+    They depend on the records alone, so the store keeps them for the next model of these.
+    """
+
+    def compute() -> tuple[Complex, ...]:
+        return tuple(part for one in _fit(ports, most) for part in (one.poles, one.coefficients))
+
+    parts = store.DESCENTS.arrays(store.key(store.environment(), "networks", ports, most), compute)
+    return [LinearNetwork(*pair) for pair in zip(parts[::2], parts[1::2], strict=True)]
+
+
+def _fit(ports: Sequence[Port], most: int) -> list[LinearNetwork]:
+    """The networks of `networks`, each from the poles of the one before."""
     fit = Projection.of(ports)
     fits = [LinearNetwork(none := np.zeros(0, dtype=complex), fit.linear_part(none).coefficients)]
     while len(fits) <= most and _samples(ports) >= SAMPLES * unknowns(len(fits), ports[0]):
