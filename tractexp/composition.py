@@ -29,7 +29,7 @@ def read_choice(group: str, name: str) -> dict[str, Any]:
         content = read_model_file(name)
     elif (file := _file(group, name, folders())) is not None:
         content = _content(group, file)
-    elif name in plugin.discover().get(group, {}):
+    elif plugin.find(group, name) is not None:
         return {"name": name}
     else:
         where = elsewhere(group, name) or describe_available(group, name, choices(group))

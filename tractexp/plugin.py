@@ -289,10 +289,31 @@ def get(group: str, name: str) -> type[Any]:
     """The plugin class registered as `name` in `group`; raises `UserError` with the
     nearest name.
     """
-    classes = discover().get(group, {})
-    if name not in classes:
-        raise UserError(f"there is no {group} '{name}'{among(name, classes)}")
-    return classes[name]
+    cls = find(group, name)
+    if cls is None:
+        raise UserError(f"there is no {group} '{name}'{among(name, discover().get(group, {}))}")
+    return cls
+
+
+def find(group: str, name: str) -> type[Any] | None:
+    """The plugin class registered as `name` in `group`; None where there is none.
+
+    A plugin has its file's name: only files of this name are imported, and all where none holds it.
+    """
+    if name not in _registry.get(group, {}):
+        for module in _modules().get(name, ()):
+            _module(module)
+    return _registry.get(group, {}).get(name) or discover().get(group, {}).get(name)
+
+
+@functools.cache
+def _modules() -> Mapping[str, Sequence[str]]:
+    """{name: modules of this name} of the plugin packages."""
+    named: dict[str, list[str]] = {}
+    for package in packages():
+        for module in modules(package.__name__, package.__path__):
+            named.setdefault(module.rpartition(".")[2], []).append(module)
+    return named
 
 
 def build(group: str, settings: Mapping[str, Any]) -> Any:

@@ -560,3 +560,12 @@ def test_the_framework_names_no_plugin():
                 f"{where}:{s.lineno} '{s.value}'" for s in strings if s.value in names - ENGLISH
             ]
     assert not found
+
+
+def test_of_the_plugins_that_are_named_alone_the_files_are_imported():
+    script = (
+        "import sys; from tractexp.plugin import get; get('optimizer', 'pso');"
+        " print(*(name for name in sys.modules if name.startswith('tractexp_plugins.optimizers.')))"
+    )
+    run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == ["tractexp_plugins.optimizers.pso"]

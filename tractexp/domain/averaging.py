@@ -9,7 +9,7 @@ import numpy as np
 
 from tractexp.errors import MODEL, UserError, among
 from tractexp.model.model import WAVES, Model
-from tractexp.plugin import discover
+from tractexp.plugin import discover, find
 from tractexp.record import Event
 from tractexp.record.window import LONGEST_WINDOW, mean_weights
 from tractexp.recording.estimator import Estimator, estimator_of
@@ -34,9 +34,11 @@ def check_window(window: object, domain: str) -> None:
         raise UserError(
             f"{MODEL.window}={window} has no meaning on waveforms, which are samples; leave it out"
         )
-    names = (RECORDED, *sorted(discover()[Estimator.group]))
-    if window is None or window in names:
+    if window in (None, RECORDED):
         return
+    if isinstance(window, str) and find(Estimator.group, window) is not None:
+        return
+    names = (RECORDED, *sorted(discover()[Estimator.group]))
     if isinstance(window, str):
         raise UserError(
             f"{MODEL.window}={window}: there is no such window{among(window, names)}; or give"
