@@ -219,6 +219,16 @@ def variant(optimizer: str, chosen: Mapping[str, str]) -> str:
     return " ".join([optimizer, *(re.sub(r"[^\s,\[=']*/", "", part) for part in parts)])
 
 
+def read_events(data: Mapping[str, Any]) -> Any:
+    """The recorded events of a choice of data, read and with their dips found (`Events` of
+    `Event`).
+    """
+    from tractexp.record import Events, detect
+
+    records = build("data", data).read()
+    return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
+
+
 @dataclass(frozen=True)
 class Job:
     """One run: its configuration as plain data, and the folder it writes to."""
@@ -236,14 +246,13 @@ class Job:
     measured: dict[str, float] = field(default_factory=dict)  # metrics by name, as they are logged
     # how results take the place of an earlier run's
     placed: Callable[[Write], list[Path]] | None = None
+    # what reads a choice of data; the jobs of a sweep share what was read
+    read_events: Callable[[Mapping[str, Any]], Any] = read_events
 
     @functools.cached_property
     def events(self) -> Any:
         """The recorded events, read and with their dips found (`Events` of `Event`)."""
-        from tractexp.record import Events, detect
-
-        records = build("data", self.config["data"]).read()
-        return Events([detect(r) for r in records.train], [detect(r) for r in records.validate])
+        return self.read_events(self.config["data"])
 
     @functools.cached_property
     def events_of_fit(self) -> Any:

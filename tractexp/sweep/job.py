@@ -1,5 +1,7 @@
 """One job of a sweep, and how it is run: isolated, silent, with its end on disk."""
 
+import functools
+import json
 import shutil
 import time
 import traceback
@@ -9,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from tractexp import credentials, files
-from tractexp.api.task import Job, variant
+from tractexp.api.task import Job, read_events, variant
 from tractexp.cli.chosen import collect_chosen_settings
 from tractexp.errors import UserError
 from tractexp.sweep import identity
@@ -19,6 +21,7 @@ from tractexp.sweep.surroundings import surround_job
 from tractexp.tracking.sweepfile import folder_of, parent_of
 
 OUTPUT, TRACEBACK = "output.txt", "traceback.txt"
+MOST_RECORDS = 4  # choices of data that a worker keeps: the jobs of a sweep share one
 
 
 @dataclass(frozen=True)
@@ -189,6 +192,7 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
             "logs": logs,
             "given": job.given,
             "measured": measured,
+            "read_events": functools.partial(_read_events, inputs=job.inputs),
         }
         perform(Job(job.config, job.choices, job.folder, parent, **about))
         select_returned_metrics(measured, job.returns)
@@ -198,6 +202,18 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
         files.write(job.folder / TRACEBACK, traceback.format_exc())
         return traceback.format_exception_only(error)[-1].strip() or type(error).__name__
     return ""
+
+
+def _read_events(data: Mapping[str, Any], inputs: str) -> Any:
+    """The events of a choice of data, which the jobs of a worker share; `inputs` is of its
+    files.
+    """
+    return _read_once(json.dumps(data, sort_keys=True, default=str), inputs)
+
+
+@functools.lru_cache(MOST_RECORDS)
+def _read_once(data: str, inputs: str) -> Any:
+    return read_events(json.loads(data))
 
 
 def _prepare(job: SweepJob) -> None:
