@@ -127,7 +127,8 @@ class Store:
 CODE, TEXTS, DRAWINGS = Store("code", 4000), Store("texts", 4000), Store("drawings", 4000)
 # draws of 10 MB
 SEARCHES, DESCENTS, DRAWS = Store("searches", 3000), Store("descents", 4000), Store("draws", 100)
-KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DRAWS))
+DATABASES = Store("databases", 4)  # of 1 MB
+KINDS = tuple(store.kind for store in (CODE, TEXTS, DRAWINGS, SEARCHES, DESCENTS, DRAWS, DATABASES))
 MOST_LINKS = 40  # that a path leads through, as the system has it
 
 

@@ -24,6 +24,7 @@ from command_line import free_port, run_command
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
 from tractexp.tracking import TrackedRun, model, process
+from tractexp.tracking import store as tracking_store
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
 from tractexp.tracking.store import sentences
@@ -215,6 +216,20 @@ tracking.log(run, tracking.default_uri(Path(sys.argv[1])))"""
         "mlflow.db",
         "mlflow.db.lock",
     ]
+
+
+def test_the_store_of_a_second_folder_needs_no_migrations_and_is_its_own(tmp_path, monkeypatch):
+    monkeypatch.setenv("TRACTEXP_CACHE_DIR", str(tmp_path / "cache"))
+    places = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        monkeypatch.chdir(tmp_path / name)
+        (default,) = tracking.open_store(tracking.default_uri(Path())).search_experiments()
+        places.append(default.artifact_location)
+        monkeypatch.setattr(tracking_store, "_migrate", None)  # is not called again
+    assert [
+        str(tmp_path / name) in place for name, place in zip(("one", "two"), places, strict=True)
+    ] == [True] * 2
 
 
 def test_a_creation_that_was_killed_leaves_nothing_that_hinders_the_next(tmp_path):

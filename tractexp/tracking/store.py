@@ -20,6 +20,7 @@ from typing import Any
 
 from tractexp import credentials, files, quoting
 from tractexp.errors import UserError
+from tractexp.store import DATABASES, key, version
 from tractexp.tracking.owner import close_quietly
 
 PATIENCE = 15.0  # s to wait for a process that writes to the database
@@ -95,8 +96,17 @@ def open_store(uri: str) -> Any:
 
 
 def _create_database(database: Path) -> None:
-    """Migrate an empty database in memory and move a copy into place, so that a killed process
-    leaves no half of one.
+    """Put an empty database in place whole, so that a killed process leaves no half of one.
+
+    MLflow's migrations take a second of work; what they came to is kept for the next folder.
+    """
+    makers = [version(name) for name in ("mlflow", "sqlalchemy", "alembic")]
+    files.write(database, DATABASES.get(key(makers, sqlite3.sqlite_version), _migrate))
+
+
+def _migrate() -> bytes:
+    """The content of an empty database, migrated in memory: without the experiment that MLflow
+    opens one with, whose place is the folder of its user.
 
     On disk the migrations wait hundreds of times for the drive: 3 to 6 s on a busy one, against 1
     s.
@@ -106,11 +116,13 @@ def _create_database(database: Path) -> None:
     memory = "file:tractexp-fresh?mode=memory&cache=shared"
     with (
         contextlib.closing(sqlite3.connect(memory, uri=True)) as connection,
-        tempfile.TemporaryDirectory(dir=database.parent) as folder,
+        tempfile.TemporaryDirectory() as folder,
     ):
         MlflowClient(f"sqlite:///{memory}&uri=true").search_experiments(max_results=1)
+        with connection:
+            connection.execute("DELETE FROM experiments")
         connection.execute("VACUUM INTO ?", (str(Path(folder, "fresh.db")),))
-        files.move(Path(folder, "fresh.db"), database)
+        return Path(folder, "fresh.db").read_bytes()
 
 
 def _check_database(database: Path) -> None:
