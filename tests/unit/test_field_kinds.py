@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import tractexp
+from tractexp.errors import UserError
 from tractexp.filetypes import comtrade
 from tractexp.plugin import chosen
 from tractexp.recording import Channel, Recording, Segment
@@ -180,6 +181,10 @@ def test_secondary_values_show_no_megawatts_until_the_ratio_is_given(tmp_path):
     assert "secondary" in first
     assert any("units={U: '1.1 kV', I: '120 A'}" in note for note in seen.files.rows[0]["notes"])
     assert any("secondary" in note for note in tractexp.read(path)[0].record.notes)
+    made = tractexp.survey(str(tmp_path), cores=1, progress=False)
+    [row] = made.content["rows"]
+    powers = [row[f"{x}_{when}"] for x in "PQ" for when in ("before", "after")]
+    assert (powers, row["unit"]) == ([None] * 4, "secondary")
     [load] = look(path, units={"U": "1.1 kV", "I": "120 A"})[0].feeders
     assert (load["U"], load["P"], load["Q"]) == pytest.approx((110, 20, 8), rel=0.01)
 
@@ -216,3 +221,60 @@ def test_a_bus_tells_the_fault_that_its_circuits_end_at_different_instants(tmp_p
     [bus] = [line for line in str(seen.summary()).splitlines() if line.strip().startswith("bus 1")]
     assert "dip at 0.99" in bus
     assert "1200 ms" in bus
+
+
+def write_direct(path, columns, volts=1500.0, rate=2000.0, ripple=0.02, pulses=300.0, factor=0.0):
+    """A table of a direct voltage that falls by a fifth, with its current and powers; `columns`
+    {name: quantity}.
+    """
+    t = np.arange(0, 1.0, 1 / rate)
+    u = np.where((t > 0.5) & (t < 0.6), 0.8, 1.0)
+    U = volts * u * (1 + ripple * np.sin(2 * np.pi * pulses * t))
+    values = {"U": U, "kV": U / 1000, "I": 2000 * u, "P": 2 * U * u, "Q": factor * 2 * U * u}
+    rows = zip(t, *(values[quantity] for quantity in columns.values()), strict=True)
+    lines = [",".join(["t", *columns]), *(",".join(f"{x:.7g}" for x in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("columns", "settings"),
+    [
+        ({"U [V]": "U", "I [A]": "I"}, {}),
+        ({"U [V]": "U", "I [A]": "I"}, {"volts": 750.0, "pulses": 600.0}),
+        ({"Voltage (kV)": "kV", "Current (A)": "I"}, {"volts": 3000.0}),
+        ({"U [V]": "U", "I [A]": "I"}, {"rate": 100.0, "ripple": 0.0}),
+        ({"U [V]": "U", "P [kW]": "P"}, {}),
+        ({"U": "U", "I": "I"}, {}),
+        ({"Udc [V]": "U", "Idc [A]": "I"}, {"volts": 1100.0}),
+        ({"Gleichspannung [V]": "U", "P [kW]": "P"}, {"volts": 400.0}),
+        ({"U [V]": "U", "P [kW]": "P", "Q [kvar]": "Q"}, {}),
+        ({"U [V]": "U", "P [kW]": "P", "Q [kvar]": "Q"}, {"factor": 0.3}),
+        ({"U [V]": "U", "P [kW]": "P", "Q [kvar]": "Q"}, {"rate": 100.0, "ripple": 0.0}),
+    ],
+)
+def test_a_table_of_direct_current_is_said_to_be_one(tmp_path, columns, settings):
+    path = write_direct(tmp_path / "dc.csv", columns, **settings)
+    volts = settings.get("volts", 1500.0)
+    words = (
+        rf"is direct: {volts:.4g} V in the mean with a ripple of \d\.\d% RMS, and falls to"
+        rf" .*\(20\.\d%\) at 0\.\d+ s for \d+ ms; the models here are those of loads at alternating"
+    )
+    with pytest.raises(UserError, match=words):
+        look(path)
+
+
+def test_what_may_be_direct_and_has_a_q_is_alternating_and_said(tmp_path):
+    columns = {"U [V]": "U", "P [kW]": "P", "Q [kvar]": "Q"}
+    path = write_direct(tmp_path / "ac.csv", columns, rate=100.0, ripple=0.0, factor=0.4)
+    seen, first = look(path)
+    assert "is worth fitting" in first
+    assert "1.5 kV may be a direct voltage of railways" in " ".join(seen.files.rows[0]["notes"])
+    still = write_direct(tmp_path / "zero.csv", columns, rate=100.0, ripple=0.0)
+    assert tractexp.read(still, base_voltage=1.5, base_power=4.0)
+
+
+def test_other_tables_without_q_are_not_direct(tmp_path):
+    path = write_direct(tmp_path / "ac.csv", {"U [V]": "U", "P [kW]": "P"}, volts=27500.0)
+    with pytest.raises(UserError, match="column Q is missing"):
+        look(path)

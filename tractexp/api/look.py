@@ -447,11 +447,11 @@ def _feeder(view: View, shown: Sight) -> dict[str, Any]:
         "unexamined": shown.unexamined,
         "secondary": shown.secondary,
         "command": command(view, shown),
-        "events": [_without_powers(event_row(event, view.begun), shown) for event in shown.events],
+        "events": [hide_secondary(event_row(event, view.begun), shown) for event in shown.events],
     }
 
 
-def _without_powers(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
+def hide_secondary(row: dict[str, Any], shown: Sight) -> dict[str, Any]:
     """The row of an event, without powers where they are those of a transformer's secondary."""
     return (
         row | dict.fromkeys(("P_before", "Q_before", "P_after", "Q_after"))

@@ -46,7 +46,7 @@ ABOUT = {
     "Q_before": "Mvar",
     "P_after": "MW",
     "Q_after": "Mvar",
-    "unit": "of P: MW, or pu where no base is known",
+    "unit": "of P: MW, pu where no base is known, secondary where the ratio is not",
     "noise": "of P, before the event",
     "rate": "Hz, sampled",
 }

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from tractexp import files
-from tractexp.api.look import command, event_row, series
+from tractexp.api.look import command, event_row, hide_secondary, series
 from tractexp.errors import UserError
 from tractexp.recording import archive
 from tractexp.recording.event_views import list_within
@@ -123,14 +123,14 @@ def _common(view: View) -> dict[str, Any]:
 
 
 def _event(view: View, file: str, number: int, shown: Sight, seen: LoadEvent) -> dict[str, Any]:
-    fields = event_row(seen, view.begun)
+    fields = hide_secondary(event_row(seen, view.begun), shown)
     event = seen.event
     return {
         **_common(view),
         **{key: value for key, value in fields.items() if key in COLUMNS},
         "event": archive.event_name(file, number, seen),
         "load": shown.name,
-        "unit": "pu" if shown.per_unit else "MW",
+        "unit": "secondary" if shown.secondary else "pu" if shown.per_unit else "MW",
         "noise": event and event.noise_share,
         "command": command(view, shown) if seen.worth else "",
         **_pictures(shown, seen),

@@ -10,6 +10,7 @@ import numpy as np
 from tractexp.errors import DATA, UserError
 from tractexp.files import locate_file
 from tractexp.filetypes.columns import PER_UNIT, factor
+from tractexp.filetypes.direct_table import check_alternating, describe_direct_table
 from tractexp.filetypes.mapping import (
     LINES,
     PHASES,
@@ -67,7 +68,12 @@ class Tabular:
         """
         table = open_table(path, replace(self._form, join=tuple(join)))
         columns, units = {**sidecar.columns, **self.columns}, {**sidecar.units, **self.units}
-        return table, map_columns(table, columns, units, sidecar.more)
+        try:
+            return table, map_columns(table, columns, units, sidecar.more)
+        except UserError:
+            if said := describe_direct_table(table, units):
+                raise UserError(f"{table.source}: {said}") from None
+            raise
 
 
 def kind_of(path: str, *join: str) -> str:
@@ -174,7 +180,10 @@ def _of_powers(table: TableFile, mapping: Mapped, kilovolts: bool) -> Powers:
     absolute = {"U": _absolute(mapping, first), "P": _absolute(mapping, power)}
     if absolute["U"] or (absolute["U"] is None and kilovolts):
         current = next((values[key] for key in values if key[0] == "I"), None)
-        notes += _to_lines(columns, mapping.columns[first].role.line, first, current)
+        told = mapping.columns[first]
+        if absolute["U"]:
+            notes += check_alternating(table.source, told.name, columns, kilovolts)
+        notes += _to_lines(columns, told.role.line, first, current)
     return Powers(columns, absolute, (*table.notes, *notes), start=start)
 
 

@@ -8,6 +8,7 @@ that is modelled here.
 
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -29,6 +30,7 @@ DIRECT = 3.0  # times what alternates: a greater mean is a direct voltage
 RIPPLE_SECONDS = 0.02  # s over which its ripple is averaged out
 LEAST_DC_DIP = 0.03  # of it: a dip
 LONGEST = 1 << 20  # samples that are looked at
+ALTERNATING = "the models here are those of loads at alternating voltage"
 
 
 def opposite_pair(phasors: Snapshots, volts: Sequence[int]) -> tuple[int, int] | None:
@@ -128,35 +130,62 @@ def direct_voltage(recording: Recording) -> str:
         for c in recording.channels
         if c.form == "waveform" and kind(c) == "voltage" and not in_doubt(c)
     ]
-    segment = max(recording.segments, key=lambda s: s.stop - s.first)
-    n, said = max(3, round(RIPPLE_SECONDS * segment.rate)) | 1, ""
+    segment, said = max(recording.segments, key=lambda s: s.stop - s.first), ""
     for channel in volts:
         x = channel.values(segment.first, min(segment.stop, segment.first + LONGEST))
+        seen = DirectVoltage.of(x, segment.rate)
+        if seen is not None and seen.alternates:
+            return ""
+        if seen is not None and seen.is_direct:
+            said = said or seen.describe(channel.name.strip(), segment.start)
+    return said
+
+
+@dataclass(frozen=True)
+class DirectVoltage:
+    """A voltage as a direct one: its mean, what is faster, and the deepest dip."""
+
+    mean: float  # kV
+    alternating: float  # kV RMS of what is faster than a cycle
+    greatest: float  # kV
+    fall: float  # of the mean
+    begin: float  # s from the first sample to that of the dip
+    seconds: float
+
+    @classmethod
+    def of(cls, x: np.ndarray, rate: float) -> "DirectVoltage | None":
+        """Values (N,) [kV]; None where there are too few."""
+        n = max(3, round(RIPPLE_SECONDS * rate)) | 1
         x = x[np.isfinite(x)]
         if len(x) < 4 * n:
-            continue
+            return None
         smooth = np.convolve(x, np.full(n, 1 / n), "valid")
         rest = (x[n // 2 : len(x) - n // 2] - smooth)[: len(smooth) // n * n]
         ripple = float(np.sqrt(np.median(rest.reshape(-1, n).var(axis=1))))
         mean = float(np.median(smooth))
-        if abs(mean) <= DIRECT * ripple or abs(mean) <= DIRECT * float(np.abs(x).max()) / 20:
-            if ripple > DIRECT * abs(mean):
-                return ""  # one that alternates
-            continue
-        low = int(np.argmin(smooth / mean))
-        fall = 1 - float(smooth[low]) / mean
-        below = smooth / mean < 1 - max(LEAST_DC_DIP, fall / 2)
-        at = segment.start + (int(np.argmax(below)) + n // 2) / segment.rate
+        shares = smooth / mean if mean else np.ones(len(smooth))
+        fall = 1 - float(shares.min())
+        below = shares < 1 - max(LEAST_DC_DIP, fall / 2)
+        begin, count = (int(np.argmax(below)) + n // 2) / rate, np.count_nonzero(below)
+        return cls(mean, ripple, float(np.abs(x).max()), fall, begin, count / rate)
+
+    @property
+    def alternates(self) -> bool:
+        return not self.is_direct and self.alternating > DIRECT * abs(self.mean)
+
+    @property
+    def is_direct(self) -> bool:
+        return abs(self.mean) > DIRECT * max(self.alternating, self.greatest / 20)
+
+    def describe(self, name: str, start: float = 0.0) -> str:
+        """One clause, times counted from `start` [s] at the first sample."""
         dip = (
-            f", and falls to {1000 * smooth[low]:.4g} V ({fall:.1%}) at {at:.3f} s for "
-            f"{1000 * np.count_nonzero(below) / segment.rate:.0f} ms"
-            if fall > LEAST_DC_DIP
+            f", and falls to {1000 * self.mean * (1 - self.fall):.4g} V ({self.fall:.1%}) at"
+            f" {start + self.begin:.3f} s for {1000 * self.seconds:.0f} ms"
+            if self.fall > LEAST_DC_DIP
             else ""
         )
-        said = said or (
-            f"the voltage '{channel.name.strip()}' is direct: {1000 * mean:.4g} V in the mean with"
-            " a ripple of "
-            f"{ripple / abs(mean):.1%} RMS{dip}; the models here are those of loads at alternating"
-            " voltage"
+        return (
+            f"the voltage '{name}' is direct: {1000 * self.mean:.4g} V in the mean with a ripple of"
+            f" {self.alternating / abs(self.mean):.1%} RMS{dip}; {ALTERNATING}"
         )
-    return said
