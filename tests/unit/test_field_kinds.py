@@ -2,6 +2,8 @@
 unknown units.
 """
 
+import re
+
 import numpy as np
 import pytest
 
@@ -255,13 +257,14 @@ def write_direct(path, columns, volts=1500.0, rate=2000.0, ripple=0.02, pulses=3
 )
 def test_a_table_of_direct_current_is_said_to_be_one(tmp_path, columns, settings):
     path = write_direct(tmp_path / "dc.csv", columns, **settings)
-    volts = settings.get("volts", 1500.0)
     words = (
-        rf"is direct: {volts:.4g} V in the mean with a ripple of \d\.\d% RMS, and falls to"
-        rf" .*\(20\.\d%\) at 0\.\d+ s for \d+ ms; the models here are those of loads at alternating"
+        r"is direct: (\S+) V in the mean with a ripple of \d\.\d% RMS, and falls to .*\(20\.\d%\)"
+        r" at 0\.\d+ s for \d+ ms; the models here are those of loads at alternating voltage"
     )
-    with pytest.raises(UserError, match=words):
+    with pytest.raises(UserError, match=words) as refused:
         look(path)
+    mean = float(re.search(words, str(refused.value))[1])
+    assert mean == pytest.approx(settings.get("volts", 1500.0), rel=1e-3)
 
 
 def test_what_may_be_direct_and_has_a_q_is_alternating_and_said(tmp_path):
