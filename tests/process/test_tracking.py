@@ -15,6 +15,7 @@ import sys
 import time
 import urllib.request
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from command_line import free_port, run_command
 
 from tractexp import provenance, tracking
 from tractexp.errors import UserError
-from tractexp.tracking import TrackedRun, model, process
+from tractexp.tracking import TrackedRun, model, process, runfile
 from tractexp.tracking import store as tracking_store
 from tractexp.tracking.process import Logger
 from tractexp.tracking.run import CURVE_POINTS
@@ -99,6 +100,7 @@ def test_a_new_experiment_leads_to_the_columns_that_matter_from_any_page_of_mlfl
         "?viewStateShareKey=tractexp&compareRunsMode=TABLE"
     )
     assert f"]({address})" in experiment.tags["mlflow.note.content"]
+    assert experiment.tags["mlflow.experimentKind"] == "custom_model_development"
     packed = experiment.tags["mlflow.sharedViewState.tractexp"].removeprefix("deflate;")
     columns = json.loads(zlib.decompress(base64.b64decode(packed)))["selectedColumns"]
     assert {"metrics.`search_objective`", "metrics.`model_error`", "metrics.`grade`"} <= set(
@@ -460,6 +462,52 @@ def test_the_signature_of_the_model_is_what_mlflow_itself_writes(tmp_path, uri):
     )
     assert Model.load(str(there)).signature == signature
     assert signature.to_dict() == model.SIGNATURE
+
+
+def test_the_page_of_the_model_has_its_metrics_its_structure_and_its_record(tmp_path, uri):
+    (tmp_path / "result.json").write_text("{}")
+    record = {"name": "dip1", "role": "train", "sha256": "ab" * 32}
+    held_out = {"name": "dip2", "role": "validate", "sha256": "cd" * 32}
+    run = TrackedRun(
+        "e",
+        "r",
+        parameters={"model.motor.name": "electromechanical", "optimizer.name": "pso"},
+        metrics={"grade": 2.0, "T_prime": 0.12, "search_T_prime": 0.4},
+        curves={"fitness": (STEPS, FITNESS)},
+        records=[record, held_out],
+        description="**adequate**",
+        model=tmp_path / "result.json",
+        model_metrics=["grade", "T_prime"],
+    )
+    run_id = tracking.log(run, uri)
+    found = client(uri).get_run(run_id)
+    assert found.data.metrics["search_T_prime"] == 0.4
+    (logged,) = client(uri).search_logged_models([found.info.experiment_id])
+    assert logged.params == {"model.motor.name": "electromechanical"}
+    assert logged.tags["mlflow.note.content"] == "**adequate**"
+    assert {metric.key: metric.value for metric in logged.metrics} == {
+        "grade": 2.0,
+        "T_prime": 0.12,
+    }
+    assert {metric.dataset_name for metric in logged.metrics} == {"dip1"}
+    assert {metric.dataset_digest for metric in logged.metrics} == {record["sha256"][:36]}
+    both = tracking.log(replace(run, records=[record, held_out | {"role": "train"}]), uri)
+    (logged,) = client(uri).search_logged_models(
+        [found.info.experiment_id], f"source_run_id = '{both}'"
+    )
+    assert {metric.dataset_name for metric in logged.metrics} == {None}, "of both together"
+
+
+def test_a_file_of_an_earlier_version_names_no_metrics_of_the_model(tmp_path):
+    runfile.save(tmp_path, TrackedRun("e", "r", metrics={"grade": 2.0}), "sqlite:///x.db")
+    content = json.loads((tmp_path / runfile.FILE).read_text())
+    del content["run"]["model_metrics"]
+    (tmp_path / runfile.FILE).write_text(json.dumps(content))
+    assert runfile.read(tmp_path).run.model_metrics == []
+    content["run"]["model_metrics"] = [3]
+    (tmp_path / runfile.FILE).write_text(json.dumps(content))
+    with pytest.raises(UserError, match=r"is damaged .its model_metrics hold what they cannot"):
+        runfile.read(tmp_path)
 
 
 def test_an_experiment_that_was_deleted_is_reported_with_the_way_back(uri):

@@ -516,8 +516,10 @@ class Discrepancy(Task, call=investigate):
         was refitted.
         """
         from tractexp import tracking
+        from tractexp.api.logged import measure_model
 
-        metrics = {}
+        of_model = measure_model(result.fit)
+        metrics = dict(of_model)
         for role in ("train", "validate"):
             if (gap := getattr(result.gap, role)) is None:
                 continue
@@ -543,10 +545,11 @@ class Discrepancy(Task, call=investigate):
         ]
         return {
             "name": f"{result.verdict} {' '.join(result.names)}".strip(),
-            "tags": {"verdict": result.verdict},
+            "tags": {"verdict": result.verdict, "grade": result.fit.grade},
             "metrics": metrics,
             "children": children,
             "description": quoting.markdown(result.reason),
             "model": job.folder / "result.json",
+            "model_metrics": [*of_model],
             "records": result.result.records,
         }

@@ -26,7 +26,7 @@ GRADES = (Grade.WRONG_MODEL, Grade.EFFECT_MISSING, Grade.ADEQUATE)
 
 def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> dict[str, Any]:
     """Fields of `tractexp.tracking.TrackedRun`: metrics, curves and, as a predictor, the model."""
-    result = fit.result
+    result, of_model = fit.result, measure_model(fit)
     searched = (
         f"{job.variant}, {' and '.join(e.record.name for e in job.events.train)}, seed {job.seed}"
     )
@@ -36,14 +36,23 @@ def logged_fit(job: "Job", fit: "Identification", predictor: bool = False) -> di
         )
     return {
         "name": searched,
-        "metrics": _of_search(fit) | _errors(fit) | _estimates(fit),  # MLflow compares by the first
+        # MLflow compares by the first
+        "metrics": _of_search(fit)
+        | {key: getattr(result, key) for key in ("simulations", "seconds")}
+        | of_model,
         "curves": _curves(fit),
         "tags": {"grade": fit.grade},
         "seconds": result.seconds,
         "description": quoting.markdown(fit.headline),
         "records": result.records,
         "model": job.folder / "result.json" if predictor else None,
+        "model_metrics": [*of_model],
     }
+
+
+def measure_model(fit: "Identification") -> dict[str, float]:
+    """What is logged of a fitted model, whichever task fitted it: grade, errors and estimates."""
+    return _errors(fit) | _estimates(fit)
 
 
 def _estimates(fit: "Identification") -> dict[str, float]:
@@ -62,9 +71,8 @@ def _estimates(fit: "Identification") -> dict[str, float]:
 def _errors(fit: "Identification") -> dict[str, float]:
     """How well the estimate fits, event by event too."""
     result = fit.result
-    metrics = {key: getattr(result, key) for key in ENDED} | {
-        "model_error": result.model_error["value"]
-    }
+    metrics = {key: getattr(result, key) for key in ("objective", "epsilon_p", "epsilon_q")}
+    metrics["model_error"] = result.model_error["value"]
     if held_out := result.model_error["held_out"]:
         metrics["model_error_held_out"] = held_out["value"]
     if (ratio := result.linear_network.get("ratio")) is not None:

@@ -7,8 +7,10 @@ pickled code.
 import json
 import sys
 import tempfile
+from collections.abc import Mapping
 from importlib.metadata import entry_points
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from tractexp import files
@@ -18,6 +20,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 RESULT = "result.json"
+NOTE = "mlflow.note.content"  # the tag that MLflow shows as a description
 
 
 def _columns(*names: str, optional: str = "") -> str:
@@ -34,9 +37,15 @@ SIGNATURE = {
 }
 
 
-def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> str:
+def log_model(
+    client: Any,
+    run_id: str,
+    result: Path,
+    parameters: Mapping[str, str] = MappingProxyType({}),
+    description: str = "",
+) -> str:
     """Log the model of the file `result` under a run, with an open `MlflowClient`, and return the
-    model id.
+    model id. Its page in MLflow has the parameters and the description, which is Markdown.
 
     `mlflow.pyfunc.log_model` is not used: it imports pandas, and lists every file of every
     installed package (0.4 s) to find requirements that this module has at hand.
@@ -44,7 +53,10 @@ def log_model(client: Any, run_id: str, result: Path, name: str = "model") -> st
     from mlflow.entities import LoggedModelOutput
 
     experiment_id = client.get_run(run_id).info.experiment_id
-    logged = client.create_logged_model(experiment_id, name, run_id, model_type="traction load")
+    tags = {NOTE: description} if description else {}
+    logged = client.create_logged_model(
+        experiment_id, "model", run_id, tags, dict(parameters), "traction load"
+    )
     client.log_outputs(run_id, [LoggedModelOutput(logged.model_id, step=0)])
     with tempfile.TemporaryDirectory() as folder:
         _save(Path(folder), result, run_id, logged)

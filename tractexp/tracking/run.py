@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 STATUSES = ("FINISHED", "FAILED", "KILLED")
 KEY = "tractexp.key"  # a tag
+FITTED = "train"  # the role of a record
 PER_DECADE = 40  # steps that curves share
 CURVE_POINTS = 1000  # a longer curve is thinned evenly; the files of the run keep every point
 # MLflow takes at most 1000 entries a batch, 100 of them parameters
@@ -60,6 +61,7 @@ class TrackedRun:
     status: str = "FINISHED"
     seconds: float = 0.0
     model: Path | None = None
+    model_metrics: Sequence[str] = ()  # those of `metrics` that are on the model's page, too
     records: "Sequence[Mapping[str, str]]" = ()  # name, role, sha256: MLflow's inputs
     children: "Sequence[TrackedRun]" = ()
     key: str = ""  # identifies a run that is sent again
@@ -294,21 +296,38 @@ def _write(client: Any, run_id: str, run: TrackedRun) -> None:
     points = [(name, value, 0) for name, value in run.metrics.items() if not math.isinf(value)]
     for name, (steps, values) in run.curves.items():
         points += [(name, values[i], steps[i]) for i in choose_curve_points(len(steps))]
-    metrics = [Metric(name, float(value), now, int(step)) for name, value, step in points]
+    of_model = _log_inputs_and_model(client, run_id, run)
+    metrics = [
+        Metric(name, float(value), now, int(step), **of_model.get(name, {}))
+        for name, value, step in points
+    ]
     parameters = [Param(key, _text(value)[:VALUE_LENGTH]) for key, value in run.parameters.items()]
     chunks = zip_longest(
         _chunks(metrics, BATCH_METRICS), _chunks(parameters, BATCH_PARAMETERS), fillvalue=[]
     )
     for some_metrics, some_parameters in chunks:
         client.log_batch(run_id, some_metrics, some_parameters)
-    if run.records:
-        _log_inputs(client, run_id, [_input(record) for record in run.records])
     for path in run.artifacts:
         client.log_artifact(run_id, str(path))
-    if run.model:
-        from tractexp.tracking.model import log_model
 
-        log_model(client, run_id, run.model)
+
+def _log_inputs_and_model(client: Any, run_id: str, run: TrackedRun) -> dict[str, dict[str, str]]:
+    """Log what a run has read and the model that it has made; by the names of the metrics that are
+    the model's, whose they are and, where one record was fitted, of what.
+    """
+    inputs = [_input(record) for record in run.records]
+    if inputs:
+        _log_inputs(client, run_id, inputs)
+    if run.model is None:
+        return {}
+    from tractexp.tracking.model import log_model
+
+    parameters = {k: _text(v) for k, v in run.parameters.items() if k.startswith("model.")}
+    whose = {"model_id": log_model(client, run_id, run.model, parameters, run.description)}
+    fitted = [one.dataset for one in inputs if one.tags[0].value == FITTED]
+    if len(fitted) == 1:
+        whose |= {"dataset_name": fitted[0].name, "dataset_digest": fitted[0].digest}
+    return dict.fromkeys(run.model_metrics, whose)
 
 
 def _log_inputs(client: Any, run_id: str, datasets: list[Any]) -> None:

@@ -30,6 +30,7 @@ SHAPES: Mapping[str, Any] = {  # kinds of the entries of a run that are no texts
     "artifacts": list,
     "records": list,
     "children": list,
+    "model_metrics": list,
     "model": (str, type(None)),
     "parent": (str, type(None)),
     "seconds": NUMBER,
@@ -42,6 +43,7 @@ INNER: Mapping[str, Any] = {  # and of what these hold
     "records": dict,
     "children": dict,
     "curves": list,
+    "model_metrics": str,
 }
 KEY = re.compile(r"[\w-]*", re.ASCII)  # what may stand in MLflow's filter
 
@@ -122,6 +124,7 @@ def _plain(run: TrackedRun, folder: Path) -> dict[str, Any]:
     content["metrics"] = {name: float(value) for name, value in run.metrics.items()}
     content["curves"] = {name: _thin(*curve) for name, curve in run.curves.items()}
     content["artifacts"] = [_relative(path, folder) for path in run.artifacts]
+    content["model_metrics"] = list(run.model_metrics)
     content["model"] = None if run.model is None else _relative(run.model, folder)
     content["records"] = [dict(record) for record in run.records]
     content["children"] = [_plain(child, folder) for child in run.children]
@@ -152,6 +155,7 @@ def _texts(content: Mapping[str, Any], *names: str) -> list[str]:
 
 
 def _run(content: Mapping[str, Any], folder: Path) -> TrackedRun:
+    content = {"model_metrics": [], **content}  # which earlier versions did not write
     key, *_ = _texts(content, "key", "experiment", "name", "status", "description")
     if not KEY.fullmatch(key):
         raise ValueError(f"its key is {key!r:.60}")

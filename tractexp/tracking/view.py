@@ -16,6 +16,8 @@ from tractexp.tracking.run import tag_experiment
 from tractexp.tracking.store import open_store, sentences
 
 KEY = "tractexp"
+# a tag, and its value: else MLflow shows an experiment as one of language models
+KIND, MODELS = "mlflow.experimentKind", "custom_model_development"
 TAG = f"mlflow.sharedViewState.{KEY}"
 SECTION = "tractexp-charts"
 RUNS = "tags.task = 'identify' and metrics.objective >= 0"  # a sweep's own run has no objective
@@ -166,7 +168,7 @@ def tags_of_new(experiment_id: str) -> dict[str, str]:
     note = (
         f"[Errors, grades and where the searches ended, as columns]({page(experiment_id, 'TABLE')})"
     )
-    return {TAG: _pack_view(table), "mlflow.note.content": note}
+    return {TAG: _pack_view(table), "mlflow.note.content": note, KIND: MODELS}
 
 
 def comparison_view(uri: str) -> str:
