@@ -61,6 +61,9 @@ def test_the_events_are_a_list_that_prints_as_a_table(dips):
     assert repr(dips[:1]).startswith("1 dip\n")
     assert "<td" in dips._repr_html_()
     assert dips.to_frame()["event"].tolist() == ["dip1", "dip2", "dip3"]
+    frame = dips[0].to_frame()
+    assert frame.columns.tolist() == ["t", "U", "P", "Q"]
+    assert frame["P"].tolist() == dips[0].record.P.tolist()
     assert repr(dips[0].record) == "dip1: 401 samples of t, U, P, Q, 0.000 to 2.000 s, 200 Hz"
 
 
@@ -82,7 +85,12 @@ def test_values_have_names(fit, dips):
     assert "95 % interval" in repr(fit)
     assert fit.headline[1:] in repr(fit)
     assert "<table>" in fit._repr_html_()
-    assert fit.to_frame()["parameter"].tolist() == list(MOTOR)
+    frame = fit.to_frame().set_index("parameter")
+    assert frame.index.tolist() == list(MOTOR)
+    assert tuple(frame.loc["M", ["lower", "upper"]]) == inertia.interval
+    assert frame.loc["M", "standard_error"] == inertia.standard_error
+    with pytest.raises(KeyError, match="no parameter is called Xprime; did you mean 'X_prime'"):
+        fit.parameters["Xprime"]
     assert fit.report().html.startswith("<!DOCTYPE html>")
     assert fit.report()._repr_html_().startswith("<iframe")
 
@@ -105,6 +113,9 @@ def test_where_nothing_is_named_there_is_no_extended_model(dips, tmp_path):
         dips[:2], effects=["speed_dependent_torque"], criteria={"adequate_p": 1.0}
     )
     assert found.names == ()
+    assert not found.gap.validate
+    with pytest.raises(UserError, match="no event was held out, so nothing is known of its closed"):
+        _ = found.gap.validate.closed
     with pytest.raises(
         UserError, match=rf"no extended model: the verdict is '{found.verdict}'.* base model"
     ):

@@ -73,12 +73,32 @@ class Gap:
     closed: float | None
 
 
+class NoGap:
+    """In place of a gap on held-out events where there are none: it is false, and whatever is asked
+    of it raises a `UserError` that says why.
+    """
+
+    def __bool__(self) -> bool:
+        return False
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        raise UserError(
+            f"no event was held out, so nothing is known of its {name}: give one to"
+            " tractexp.investigate(..., validate=...)"
+        )
+
+    def __repr__(self) -> str:
+        return "no event was held out"
+
+
 @dataclass(frozen=True)
 class Gaps:
-    """On the fitted and on the held-out events, None without any."""
+    """On the fitted and on the held-out events."""
 
     train: Gap
-    validate: Gap | None
+    validate: Gap | NoGap
     fitted_to_both: bool
 
 
@@ -219,7 +239,7 @@ class Investigation(Written):
             return Gap(Misfit(**entry["before"]), Misfit(**entry["after"]), entry["closed"])
 
         entry = self.content["gap"]
-        held = entry["validate"] and gap(entry["validate"])
+        held = gap(entry["validate"]) if entry["validate"] else NoGap()
         return Gaps(gap(entry["train"]), held, entry["fitted_to_both"])
 
     @functools.cached_property
@@ -521,7 +541,7 @@ class Discrepancy(Task, call=investigate):
         of_model = measure_model(result.fit)
         metrics = dict(of_model)
         for role in ("train", "validate"):
-            if (gap := getattr(result.gap, role)) is None:
+            if not (gap := getattr(result.gap, role)):
                 continue
             for stage in ("before", "after"):
                 misfit = vars(getattr(gap, stage))

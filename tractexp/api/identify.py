@@ -16,7 +16,7 @@ from tractexp.api.setup import Setup
 from tractexp.api.task import Job, Task
 from tractexp.blocks import Report, Table
 from tractexp.choices import set_holding
-from tractexp.errors import Stopped, UserError
+from tractexp.errors import Stopped, UserError, among
 from tractexp.identification.adequacy import Adequacy
 from tractexp.identification.result import Result, by_event, conclude, play, refuse_failed
 from tractexp.identification.search import REFUSED, History, SearchResult
@@ -112,6 +112,31 @@ class Estimates(dict[str, Estimate]):
 
     def __repr__(self) -> str:
         return "\n".join(map(repr, self.values()))
+
+    def __missing__(self, name: str) -> Estimate:
+        raise KeyError(f"no parameter is called {name}{among(name, self, 'Parameters')}")
+
+    def to_frame(self) -> Any:
+        """A pandas frame of numbers with a row for each estimate: parameter, value, unit, the ends
+        `lower` and `upper` of the 95 % interval and the standard error (nan where there is none),
+        search (where the optimizer ended), verdict.
+        """
+        import pandas
+
+        rows = [
+            {
+                "parameter": e.name,
+                "value": e.value,
+                "unit": e.unit,
+                "lower": e.interval[0] if e.interval else np.nan,
+                "upper": e.interval[1] if e.interval else np.nan,
+                "standard_error": np.nan if e.standard_error is None else e.standard_error,
+                "search": e.search,
+                "verdict": e.verdict,
+            }
+            for e in self.values()
+        ]
+        return pandas.DataFrame(rows)
 
 
 class FitDetails(NamedTuple):
@@ -309,6 +334,10 @@ class Identification(Written):
         from tractexp.report.identify import parameters
 
         return parameters(self)
+
+    def to_frame(self) -> Any:
+        """The estimates as a pandas frame of numbers: `Estimates.to_frame`."""
+        return self.parameters.to_frame()
 
     def summary(self) -> Report:
         from tractexp.report import identify

@@ -3,7 +3,7 @@ recording is.
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -45,6 +45,10 @@ class Event:
 
     def __repr__(self) -> str:
         return describe(self)
+
+    def to_frame(self) -> Any:
+        """The record as a pandas frame: `Record.to_frame`."""
+        return self.record.to_frame()
 
     @property
     def first(self) -> int:

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -106,6 +107,14 @@ class Record:
     def __repr__(self) -> str:
         span = f"{self.samples} samples of {', '.join(self.channels)}"
         return f"{self.name}: {span}, {self.t[0]:.3f} to {self.t[-1]:.3f} s, {self.rate:.0f} Hz"
+
+    def to_frame(self) -> Any:
+        """A pandas frame of what a model reads: t [s], U, P, Q and, where recorded, f [Hz] and U2,
+        per unit of `base`.
+        """
+        import pandas
+
+        return pandas.DataFrame(self.channels)
 
     @property
     def samples(self) -> int:
