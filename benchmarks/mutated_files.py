@@ -31,9 +31,9 @@ import numpy as np  # noqa: E402
 from memory import peak, reset  # noqa: E402
 
 from tractexp import files  # noqa: E402
-from tractexp.api.read import reader_of  # noqa: E402
 from tractexp.errors import UserError  # noqa: E402
 from tractexp.filetypes import cev, comtrade  # noqa: E402
+from tractexp.record import reader_of  # noqa: E402
 from tractexp.recording import Channel, Recording, Segment, StatusChannel  # noqa: E402
 
 SECONDS, MEGABYTES = 5.0, 500.0
