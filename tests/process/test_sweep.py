@@ -350,6 +350,44 @@ def test_the_job_of_a_killed_worker_is_run_again_and_its_neighbors_are_not_blame
     ]
 
 
+@needs_dask
+def test_a_worker_without_a_shared_disk_is_sent_the_records_and_returns_results_and_logs(
+    tmp_path,
+):
+    """The worker, reached by TCP, has a folder of its own: no records, and another store."""
+    from distributed import LocalCluster
+
+    away, here = tmp_path / "away", tmp_path / "here"
+    away.mkdir()
+    here.mkdir()
+    shipped = Path(__file__).parents[2] / "tractexp" / "data"
+    for ending in ("csv", "json"):
+        shutil.copy(shipped / f"tibet_50pct.{ending}", here / f"dip.{ending}")
+    with LocalCluster(n_workers=0, dashboard_address=None, protocol="tcp") as cluster:
+        command = [sys.executable, "-m", "distributed.cli.dask_worker", cluster.scheduler_address]
+        worker = subprocess.Popen(
+            [*command, "--nthreads", "1", "--no-dashboard"], cwd=away, stderr=subprocess.DEVNULL
+        )
+        try:
+            address = f"hydra.launcher.address={cluster.scheduler_address}"
+            records = ("data=csv", "data.train=[dip.csv]", "seed=0,1", "optimizer=pso")
+            done = tractexp(
+                *("-m", *QUICK, *records, "hydra/launcher=dask", address, HERE), cwd=here
+            )
+        finally:
+            worker.terminate()
+            worker.wait(60)
+    assert done.returncode == 0, done.stderr
+    assert not [path for path in away.rglob("*") if path.suffix in (".json", ".db", ".csv")]
+    assert len(results(here / "sweep")) == 2
+    job = here / "sweep" / "0"
+    assert {".hydra", "history.csv", "mlflow.json", "output.txt"} <= {p.name for p in job.iterdir()}
+    assert f"  {job / 'result.json'}\n" in (job / "output.txt").read_text()
+    parent = json.loads((here / "sweep" / "sweep.json").read_text())["run"]
+    below = f"select 1 from tags where key = 'mlflow.parentRunId' and value = '{parent}'"
+    assert len(ask(here, below)) == 2
+
+
 def test_a_job_that_kills_its_worker_every_time_is_listed_and_the_others_finish(site, tmp_path):
     """Next to each there is one in work; one of them kills its worker the first time only. By an
     earlier spelling.

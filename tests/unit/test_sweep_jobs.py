@@ -15,9 +15,8 @@ import pytest
 
 from tractexp.errors import UserError
 from tractexp.progress import FIRST_LINE
-from tractexp.sweep import job as job_module
 from tractexp.sweep import launcher, progress, recorder
-from tractexp.sweep.job import SweepJob, find_shared_overrides
+from tractexp.sweep.job import SweepJob, find_shared_overrides, read_shared_events
 from tractexp.sweep.output import printing_to
 from tractexp.sweep.placing import place
 from tractexp.sweep.status import (
@@ -274,6 +273,6 @@ def test_a_run_with_others_below_it_and_what_was_never_reached_is_read_back(tmp_
 
 def test_the_jobs_of_a_worker_read_their_records_once_but_changed_ones_again():
     data = {"name": "csv", "train": ["pkg://tractexp.data/tibet_30pct.csv"], "validate": None}
-    first = job_module._read_events(data, inputs="as they are")
-    assert job_module._read_events(dict(data), inputs="as they are") is first
-    assert job_module._read_events(data, inputs="changed") is not first
+    first = read_shared_events(data, inputs="as they are")
+    assert read_shared_events(dict(data), inputs="as they are") is first
+    assert read_shared_events(data, inputs="changed") is not first

@@ -55,6 +55,7 @@ class SweepJob:
     # its whole configuration, where a callback or a logger of the user's reads that
     hydra: Any = None
     callbacks: Any = None  # of Hydra's, where there is `hydra`
+    events: Any = None  # its records (`Events`), for a worker that cannot read them
 
     @classmethod
     def of(cls, composed: Composed, overrides: Sequence[str], folder: Path = Path()) -> "SweepJob":
@@ -137,7 +138,7 @@ def work(job: SweepJob, logs: bool = False) -> Status:
 
     What the task prints goes to `output.txt`; an unexpected error leaves its `traceback.txt`.
     """
-    _prepare(job)
+    prepare_folder(job)
     job.status.write(job.folder)
     started = time.perf_counter()
     output = files.Transcript(job.folder / OUTPUT)
@@ -192,7 +193,7 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
             "logs": logs,
             "given": job.given,
             "measured": measured,
-            "read_events": functools.partial(_read_events, inputs=job.inputs),
+            "read_events": functools.partial(_read_events, job),
         }
         perform(Job(job.config, job.choices, job.folder, parent, **about))
         select_returned_metrics(measured, job.returns)
@@ -204,7 +205,13 @@ def _run(job: SweepJob, measured: dict[str, float], logs: bool) -> str:
     return ""
 
 
-def _read_events(data: Mapping[str, Any], inputs: str) -> Any:
+def _read_events(job: SweepJob, data: Mapping[str, Any]) -> Any:
+    """The events of a choice of data as a job has them."""
+    brought = job.events is not None and data == job.config["data"]
+    return job.events if brought else read_shared_events(data, job.inputs)
+
+
+def read_shared_events(data: Mapping[str, Any], inputs: str) -> Any:
     """The events of a choice of data, which the jobs of a worker share; `inputs` is of its
     files.
     """
@@ -216,7 +223,7 @@ def _read_once(data: str, inputs: str) -> Any:
     return read_events(json.loads(data))
 
 
-def _prepare(job: SweepJob) -> None:
+def prepare_folder(job: SweepJob) -> None:
     """An empty folder with the files a Hydra job has in `.hydra`."""
     import yaml
 

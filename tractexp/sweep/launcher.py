@@ -4,7 +4,7 @@ cluster.
 
 import atexit
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ from tractexp.compat.hydra_plugins import NAMESPACE
 from tractexp.errors import UserError, check_choice, check_range
 from tractexp.sweep import status
 from tractexp.sweep.compose import Composer
+from tractexp.sweep.elsewhere import pack_job, unpack_job, work_elsewhere
 from tractexp.sweep.job import SweepJob, work
 from tractexp.sweep.live import LivePage, keep_live
 from tractexp.sweep.parent import parent_run
@@ -29,6 +30,7 @@ from tractexp.workers import Workers, backends
 
 # backends whose workers would inherit a half-done import of another thread
 FORKING = ("multiprocessing",)
+DISTANT = ("dask",)  # backends whose workers may be other computers
 SPELLINGS = {"processes": "loky"}  # of a backend in earlier versions
 
 
@@ -113,7 +115,7 @@ class Cores(Launcher):
         callbacks = self.hydra_context.callbacks
         jobs = [job if job.hydra is None else replace(job, callbacks=callbacks) for job in jobs]
         ends: dict[Path, Status] = {}
-        results = self.workers.results(work, jobs, self.tries, _trace)
+        results = self._results(jobs)
         waiting = {job.folder for job in jobs}  # to be logged
         try:
             with progress(jobs) as note, contextlib.closing(results):
@@ -128,6 +130,22 @@ class Cores(Launcher):
             raise
         return [ends[job.folder] for job in jobs]
 
+    def _results(
+        self, jobs: Sequence[SweepJob]
+    ) -> Generator[tuple[SweepJob, Status | None], None, None]:
+        """Each job and how it ended, as they are done; None where its worker was killed each time.
+
+        What workers of a cluster have done comes through it: they may share no disk with this one.
+        """
+        if self.workers.backend not in DISTANT:
+            yield from self.workers.results(work, jobs, self.tries, _trace)
+            return
+        packed = [pack_job(job) for job in jobs]
+        results = self.workers.results(work_elsewhere, packed, self.tries)
+        with contextlib.closing(results):
+            for job, delivery in results:
+                yield job, delivery and unpack_job(job, delivery)
+
     def _killed(self, job: SweepJob) -> Status:
         """The end of a job that killed its worker each time."""
         message = (
@@ -135,6 +153,7 @@ class Cores(Launcher):
             " memory for it?"
         )
         end = replace(job.status, status=FAILED, message=message)
+        job.folder.mkdir(parents=True, exist_ok=True)
         end.write(job.folder)
         return end
 
