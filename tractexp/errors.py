@@ -152,9 +152,11 @@ def check_range(
     setting's full key.
     """
     if value is not None and (not low <= value <= high or math.isinf(value)):
-        limits = [f"at least {low:g}"] * (low > float("-inf")) + [f"at most {high:g}"] * (
-            high < float("inf")
-        )
+        limits = []
+        if low > float("-inf"):
+            limits.append(f"at least {low:g}")
+        if high < float("inf"):
+            limits.append(f"at most {high:g}")
         raise UserError(
             f"{setting(where)}={value} is out of range: it must be"
             f" {' and '.join(limits) or 'finite'}"

@@ -113,7 +113,7 @@ def change(before: float | None, after: float | None) -> str:
 
 def count_noun(number: int, noun: str) -> str:
     """1 dip, 2 dips."""
-    return f"{number} {noun}{'s' * (number != 1)}"
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def share(value: float | None) -> str:

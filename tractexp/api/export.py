@@ -160,7 +160,9 @@ def _base_sentence(load: "Identified", base: str, ratio: float, guessed: bool) -
         else ", the record's own base"
     )
     said = f"per unit of {load.power:.6g} MVA and {load.voltage:.6g} kV{which}"
-    return said + f"; 1 pu of the file is taken for {POWER:g} MVA, for no power is given" * guessed
+    if guessed:
+        return f"{said}; 1 pu of the file is taken for {POWER:g} MVA, for no power is given"
+    return said
 
 
 @plugin

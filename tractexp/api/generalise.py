@@ -53,7 +53,10 @@ class Generalised(Written):
         """What is told of each dip: residuals and relative errors of P and Q, and in waveforms of
         the currents.
         """
-        return (*ERRORS, *["epsilon_i"] * all("epsilon_i" in row for row in self.residuals))
+        return (
+            *ERRORS,
+            *(["epsilon_i"] if all("epsilon_i" in row for row in self.residuals) else []),
+        )
 
     @property
     def medians(self) -> list[dict[str, Any]]:

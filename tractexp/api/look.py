@@ -248,8 +248,8 @@ def look(*sources: Any, progress: Progress = None, **settings: Any) -> Look:
         if together := _join_given(distinct, settings):
             distinct, settings = [together["path"]], {**settings, "join": together["join"]}
         for k, source in enumerate(distinct, start=1):
-            of = f"{k} of {len(distinct)}: " * (len(distinct) > 1)
-            stage(f"reading {of}{source if isinstance(source, str) else source.name}")
+            count = f"{k} of {len(distinct)}: " if len(distinct) > 1 else ""
+            stage(f"reading {count}{source if isinstance(source, str) else source.name}")
             views.append(_view(source, settings))
         stage("measuring the quality of the channels")
         content = files.plain({"files": [_content(view) for view in views]})

@@ -70,7 +70,11 @@ class Sampled(Written):
             f" autocorrelation time {c['autocorrelation']:.0f} steps"
         )
         short = "note: the chain is shorter than 50 autocorrelation times; raise steps"
-        return self.fit.summary().add(self.table()).text(effort, *[short] * (not c["converged"]))
+        return (
+            self.fit.summary()
+            .add(self.table())
+            .text(effort, *([short] if not c["converged"] else []))
+        )
 
     def report(self) -> Report:
         from tractexp.report import posterior

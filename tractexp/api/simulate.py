@@ -75,7 +75,8 @@ class Simulation(Written):
 
     def table(self) -> Table:
         columns = ["event", "U min", "P min", "P max", "Q min", "Q max", "epsilon_p", "epsilon_q"]
-        columns += ["epsilon_i"] * any(one.epsilon_i is not None for one in self.responses)
+        if any(one.epsilon_i is not None for one in self.responses):
+            columns.append("epsilon_i")
         return Table(columns, [one.row for one in self.responses], self.model.model.title)
 
     def summary(self) -> Report:

@@ -225,7 +225,7 @@ class Report:
 
     def charts(self, charts: Sequence["Chart"], caption: str = "") -> "Report":
         self.add(Charts([ChartBlock(chart) for chart in charts]))
-        return self.text(*[caption] * bool(caption))
+        return self.text(caption) if caption else self
 
     def figure(self, path: Path, caption: str = "") -> "Report":
         """An SVG file. Raises `UserError` where it is not there or not SVG."""

@@ -52,9 +52,11 @@ def fragment(report: Report) -> str:
 
     The notebook typesets what stands between dollars: equations only, whatever a name holds.
     """
-    parts = [f"<p><b>{quoting.html(report.title)}</b></p>"] * bool(report.title)
-    parts += [f"<p>{quoting.html(report.lead)}</p>"] * bool(report.lead)
-    parts = [*map(_untypeset, parts)]
+    parts = []
+    if report.title:
+        parts.append(_untypeset(f"<p><b>{quoting.html(report.title)}</b></p>"))
+    if report.lead:
+        parts.append(_untypeset(f"<p>{quoting.html(report.lead)}</p>"))
     for block in report.blocks:
         if isinstance(block, Table):
             parts.append(_untypeset(_table(block.brief)))

@@ -8,12 +8,12 @@ from tractexp.blocks import block as blocks
 
 
 def markdown(report: Report) -> str:
-    parts = [f"# {quoting.markdown(report.title)}"] + [quoting.markdown(report.lead)] * bool(
-        report.lead
-    )
-    return (
-        "\n\n".join([*parts, *(part for block in report.blocks for part in _parts(block))]) + "\n"
-    )
+    parts = [f"# {quoting.markdown(report.title)}"]
+    if report.lead:
+        parts.append(quoting.markdown(report.lead))
+    for block in report.blocks:
+        parts.extend(_parts(block))
+    return "\n\n".join(parts) + "\n"
 
 
 def _parts(block: blocks.Block) -> Iterator[str]:

@@ -118,7 +118,7 @@ def explanations(
         steps.append(tests)
     if len(steps) == 1:
         tests = with_families(base, first, refits, seed)
-        steps += [tests] * (tests is not first)
+        steps += [tests] if tests is not first else []
     return Explanations(base, tuple(steps), refits)
 
 

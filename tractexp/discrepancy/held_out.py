@@ -17,6 +17,7 @@ from tractexp.inference.noise_in_quiet import QuietNoise, white
 from tractexp.inference.records import Records
 from tractexp.noise import Noise
 from tractexp.record import Event
+from tractexp.wording import count_noun
 
 # of what an effect explains: no formula is exact to this, and a fault of the measurement mends it
 MENDED = 0.05
@@ -56,9 +57,7 @@ def judge_held_out(
         if is_silent and exceeds_noise(both):
             base = replace(base, p_of_all=both.p_left(explained.base.local_minima, seed))
         return replace(evidence, base=base)
-    context.effort.say(
-        f"judging {len(adequate)} explanation{'s' * (len(adequate) > 1)} on the held-out events"
-    )
+    context.effort.say(f"judging {count_noun(len(adequate), 'explanation')} on the held-out events")
     judged = {row.fit.names: row for row in assess(both, find_adequate(evidence, criteria), seed)}
     return replace(evidence, rows=tuple(judged.get(row.fit.names, row) for row in evidence.rows))
 

@@ -273,7 +273,8 @@ class Findings:
         held_out = shapes[0].event in {event.record.name for event in self.withheld}
         base |= self.nearest is None
         whose = "the base model misses this" if base else "the nearest candidates miss this"
-        return f"{whose}{' on the held-out events' * held_out}: {shapes[0]}"
+        where = " on the held-out events" if held_out else ""
+        return f"{whose}{where}: {shapes[0]}"
 
     def _left(self, overlays: Sequence[Overlay]) -> list[Remainder]:
         noise, level = self.last.noise, self.context.criteria.false_alarms

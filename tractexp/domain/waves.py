@@ -146,11 +146,10 @@ class WaveDomain(Domain):
             if judged
             else "and not judged: these offsets and edges would pass for them"
         )
-        return (
-            origin
-            + f" Faults of the measurement ({join_words(faults)}) are free in every fit, {how}."
-            * bool(faults)
-        )
+        if not faults:
+            return origin
+        free = f"Faults of the measurement ({join_words(faults)}) are free in every fit, {how}."
+        return f"{origin} {free}"
 
     def planned(
         self, shape: "DipShape", name: str, t: np.ndarray, course: np.ndarray, start: int, end: int

@@ -109,4 +109,4 @@ def doubts(result: Result, point: OperatingPoint | None) -> list[str]:
         if verdict.startswith(BOUND) and name not in result.nuisances
     ]
     held = f"{', '.join(resting)} {'is' if len(resting) == 1 else 'are'} held by a bound alone"
-    return [*([point.doubt] if point and point.doubt else []), *[held] * bool(resting)]
+    return [*([point.doubt] if point and point.doubt else []), *([held] if resting else [])]

@@ -469,7 +469,7 @@ def _states(report: EventReport, words: list[str]) -> list[StatusChannel]:
     held, rows = "", []
     for word in words:
         held = word if re.fullmatch(r"[0-9A-Fa-f]+", word) else held
-        rows.append(bytes.fromhex(held + "0" * (len(held) % 2)))
+        rows.append(bytes.fromhex(held if len(held) % 2 == 0 else f"{held}0"))
     if not names:
         return []
     width = -(-len(names) // 8)

@@ -148,13 +148,13 @@ def _spread_merged_cells(above: list[str], names: Sequence[str]) -> list[str]:
     repeated = {name for name in names if name and names.count(name) > 1}
     if not repeated or sum(map(bool, above)) < 2:
         return above
-    above = [*above, *[""] * (len(names) - len(above))]
+    padded = _pad_texts(above, len(names))
     filled, last = list[str](), ""
-    for text, name in zip(above, names, strict=False):
+    for text, name in zip(padded, names, strict=False):
         last = text or last
         filled.append(last if name in repeated or text else "")
     return filled
 
 
 def _pad_texts(texts: Sequence[str], width: int) -> tuple[str, ...]:
-    return (*texts, *[""] * (width - len(texts)))
+    return (*texts, *("",) * (width - len(texts)))

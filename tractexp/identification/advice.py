@@ -37,7 +37,8 @@ def advise(
         for why in better_domain(uncertainty.likelihood.problem)
     ]
     sentences = [f"leave {name} out, or free what differs there by model.per_event" for name in odd]
-    search = build_again_command("task=discrepancy", *[f"data={data}"] * bool(data))
+    settings = ["task=discrepancy", f"data={data}"] if data else ["task=discrepancy"]
+    search = build_again_command(*settings)
     if adequacy.grade is Grade.WRONG_MODEL:
         missing = f"find what is missing: {search}; or choose another model: tractexp list model"
         return [*better, missing, *sentences]

@@ -80,8 +80,8 @@ class Region:
         if not len(values):
             return []
         down, up = int(values.argmin()), int(values.argmax())
-        return [down] * bool(values[down] < low - SMALLEST_STEP) + [up] * bool(
-            values[up] > high + SMALLEST_STEP
+        return ([down] if values[down] < low - SMALLEST_STEP else []) + (
+            [up] if values[up] > high + SMALLEST_STEP else []
         )
 
 

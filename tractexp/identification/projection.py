@@ -111,7 +111,9 @@ class Projection:
         moved = moved * coefficients[: len(poles)]
         moved = base @ (base.conj().T @ moved) - moved
         return _parts(
-            np.concatenate([moved * poles.real] + [1j * moved] * (not self.ports[0].series), axis=1)
+            np.concatenate(
+                [moved * poles.real] + ([1j * moved] if not self.ports[0].series else []), axis=1
+            )
         )
 
 
@@ -123,7 +125,7 @@ def basis(port: Port, poles: Complex) -> Complex:
     """
     columns = [of_pole(port, pole) for pole in poles]
     if not port.series:
-        columns += [np.gradient(port.u, port.step), *[port.u] * (port.steady is None)]
+        columns += [np.gradient(port.u, port.step), *([port.u] if port.steady is None else [])]
     return np.array(columns, dtype=complex).reshape(len(columns), len(port.u)).T
 
 

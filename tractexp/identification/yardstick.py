@@ -39,10 +39,8 @@ def yardstick(fits: Sequence[Fit], error: Mapping[str, Any]) -> dict[str, Any]:
     own, judged = model_errors(played), slice(split, None) if split < len(fits) else slice(split)
     left, model = (e["held_out"]["value"] if e["held_out"] else e["value"] for e in (own, error))
     ratio = model / left if left > 0 else None
-    on = (
-        f"on the dip{'s' * (len(fits[judged]) > 1)} it"
-        f" {'never saw' if own['held_out'] else 'was fitted to'}"
-    )
+    dips = "dips" if len(fits[judged]) > 1 else "dip"
+    on = f"on the {dips} it {'never saw' if own['held_out'] else 'was fitted to'}"
     sentence = _sentence(ratio, model, len(box.poles), on) + _of_currents(
         fits[judged], played[judged]
     )

@@ -96,9 +96,10 @@ class Catalogue:
     def spoken(self, name: str) -> str:
         """An effect as a sentence tells it: by its textbook name, and what differs from that."""
         differs = self[name].effect.differs
-        return (
-            f"{self.family(name)}{',' * differs.startswith('but')} {differs}" if differs else name
-        )
+        if not differs:
+            return name
+        comma = "," if differs.startswith("but") else ""
+        return f"{self.family(name)}{comma} {differs}"
 
     @functools.cached_property
     def effects(self) -> list[Effect]:

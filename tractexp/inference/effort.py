@@ -96,13 +96,11 @@ class Effort:
                 if now - self._said >= SILENCE:
                     # parts of parts come and go
                     far = [str(part) for part in self._parts if part.total > 1][:1]
-                    far += [f"{self.total} simulations"] * (self.total > counted)
+                    if self.total > counted:
+                        far.append(f"{self.total} simulations")
                     self._said, counted = now, self.total
-                    self._tell(
-                        ": ".join(
-                            [f"  still {self._step or 'at work'}", *[", ".join(far)] * bool(far)]
-                        )
-                    )
+                    reached = f": {', '.join(far)}" if far else ""
+                    self._tell(f"  still {self._step or 'at work'}{reached}")
 
         watcher = Thread(target=watch, name="progress", daemon=True)
         watcher.start()

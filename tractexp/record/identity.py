@@ -88,7 +88,7 @@ class Identity:
     def parts(self) -> list[str]:
         """What is known of it, in words."""
         said = [
-            f"{key} {text}" * (key != "file") or text for key, text in self.source.items() if text
+            text if key == "file" else f"{key} {text}" for key, text in self.source.items() if text
         ]
         for base, name in ((self.base, "per unit of"), (self.given_base or {}, "in the file of")):
             sizes = [
@@ -96,7 +96,8 @@ class Identity:
                 for size in ("voltage_kV", "power_MVA")
                 if base.get(size)
             ]
-            said += [f"{name} {' and '.join(sizes)}"] * bool(sizes)
+            if sizes:
+                said.append(f"{name} {' and '.join(sizes)}")
         return said
 
     @property

@@ -135,7 +135,7 @@ def convert_base(event: Event, ratio: float, own: OwnBase) -> Event:
             original_base=record.file_base,
             digest=digest(record),
             more=by.per_unit(record.more),
-            notes=(*record.notes, *[note] * (record.original_base is None)),
+            notes=(*record.notes, *([note] if record.original_base is None else [])),
             **arrays,
         )
     )

@@ -260,7 +260,7 @@ class Record:
                 " is usual"
             )
         more = int(np.count_nonzero(long)) - 1
-        places = f" here and at {more} more place{'s' * (more > 1)}" if more else ""
+        places = f" here and at {more} more {'places' if more > 1 else 'place'}" if more else ""
         raise UserError(
             f"{self.where}: {place(i)}: t advances by {steps[i - 1]:g} s where {usual:g} s is"
             " usual: rows are "

@@ -42,7 +42,8 @@ def candidates(page: Report, findings: Findings) -> None:
     if finite:
         page.chart(_bars(findings, finite, labels), _bars_caption(findings, finite))
     for sentence in (why_not_the_most_helpful(findings), describe_untestable_beside(findings)):
-        page.text(*[sentence] * bool(sentence))
+        if sentence:
+            page.text(sentence)
     entries = [
         [
             f"{labels[r]}: {join_words(r.names)}" if len(r.names) > 1 else labels[r],
@@ -83,7 +84,7 @@ def _bars(
     findings: Findings, rows: Sequence[CandidateRow], labels: Mapping[CandidateRow, str]
 ) -> Chart:
     colors = [COLORS.get(r.status, REFITTED if r.how == FITTED else ESTIMATED) for r in rows]
-    entries = [f"{r.drop:.{int(r.drop < 100)}f}{f', {r.status}' * (r.standing < 2)}" for r in rows]
+    entries = [_describe_bar(row) for row in rows]
     chance = chance_level(findings)
     chart = Chart("deviance", [""], pixels=130 + BAR * len(rows))
     chart.bars("", [labels[r] for r in rows], [r.drop for r in rows], colors, hover=entries)
@@ -92,11 +93,22 @@ def _bars(
     )
 
 
+def _describe_bar(row: CandidateRow) -> str:
+    """What the pointer over a bar shows."""
+    drop = f"{row.drop:.{0 if row.drop >= 100 else 1}f}"
+    return f"{drop}, {row.status}" if row.standing < 2 else drop
+
+
 def _bars_caption(findings: Findings, rows: Sequence[CandidateRow]) -> str:
-    colors = ["green: added"] * bool(findings.names)
-    colors += ["orange: tied with it"] * any(r.status == TIED for r in rows)
-    colors += ["blue: refitted"] * any(r.how == FITTED and r.standing == 2 for r in rows)
-    colors += ["gray: estimated in one linear step"] * any(r.how == ONE_STEP for r in rows)
+    colors = []
+    if findings.names:
+        colors.append("green: added")
+    if any(r.status == TIED for r in rows):
+        colors.append("orange: tied with it")
+    if any(r.how == FITTED and r.standing == 2 for r in rows):
+        colors.append("blue: refitted")
+    if any(r.how == ONE_STEP for r in rows):
+        colors.append("gray: estimated in one linear step")
     chance = f"{chance_level(findings):.1f}, what chance gives to the most helpful of all in"
     return (
         f"By how much each alone lowers the deviance of the base model ({', '.join(colors)})."

@@ -51,7 +51,7 @@ def summary(findings: "Outcome") -> Report:
     names = alternatives(content["name_sets"])
     report = Report().text(f"verdict: {findings.verdict.upper()} {names}".rstrip())
     grade, which = content["adequacy"], "extended" if findings.names else "base"
-    report.items([findings.reason, *findings.sizes, *[left] * bool(left), *findings.proposed])
+    report.items([findings.reason, *findings.sizes, *([left] if left else []), *findings.proposed])
     report.items(
         [f"the {which} model is graded {grade['grade'].replace('_', ' ')}: {grade['sentence']}"]
     )
@@ -59,7 +59,8 @@ def summary(findings: "Outcome") -> Report:
     if places := content["where"]:
         loudest, others = places[0], len(places) - 1
         span = f"{loudest['start']:.3f} to {loudest['end']:.3f} s"
-        more = f", and {others} more stretch{'es' * (others > 1)}" if others else ""
+        stretches = "stretches" if others > 1 else "stretch"
+        more = f", and {others} more {stretches}" if others else ""
         report.text(
             f"where: {loudest['channel']} of {loudest['event']}, {span}, {loudest['share']:.0%} of"
             f" the excess{more}"
@@ -228,7 +229,9 @@ def _size(error: float | None) -> str:
 
 def _off(misfit: Mapping[str, Any]) -> list[str]:
     """How far off curves are, as a table has it."""
-    shown = ["epsilon_p", "epsilon_q", *["epsilon_i"] * (misfit.get("epsilon_i") is not None)]
+    shown = ["epsilon_p", "epsilon_q"]
+    if misfit.get("epsilon_i") is not None:
+        shown.append("epsilon_i")
     chi2 = misfit["chi2_per_sample"]
     return [*(epsilon(misfit[name]) for name in shown), "" if chi2 is None else f"{chi2:.3f}"]
 

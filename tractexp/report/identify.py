@@ -68,7 +68,10 @@ def summary(fit: "Identification") -> Report:
     ]
     notes = [f"note: {note}" for note in result.uncertainty.get("notes", ())]
     start = [text for event in result.events if (text := starts_at_rest(event))]
-    report = Report().text(*[as_sentence(fit.headline)] * bool(fit.headline)).add(parameters(fit))
+    report = Report()
+    if fit.headline:
+        report.text(as_sentence(fit.headline))
+    report.add(parameters(fit))
     report.text(*machine(fit), *fit.structures, *filter(None, [result.on_given_base()])).add(
         errors(fit)
     )
@@ -78,7 +81,7 @@ def summary(fit: "Identification") -> Report:
         *correlations(fit),
         *start,
         result.acceptance,
-        *[headline(result)] * bool(verdicts),
+        *([headline(result)] if verdicts else []),
         *(f"  {sentence}" for sentence in poor),
         *notes,
         *filter(None, [fit.end_of_search]),
@@ -88,7 +91,7 @@ def summary(fit: "Identification") -> Report:
 
 def machine(fit: "Identification") -> list[str]:
     """How the load divides before the dip, in a sentence; [] where its model has no motor."""
-    return [*[str(fit.operating_point)] * (fit.operating_point is not None), *network(fit)]
+    return [*([str(fit.operating_point)] if fit.operating_point is not None else []), *network(fit)]
 
 
 def network(fit: "Identification") -> list[str]:
@@ -117,7 +120,7 @@ def yardstick(fit: "Identification") -> list[str]:
     """
     poles = fit.result.linear_network.get("poles")
     beside = f" The network's poles: {poles_in_words(poles)}." if poles else ""
-    return [as_sentence(fit.yardstick) + beside] * bool(fit.yardstick)
+    return [as_sentence(fit.yardstick) + beside] if fit.yardstick else []
 
 
 def starts_at_rest(event: dict[str, Any]) -> str:

@@ -39,7 +39,7 @@ def poles(fit: "NetworkFit") -> Table:
 
 def numbers(fit: "NetworkFit") -> Table:
     """What networks of fewer and of more poles leave."""
-    keys = ["model_error", *["held_out"] * bool(fit.validate)]
+    keys = ["model_error", "held_out"] if fit.validate else ["model_error"]
     rows = [
         [row["poles"], *(in_percent(row[key]) for key in keys)] for row in fit.content["by_poles"]
     ]
@@ -73,6 +73,6 @@ def report(fit: "NetworkFit") -> Report:
     page.heading("How this page was made")
     origin = [
         ["tractexp", fit.content["tractexp_version"]],
-        *[["command", command()]] * bool(command()),
+        *([["command", command()]] if command() else []),
     ]
     return page.table(["", ""], origin, words=(1,))

@@ -204,7 +204,7 @@ def _describe_entry(entry: Mapping[str, Any]) -> list[str]:
     if entry["channels"]:
         numbers = [*entry["voltages"], *entry["currents"]]
         named = ", ".join(f"{n} {c}" for n, c in zip(numbers, entry["channels"], strict=True))
-        reverse = ", current reversed" * entry["reverse_current"]
+        reverse = ", current reversed" if entry["reverse_current"] else ""
         sentences.append(f"Channels: {named}; connected as {entry['connection']}{reverse}.")
     if text := size(entry):
         when = "Before the dip" if any(e["worth"] for e in entry["events"]) else "At first"

@@ -180,8 +180,10 @@ def _of_waves(
     single = len(shown.phasors[0].V) == 1
     sequences = "|U| [kV]" if single else "U seq. [kV]"
     panels = ["u [kV]", "i [kA]", "U RMS [kV]", "I RMS [kA]", sequences, "P, Q [MW]", "f [Hz]"]
-    panels += ["status"] * bool(states)
-    heights = [*HEIGHTS, *[TRACE * len(states)] * bool(states)]
+    heights = list(HEIGHTS)
+    if states:
+        panels.append("status")
+        heights.append(TRACE * len(states))
     chart = Chart("t [s]", panels, heights=heights, pixels=round(150 + 110 * sum(heights)))
     for segment in recording.waveforms():
         _waves(chart, recording, shown, segment, every, span)

@@ -34,12 +34,13 @@ def summary(content: Entry) -> Report:
     """
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
-        held = [count_noun(len(entry["channels"]), "channel")] * bool(entry["channels"])
+        held = f"; {count_noun(len(entry['channels']), 'channel')}" if entry["channels"] else ""
         page.text(
-            "; ".join([_about(entry), *held]),
+            f"{_about(entry)}{held}",
             *(f"  note: {note}" for note in entry["notes"][:NOTES]),
         )
-        page.text(*[f"  note: {len(entry['notes']) - NOTES} more"] * (len(entry["notes"]) > NOTES))
+        if len(entry["notes"]) > NOTES:
+            page.text(f"  note: {len(entry['notes']) - NOTES} more")
         buses = _buses(entry["feeders"])
         page.text(*(f"  {_bus(entry, number, bus)}" for number, bus in enumerate(buses, 1)))
         if buses:
@@ -50,7 +51,8 @@ def summary(content: Entry) -> Report:
         page.items(
             list(dict.fromkeys(said for feeder in entry["feeders"] for said in feeder["said"]))
         )
-        page.text(*[f"  {explain_unnamed(entry)}"] * (not buses and len(content["files"]) > 1))
+        if not buses and len(content["files"]) > 1:
+            page.text(f"  {explain_unnamed(entry)}")
     return page
 
 
@@ -59,18 +61,21 @@ def build_full_report(content: Entry) -> Report:
     page = Report().text(_answer(content["files"])).items(unfitted.sentences(content["files"]))
     for entry in content["files"]:
         page.text(_about(entry), *(f"  note: {n}" for n in entry["notes"]))
-        page.add(*[channels(entry)] * bool(entry["channels"]))
+        if entry["channels"]:
+            page.add(channels(entry))
         for feeder in entry["feeders"]:
             numbers = ", ".join(map(str, (*feeder["voltages"], *feeder["currents"])))
             wired = f" (channels {numbers}, {feeder['connection']})" if numbers else ""
             page.text(f"load {feeder['name']}{wired}: {size(feeder) or 'nothing measured'}")
             page.items([*feeder["why"], *feeder["said"]])
-            page.add(*[events(feeder)] * bool(feeder["events"])).items(
-                [quiet(feeder)] * (not feeder["events"])
-            )
+            if feeder["events"]:
+                page.add(events(feeder))
+            else:
+                page.items([quiet(feeder)])
             if feeder["command"]:
                 page.text("  to fit it:").code(feeder["command"])
-        page.text(*([f"  {explain_unnamed(entry)}"] * (not entry["feeders"])))
+        if not entry["feeders"]:
+            page.text(f"  {explain_unnamed(entry)}")
     return page
 
 
@@ -215,8 +220,10 @@ def _bus(entry: Entry, number: int, bus: Sequence[Entry]) -> str:
     """The voltages of a bus, their size, and what happened to them, in one line."""
     names = ", ".join(entry["channels"][k]["name"] for k in bus[0]["voltages"])
     happened = [_event(event) for event in _of_voltage(bus)]
-    more = [f"{len(happened) - MOST_LINE_EVENTS} more"] * (len(happened) > MOST_LINE_EVENTS)
-    events = join_words([*happened[:MOST_LINE_EVENTS], *more]) or (
+    told = happened[:MOST_LINE_EVENTS]
+    if len(happened) > MOST_LINE_EVENTS:
+        told.append(f"{len(happened) - MOST_LINE_EVENTS} more")
+    events = join_words(told) or (
         quiet(bus[0]) if any(feeder["loaded"] or not feeder["currents"] for feeder in bus) else ""
     )
     parts = filter(None, [names, figure(bus[0]["U"], 4, bus[0]["units"][0]), events])

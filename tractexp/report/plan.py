@@ -65,7 +65,7 @@ def summary(content: Mapping[str, Any]) -> Report:
     for k, event in enumerate(content["best_events"], start=1):
         narrower = f", intervals narrower by {event['gain']:.0%}" if k > 1 else ""
         report.text(f"event {k} of the best: {event['name']}{narrower}")
-    return report.text(*[content["other_events"]] * bool(content["other_events"]))
+    return report.text(content["other_events"]) if content["other_events"] else report
 
 
 def scan(content: Mapping[str, Any], label: str, rows: int = ROWS) -> Table:
@@ -176,7 +176,7 @@ def marks(low: float, high: float) -> list[float]:
 def _add_question_section(page: Report, planned: Planned) -> None:
     """The question, the dip and the parameters it is planned at."""
     needed, problem = planned.needed, planned.problem
-    stands = ", which is known as well as M," * (needed.parameter == INERTIA)
+    stands = ", which is known as well as M," if needed.parameter == INERTIA else ""
     page.heading("What was asked").items(
         [
             f"How deep must a dip be for {needed.parameter}{stands} to be known within ±"

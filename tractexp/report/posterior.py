@@ -37,9 +37,9 @@ def report(uncertainty: Uncertainty, drawn: PosteriorSample, grade: str = "") ->
         " emcee's ensemble.",
     )
     sentences = (
-        [as_sentence(grade)] * bool(grade)
+        ([as_sentence(grade)] if grade else [])
         + [_agreement(uncertainty, drawn)]
-        + [SCATTER] * (not uncertainty.exact)
+        + ([SCATTER] if not uncertainty.exact else [])
     )
     page.verdict(
         *sentences,

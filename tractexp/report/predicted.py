@@ -42,6 +42,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         " events by least"
         " squares. Dashed: what a name, or each of the best sets that have it, undercuts.",
     )
+    best = f" The best of the {len(every)} that were fitted." if len(rows) < len(every) else ""
     page.table(
         ["candidate", "model error, held out", "error divided by", "status", "size"],
         [
@@ -59,7 +60,7 @@ def add_prediction_section(page: Report, findings: Findings) -> None:
         f" It is ahead of any rival of its size or smaller by {criteria.ahead:g}, and no term of"
         " the library is"
         " ahead of it by that, all by more than chance (blocks that share the response, left out in"
-        " turn)." + f" The best of the {len(every)} that were fitted." * (len(rows) < len(every)),
+        f" turn).{best}",
         words=(0, 3, 4),
     )
 

@@ -48,8 +48,8 @@ def report(scan: Profiles, grade: str = "") -> Report:
         "One parameter is held at value after value, all others are fitted again each time.",
     )
     says = {profile.name: meaning(scan, profile) for profile in scan.profiles}
-    sentences = [*[SCATTER] * (not uncertainty.exact), *_where(says), *_poor(verdicts)]
-    graded = [as_sentence(grade)] * bool(grade)
+    sentences = [*([SCATTER] if not uncertainty.exact else []), *_where(says), *_poor(verdicts)]
+    graded = [as_sentence(grade)] if grade else []
     page.verdict(
         *graded,
         *sentences,

@@ -53,10 +53,8 @@ def summary(content: Mapping[str, Any]) -> Report:
         for row in unread
     ]
     report.text(*(f"  not read: {sentence}" for sentence in named[:MOST_UNREADABLE_FILES]))
-    report.text(
-        *[f"  and {len(unread) - MOST_UNREADABLE_FILES} more, in the table"]
-        * (len(unread) > MOST_UNREADABLE_FILES)
-    )
+    if len(unread) > MOST_UNREADABLE_FILES:
+        report.text(f"  and {len(unread) - MOST_UNREADABLE_FILES} more, in the table")
     return _best(report, content)
 
 
@@ -135,10 +133,10 @@ def _best(report: Report, content: Mapping[str, Any]) -> Report:
     best = content["informative"]
     if not best:
         return report
+    first, *others = best
     narrower = [
-        f", which narrows the intervals by {each['gain']:.0%}" * bool(k)
-        for k, each in enumerate(best)
+        f"{each['event']}, which narrows the intervals by {each['gain']:.0%}" for each in others
     ]
     report.verdict("most informative together, the best first:", kind="good")
-    report.items([f"{each['event']}{more}" for each, more in zip(best, narrower, strict=True)])
+    report.items([first["event"], *narrower])
     return report.text("to fit them together:").code(content["command"])

@@ -75,7 +75,7 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
         if any(re.search(rf"\b{c}\b", f) for f in functions)
     ]
     relevant = ", ".join(f'"{PREFIX}{s.name}": {s.relevant!r}' for s in term.balance.sizes)
-    sites = ", sites" * any("sites." in f for f in functions)
+    sites = ", sites" if any("sites." in f for f in functions) else ""
     headline = quoting.python(f"{term.words[:1].upper()}{term.words[1:]}")
     text = HEAD.format(
         headline=headline,
@@ -89,7 +89,7 @@ def source(term: Term, values: Mapping[str, float], records: str) -> str:
         + CLASS.format(
             headline=headline,
             latex=quoting.python(term.latex),
-            time=TIME * term.exogenous,
+            time=TIME if term.exogenous else "",
             records=quoting.python(records),
             parameters="\n".join(_declare_parameters(term, values)),
             relevant=f"{{{relevant}}}",

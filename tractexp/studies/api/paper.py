@@ -81,7 +81,8 @@ class PaperResult(Written):
         )
 
     def summary(self) -> Report:
-        return Report().add(self.table()).text(*[f"in {self.seconds:.0f} s"] * bool(self.seconds))
+        page = Report().add(self.table())
+        return page.text(f"in {self.seconds:.0f} s") if self.seconds else page
 
     def report(self) -> Report:
         return self._report

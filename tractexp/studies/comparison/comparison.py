@@ -203,7 +203,7 @@ def _ranks(variants: Sequence[Variant], least: float) -> tuple[Ranks | None, lis
     if len(seeds) < LEAST_SEEDS:
         return None, [
             f"The variants were not ranked: they have {len(seeds) or 'no'}"
-            f" seed{'s' * (len(seeds) != 1)} in common, "
+            f" {'seed' if len(seeds) == 1 else 'seeds'} in common, "
             f"and Friedman's test with its critical difference needs at least {LEAST_SEEDS}."
         ]
     table = np.array([[max(v.objectives[seed], least) for v in variants] for seed in seeds])

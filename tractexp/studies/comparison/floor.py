@@ -15,6 +15,7 @@ from tractexp.inference.least_squares import MOST_NUMBERS, descend
 from tractexp.inference.problem import Problem
 from tractexp.parameter import best_distinct, even
 from tractexp.studies.comparison.runs import SearchRun
+from tractexp.wording import count_noun
 
 FLOOR_SHARE = 0.01  # what ends within this share of the floor has reached it
 # starts: the best of a scatter that differ by so much of a range somewhere
@@ -110,7 +111,7 @@ def floor_of(
     best = min((run for run in runs if run.finished), key=lambda run: run.objective)
     if polished is not None:
         n = len(polished.reached)
-        ends = f"where {n} run{'s' * (n > 1)} ended and from " if n else ""
+        ends = f"where {count_noun(n, 'run')} ended and from " if n else ""
         source = (
             f"the lowest that least squares reach from {ends}{polished.starts} starts all over the"
             " bounds"

@@ -119,7 +119,7 @@ def code_of(result: Mapping[str, Any]) -> str:
     ones.
     """
     version, commit = result.get("tractexp_version", ""), result.get("commit", "")
-    dirty = "-dirty" * commit.endswith("-dirty")
+    dirty = "-dirty" if commit.endswith("-dirty") else ""
     return f"{version} at {commit[:8]}{dirty}" if version and commit else version
 
 

@@ -86,7 +86,9 @@ def on_records(
         )
         for name in _order_names(names, ranks)
     }
-    several = f"{len(comparisons)} records, " if len(comparisons) > 1 else ""
+    problems = f"{len(seeds)} seeds"
+    if len(comparisons) > 1:
+        problems = f"{len(comparisons)} records, {problems} each"
     data = [comparison.gathered.variants[0].runs[0].data for comparison in comparisons.values()]
     names_of = (
         dict(zip(comparisons, data, strict=True))
@@ -95,7 +97,7 @@ def on_records(
     )
     return Overall(
         terms,
-        f"{several}{len(seeds)} seeds{' each' * bool(several)}",
+        problems,
         "record and seed",
         tuple(names_of.values()),
         "median objective over the floor",

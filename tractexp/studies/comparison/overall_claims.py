@@ -40,8 +40,10 @@ def of_switches(overall: Overall) -> str:
     if overall.ablation is None:
         return ""
     effects = [of_effect(effect) for effect in overall.ablation.effects]
-    where = [overall.terms] * bool(overall.terms) + ["BBOB"] * overall.share
-    return ", ".join(where) + ": " * bool(where) + "; ".join(effects) + "."
+    terms = [overall.terms, "BBOB" if overall.share else ""]
+    where = ", ".join(filter(None, terms))
+    said = "; ".join(effects)
+    return f"{where}: {said}." if where else f"{said}."
 
 
 def of_effect(effect: SwitchEffect) -> str:
@@ -91,7 +93,7 @@ def of_agreement(several: Several) -> str:
 
 
 def _help(names: list[str]) -> str:
-    return f"{join_words(names)} help{'s' * (len(names) == 1)}"
+    return f"{join_words(names)} {'helps' if len(names) == 1 else 'help'}"
 
 
 def sentences(several: Several) -> list[str]:

@@ -145,7 +145,8 @@ def _speed(page: Report, comparison: Comparison) -> None:
     ]
     few = len(comparison.summaries) <= charts.TOGETHER
     for by in ("simulations", "iterations"):
-        caption = f"Best objective by {by}: the median{' and the quartiles' * few}."
+        lines = "the median and the quartiles" if few else "the median"
+        caption = f"Best objective by {by}: {lines}."
         costs = " An iteration may cost several populations." if by == "iterations" else ""
         _curves(
             page,

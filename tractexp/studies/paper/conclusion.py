@@ -40,9 +40,12 @@ def _model(parts: Mapping[str, list[Claim]]) -> str:
     where = {"table2": ("the fitted", 2), "table4": ("the milder", 0), "table5": ("the deeper", 0)}
     verdicts = {dip: parts[part][k].verdict for part, (dip, k) in where.items() if part in parts}
     good = [dip for dip, verdict in verdicts.items() if verdict == CONFIRMED]
-    said = [
-        f"describes {join_words(good)} dip with errors below 5 %, with every seed and reading tried"
-    ] * bool(good)
+    said = []
+    if good:
+        said.append(
+            f"describes {join_words(good)} dip with errors below 5 %,"
+            " with every seed and reading tried"
+        )
     said += [
         f"of {dip} dip this {verdict}" if verdict.startswith(DEPENDS) else f"not {dip} dip"
         for dip, verdict in verdicts.items()
