@@ -6,7 +6,7 @@ from ._operators import gate, ramp
 
 # how sharp a level is, and the voltage over U_0 below which a dip has begun
 LEVEL, BEGUN = 0.0015, 0.96
-WIDTH = 0.02  # of a change: how rounded its corners are
+CHANGE_CORNER = 0.02  # of a change: how rounded its corners are
 
 
 def since(eq, returned, name):
@@ -31,7 +31,7 @@ def changes(eq, returned, name, more_P, more_Q, wait, duration, static):
     Where `static` is 1 all but the motors change.
     """
     time = since(eq, returned, name)
-    begun, before = (ramp((t - wait) / duration, WIDTH) for t in (time, 0))
+    begun, before = (ramp((t - wait) / duration, CHANGE_CORNER) for t in (time, 0))
     way = eq.define(f"changed_{name}", begun - before, "r")
     if eq.waves:
         places = ((sites.current, sites.motor_current, more_P),)

@@ -5,7 +5,7 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from ._operators import seen_late, smaller
 
 SOURCE = "WECC composite load model (power electronic load); RAMSES vfd_load"
-WIDTH = 0.02  # of the power: how rounded the corner at the limit is
+CURRENT_LIMIT_CORNER = 0.02  # of the power: how rounded the corner at the limit is
 
 
 @plugin
@@ -41,7 +41,7 @@ class ConstantPowerConverter(Effect):
     confused_with = ("voltage_dependent_power_limit", "dc_link_lag")
 
     def edit(self, eq, converter_share, current_limit, control_delay):
-        held = lambda u: smaller(1, u / current_limit, WIDTH)  # noqa: E731
+        held = lambda u: smaller(1, u / current_limit, CURRENT_LIMIT_CORNER)  # noqa: E731
         u = eq[sites.static_voltage]
         delayed = seen_late(eq, u, control_delay)
         power = eq.P_s0 * held(delayed) / held(1) * u / delayed

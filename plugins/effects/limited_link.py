@@ -7,7 +7,7 @@ from ._operators import larger, smaller
 SOURCE = (
     "Hu et al. 2017, IEEE Trans. Power Electronics (four-quadrant converters), before linearisation"
 )
-WIDTH = 0.02  # of the current: how rounded the corner at its limit is
+LINK_CORNER = 0.02  # of the current: how rounded the corner at its limit is
 EMPTY = 0.6  # of the dc voltage: below it the drives behind the link are resistances
 
 
@@ -55,11 +55,15 @@ class LimitedLink(Effect):
         u, v = eq[sites.static_voltage], eq.lag("link_voltage", "v_l")
         demand = 1 + link_storage / link_time * (1 - v)
         current = eq.define(
-            "link_current", smaller(demand, link_most, WIDTH) / smaller(1, link_most, WIDTH), "i_l"
+            "link_current",
+            smaller(demand, link_most, LINK_CORNER) / smaller(1, link_most, LINK_CORNER),
+            "i_l",
         )
-        square = lambda v: v**2 / larger(v**2, EMPTY**2, WIDTH)  # noqa: E731
+        square = lambda v: v**2 / larger(v**2, EMPTY**2, LINK_CORNER)  # noqa: E731
         eq.moves(
-            v, (u * current - square(v) / square(1)) / (link_storage * larger(v, 0.1, WIDTH)), 1
+            v,
+            (u * current - square(v) / square(1)) / (link_storage * larger(v, 0.1, LINK_CORNER)),
+            1,
         )
         drawn = eq.P_s0 * u * current
         eq.edit(sites.P_static, lambda P: (1 - link_share) * P + link_share * drawn)

@@ -10,11 +10,11 @@ from ._operators import bent, evaluate_law, ramp
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 KNOT, BEND = 0.5, 0.1  # of the way from full power to none
-WIDTH = 0.02  # of the power: how rounded the corners are
+POWER_CORNER = 0.02  # of the power: how rounded the corners are
 
 
 def _compute_allowed_power(u, full, off, bend, rest):
-    return ramp(1 - bent((full - u) / (full - off), (KNOT,), (bend,), BEND), WIDTH, rest)
+    return ramp(1 - bent((full - u) / (full - off), (KNOT,), (bend,), BEND), POWER_CORNER, rest)
 
 
 @plugin

@@ -5,7 +5,7 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from ._operators import ramp
 
 SOURCE = "WECC 2014, generic converter model REGC_A: low-voltage current limit, recovery ramp"
-WIDTH = 0.02  # of the current: how rounded the corners are
+RAMP_CORNER = 0.02  # of the current: how rounded the corners are
 
 
 @plugin
@@ -49,7 +49,7 @@ class RampedCurrent(Effect):
         import sympy
 
         u = eq[sites.static_voltage]
-        allowed = lambda u: ramp((u - ramp_none) / (ramp_full - ramp_none), WIDTH)  # noqa: E731
+        allowed = lambda u: ramp((u - ramp_none) / (ramp_full - ramp_none), RAMP_CORNER)  # noqa: E731
         current = eq.lag("ramped_current", "i_r")
         aim = eq.define("current_allowed", allowed(u) / allowed(1), "m")
         eq.moves(current, sympy.Min((aim - current) / ramp_fall, ramp_rate), 1)

@@ -5,8 +5,8 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from ._operators import larger, smaller
 
 SOURCE = "Mohan, Undeland and Robbins 2003, Power Electronics, sections 5-3 and 5-6"
-WIDTH = 0.005  # of the current: how rounded the corner at the limit is
-TINY = 1e-12  # pu, for a static load without reactive power
+RECTIFIER_CORNER = 0.005  # of the current: how rounded the corner at the limit is
+SMALLEST_STATIC_Q = 1e-12  # pu, for a static load without reactive power
 
 
 def _current(u, k, limit):
@@ -15,8 +15,8 @@ def _current(u, k, limit):
     """
     import sympy
 
-    most = sympy.sqrt(larger(u**2 - 4 * k * (1 - k), 0, WIDTH / 10))
-    return smaller((u - most) / (2 * k), limit, WIDTH)
+    most = sympy.sqrt(larger(u**2 - 4 * k * (1 - k), 0, RECTIFIER_CORNER / 10))
+    return smaller((u - most) / (2 * k), limit, RECTIFIER_CORNER)
 
 
 def _powers(u, k, i):
@@ -76,4 +76,7 @@ class Rectifier(Effect):
             lambda P_s: (1 - rectified_share) * P_s + rectified_share * eq.P_s0 * P / P_0,
         )
         scale = rectified_share * eq.P_s0 / P_0
-        eq.edit(sites.Q_static, lambda Q_s: Q_s + scale * (Q - Q_0 * Q_s / (eq.Q_s0 + TINY)))
+        eq.edit(
+            sites.Q_static,
+            lambda Q_s: Q_s + scale * (Q - Q_0 * Q_s / (eq.Q_s0 + SMALLEST_STATIC_Q)),
+        )

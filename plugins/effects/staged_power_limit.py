@@ -9,7 +9,7 @@ from ._relay import stages
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
 STAGES = 3
-WIDTH = 0.02  # of the power: how rounded the corner at the limit of the current is
+STAGE_CORNER = 0.02  # of the power: how rounded the corner at the limit of the current is
 
 
 @plugin
@@ -85,6 +85,6 @@ class StagedPowerLimit(Effect):
         gone = stages(
             eq, staged_first, staged_last, staged_delay, waits, staged_margin, staged_ramp, "stage"
         )
-        allowed = lambda u, gone: smaller(1 - gone, staged_limit * u, WIDTH)  # noqa: E731
+        allowed = lambda u, gone: smaller(1 - gone, staged_limit * u, STAGE_CORNER)  # noqa: E731
         power = eq.P_s0 * allowed(eq[sites.static_voltage], gone) / allowed(1, 0)
         eq.edit(sites.P_static, lambda P: (1 - staged_share) * P + staged_share * power)

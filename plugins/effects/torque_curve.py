@@ -7,7 +7,8 @@ from tractexp.extend import Curve, Effect, Parameter, plugin, sites
 from ._operators import bent, evaluate_law
 
 SOURCE = "Milano 2010, ch. 15; WECC composite load model (Etrq)"
-KNOTS, WIDTH = (0.08, 0.2), 0.04  # of 1 - (omega/omega_0)^2: at 96 and 89 % of the speed before
+KNOTS = (0.08, 0.2)  # of 1 - (omega/omega_0)^2: at 96 and 89 % of the speed before
+TORQUE_CORNER = 0.04  # of the same: how rounded the corners there are
 
 
 @plugin
@@ -49,12 +50,12 @@ class TorqueCurve(Effect):
     def edit(self, eq, curve_share, torque_bend_1, torque_bend_2):
         speed = (eq.omega + eq.omega_n) / (eq.before(eq.omega) + eq.omega_n)
         slower = eq.define("speed_fall", 1 - speed**2, r"\Delta\omega^2")
-        law = 1 - curve_share * bent(slower, KNOTS, (torque_bend_1, torque_bend_2), WIDTH)
+        law = 1 - curve_share * bent(slower, KNOTS, (torque_bend_1, torque_bend_2), TORQUE_CORNER)
         eq.edit(sites.load_torque, lambda T: T * law)
 
     def curve(self, curve_share, torque_bend_1, torque_bend_2):
         speed = np.linspace(0.75, 1.0, 51)
         y = 1 - curve_share * evaluate_law(
-            lambda x: bent(x, KNOTS, (torque_bend_1, torque_bend_2), WIDTH), 1 - speed**2
+            lambda x: bent(x, KNOTS, (torque_bend_1, torque_bend_2), TORQUE_CORNER), 1 - speed**2
         )
         return Curve(speed, y, "speed over that before", "load torque over that before")

@@ -5,7 +5,7 @@ from tractexp.extend import Effect, Parameter, plugin, sites
 from ._operators import ramp, seen_late
 
 SOURCE = "EN 50388-1, limitation of current or power at low line voltage"
-WIDTH = 0.02  # of the power: how rounded the corners are
+VOLTAGE_LIMIT_CORNER = 0.02  # of the power: how rounded the corners are
 
 
 @plugin
@@ -46,7 +46,7 @@ class VoltageDependentPowerLimit(Effect):
     confused_with = ("constant_power_converter", "undervoltage_trip")
 
     def edit(self, eq, limited_share, full_level, off_level, limit_delay):
-        allowed = lambda u: ramp((u - off_level) / (full_level - off_level), WIDTH)  # noqa: E731
+        allowed = lambda u: ramp((u - off_level) / (full_level - off_level), VOLTAGE_LIMIT_CORNER)  # noqa: E731
         u = eq[sites.static_voltage]
         delayed = seen_late(eq, u, limit_delay)
         power = eq.P_s0 * allowed(delayed) / allowed(1) * u / delayed

@@ -21,7 +21,7 @@ import numpy as np
 
 andes: Any = importlib.import_module("andes")  # of which no type checker need know
 
-SYSTEM = 100.0  # MVA
+GRID_MVA = 100.0  # MVA
 SOURCE_BUS = -1  # a number that no load's bus has
 SOURCE = {
     "Bus": [{"idx": SOURCE_BUS, "name": "source", "Vn": 110.0}],
@@ -57,9 +57,9 @@ def load_case(tables, frequency):
     case = {name: [dict(row) for row in rows] for name, rows in SOURCE.items()}
     (bus,), (line,) = tables["Bus"], case["Line"]
     ratings = [row["Sn"] for name in ("Motor3", "Motor5") for row in tables.get(name, ())]
-    ratings += [abs(complex(row["p0"], row["q0"])) * SYSTEM for row in tables.get("PQ", ())]
+    ratings += [abs(complex(row["p0"], row["q0"])) * GRID_MVA for row in tables.get("PQ", ())]
     line["bus2"], line["Vn1"], line["Vn2"] = bus["idx"], bus["Vn"], bus["Vn"]
-    line |= {key: line[key] * min(1.0, SYSTEM / max(ratings)) for key in ("r", "x")}
+    line |= {key: line[key] * min(1.0, GRID_MVA / max(ratings)) for key in ("r", "x")}
     for name in ("Bus", "Slack", "GENCLS"):
         case[name][0]["Vn"] = bus["Vn"]
     for name, rows in tables.items():
@@ -115,7 +115,7 @@ def play(tables, dip):
     system.TDS.callpert = follow
     config = system.TDS.config
     config.tf, config.tstep, config.fixt, config.shrinkt = (
-        dip["step"] * (len(voltage) - 1),
+        (len(voltage) - 1) * dip["step"],
         dip["step"],
         1,
         0,

@@ -14,7 +14,7 @@ from tractexp.extend.formats import Format, Simulated, TCircuit, dip, lock_file
 
 from ._motor import SMALLEST, restore_load, terms
 
-SYSTEM = 100.0  # MVA, the system base of ANDES
+SYSTEM_MVA = 100.0  # MVA, the system base of ANDES
 STEP = 1e-3  # s
 LONGEST = 300.0  # s: its first run on a machine generates code, and one process at a time does
 GENERATED = Path.home() / ".andes"  # the folder of that code
@@ -74,9 +74,9 @@ class Andes(Format):
                 load.omega_n,
                 *(row.get(key) for key in ("rs", "xs", "xm", "rr1", "xr1", "rr2", "xr2")),
             )
-            motor = circuit, row["Hm"], row["c1"] * SYSTEM / load.power
+            motor = circuit, row["Hm"], row["c1"] * SYSTEM_MVA / load.power
         for row in tables.get("PQ", ()):
-            static = tuple(SYSTEM / load.power * row[key] for key in ("p0", "q0"))
+            static = tuple(SYSTEM_MVA / load.power * row[key] for key in ("p0", "q0"))
         law = {}
         for row in tables.get("FLoad", ()):
             law |= {"p_v": row["ap"], "q_v": row["aq"], "p_f": row["bp"], "q_f": row["bq"]}
@@ -105,7 +105,7 @@ class Andes(Format):
         }
         response = respond(python, text, dip_settings)
         speed = np.gradient(response["angle"], STEP, edge_order=2)
-        P, Q = (SYSTEM / load.power * response[power] for power in "PQ")
+        P, Q = (SYSTEM_MVA / load.power * response[power] for power in "PQ")
         return Simulated(f"ANDES {response['version']}", STEP, response["U"], speed, P, Q)
 
     def _motor(self, load):
@@ -122,7 +122,7 @@ class Andes(Format):
             "rr1": c.R_1,
             "xr1": c.X_1,
             "Hm": load.inertia,
-            "c1": load.values["T_m"] * load.power / SYSTEM,
+            "c1": load.values["T_m"] * load.power / SYSTEM_MVA,
             "c2": 0.0,
             "c3": 0.0,
         }
@@ -132,7 +132,7 @@ class Andes(Format):
 
     def _static(self, load):
         scale, before, static = (
-            load.power / SYSTEM,
+            load.power / SYSTEM_MVA,
             load.before,
             load.result.model["static"]["name"],
         )

@@ -13,7 +13,7 @@ import numpy as np
 
 from tractexp.extend import Box, Evaluate, Iterative, check_choice, check_range
 
-TINY = 1e-50  # epsilon of Eq. (13), the value in the SSA authors' code
+SMALLEST_GAP = 1e-50  # epsilon of Eq. (13), the value in the SSA authors' code
 EXP_MAX = 700.0  # exp overflows beyond it; any box ends long before
 
 
@@ -66,7 +66,7 @@ def perceive(
     """
     beta = rng.standard_normal(x.shape)
     k = rng.uniform(-1.0, 1.0, (len(x), 1))
-    away = x + k * np.abs(x - worst[0]) / (f - worst[1] + TINY)[:, None]
+    away = x + k * np.abs(x - worst[0]) / (f - worst[1] + SMALLEST_GAP)[:, None]
     return np.where((f > best[1])[:, None], best[0] + beta * np.abs(x - best[0]), away)
 
 

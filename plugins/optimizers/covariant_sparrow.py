@@ -10,7 +10,8 @@ from tractexp.extend import Box, Evaluate, Iterative, check_range, plugin
 
 from ._sparrow import Flock
 
-FLAT = 1e-12  # relative spread of the objectives of a flock that has nothing left to compare
+# relative spread of the objectives of a flock that has nothing left to compare
+FLAT_OBJECTIVE = 1e-12
 
 
 def differences(x: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -109,4 +110,4 @@ class CovariantSparrow(Iterative):
 
     def _collapsed(self, flock: Flock, box: Box) -> bool:
         narrow = (np.ptp(flock.x, axis=0) <= self.collapse * box.width).all()
-        return bool(narrow or np.ptp(flock.f) <= FLAT * np.abs(flock.f).max())
+        return bool(narrow or np.ptp(flock.f) <= FLAT_OBJECTIVE * np.abs(flock.f).max())
