@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import symmetries
 import uncertainty as study
+from scipy import stats
 from scipy.linalg import cholesky, toeplitz
 from scipy.signal import lfilter
 from written_out import dense, dense_normal
@@ -103,6 +104,10 @@ def test_whiteness_and_normality_speak_when_they_should_and_are_silent_when_not(
     assert ljung_box(ar1(rng, 800, 0.4)).says == "colored"
     assert jarque_bera(rng.standard_normal(800)).says == "normal"
     assert jarque_bera(rng.standard_t(3, 800)).says == "not normal"
+    skewed = rng.exponential(size=60)
+    theirs = stats.jarque_bera(skewed)
+    ours = jarque_bera(skewed)
+    assert (ours.statistic, ours.p) == pytest.approx((theirs.statistic, theirs.pvalue), rel=1e-9)
     rejected = [ljung_box(rng.standard_normal(300)).p < 0.05 for _ in range(400)]
     assert 0.02 < np.mean(rejected) < 0.09
 

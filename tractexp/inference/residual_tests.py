@@ -47,6 +47,8 @@ def ljung_box(rows: np.ndarray, fitted: int = 0) -> ResidualTest:
 def jarque_bera(rows: np.ndarray) -> ResidualTest:
     """Whether `rows` (n,) have the skewness and kurtosis of a normal distribution. Source: Jarque
     and Bera 1987.
+
+    As `scipy.stats.jarque_bera`, without the second that importing it takes.
     """
     from scipy.special import chdtrc
 
