@@ -101,6 +101,42 @@ def record():
     )
 
 
+def of_1991(path):
+    """The configuration of a record of 1999 as the first edition has it: no year, no ratios, no
+    multiplier; the dates with the month first.
+    """
+    lines = path.read_text().splitlines()
+    channels = [",".join(line.split(",")[:10]) for line in lines[2:8]]
+    head = [",".join(lines[0].split(",")[:2]), lines[1], *channels]
+    return "\n".join([*head, *(line for line in lines[8:-1])]) + "\n"
+
+
+def phase_tables(made, folder):
+    """A table of voltage and current for each phase."""
+    t = made.segments[0].t
+    return [
+        files.write(
+            folder / f"ev_{mark}.csv",
+            "t,U [kV],I [A]\n"
+            + "".join(
+                f"{x:.7f},{u:.6g},{1e3 * i:.6g}\n"
+                for x, u, i in zip(
+                    t, made.channels[k].values(), made.channels[k + 3].values(), strict=True
+                )
+            ),
+        )
+        for k, mark in enumerate("ABC")
+    ]
+
+
+def pack(path, members):
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        for member in members:
+            archive.writestr(member.name, member.read_bytes())
+    return files.write(path, out.getvalue())
+
+
 def event_report(made, every=1):
     """The record as an SEL relay's compressed event report; filtered, of 4 samples a cycle, with
     `every` 8.
@@ -238,6 +274,12 @@ def originals(folder):
             made, folder / f"{kind.lower()}.cff", kind
         )
     formats["COMTRADE 1999"] = comtrade.write(made, folder / "old.cfg", "BINARY", 1999)
+    formats["COMTRADE 1991"] = [
+        files.write(folder / "first.cfg", of_1991(folder / "old.cfg")),
+        files.write(folder / "first.dat", (folder / "old.dat").read_bytes()),
+    ]
+    formats["zip of a record"] = [pack(folder / "r.zip", formats["COMTRADE BINARY"])]
+    formats["zip of one file a phase"] = [pack(folder / "phases.zip", phase_tables(made, folder))]
     formats["SEL CEV"] = [files.write(folder / "report.cev", event_report(made))]
     formats["SEL CEV filtered"] = [
         files.write(folder / "filtered.cev", event_report(made, every=8))

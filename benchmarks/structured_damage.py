@@ -44,6 +44,7 @@ def damage(path, rng):
     ways = {
         ".pqd": _pqdif,
         ".xlsx": _archive,
+        ".zip": _directory,
         ".ods": _archive,
         ".cfg": _header,
         ".cff": _header,
@@ -149,6 +150,32 @@ def _archive(data, rng):
         for each, content in members.items():
             book.writestr(each, content)
     return out.getvalue(), f"{way} of {name}"
+
+
+FIELDS = {  # {field of an entry in an archive's table of contents: (its place, its bytes)}
+    "flags": (8, 2),
+    "method": (10, 2),
+    "sum": (16, 4),
+    "packed size": (20, 4),
+    "size": (24, 4),
+    "length of the name": (28, 2),
+    "length of what follows": (30, 2),
+    "place": (42, 4),
+}
+
+
+def _directory(data, rng):
+    """A field of an entry of a .zip, the counts at its end, or one of its files."""
+    if rng.random() < 0.4:
+        return _archive(data, rng)
+    entries = [k for k in range(len(data)) if data[k : k + 4] == b"PK\x01\x02"]
+    end = data.rindex(b"PK\x05\x06")
+    fields = {name: (choose(rng, entries) + at, size) for name, (at, size) in FIELDS.items()}
+    fields |= {"count": (end + 10, 2), "bytes": (end + 12, 4), "begin": (end + 16, 4)}
+    name = choose(rng, sorted(fields))
+    at, size = fields[name]
+    value = choose(rng, [*INTEGERS, len(data), at]) % (1 << 8 * size)
+    return data[:at] + value.to_bytes(size, "little") + data[at + size :], f"{name} {value}"
 
 
 def _header(data, rng):

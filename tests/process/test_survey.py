@@ -232,7 +232,7 @@ def test_a_file_that_kills_its_process_is_a_row_and_the_others_are_read(field):
         "surveying.rows_of = deadly\n"
         "if __name__ == '__main__':\n"
         "    names = [f'day {k % 2}/e{k}.cfg' for k in range(6)]\n"
-        "    found = dict(surveying.looked(Path(sys.argv[1]), names, 2))\n"
+        "    found = dict(surveying.look_at_files(Path(sys.argv[1]), names, 2))\n"
         "    print(len(found), sorted(n for n, rows in found.items() if rows[0]['kind'] == 'not"
         " read'))\n"
         "    print(found['day 1/e3.cfg'][0]['why'])\n"
