@@ -204,6 +204,21 @@ def test_a_channel_that_two_files_have_is_there_once(tmp_path):
     assert "channel 'UA' of b.cfg is that of an earlier file" in seen.files.rows[0]["notes"]
 
 
+@pytest.mark.parametrize("names", [("U", "I"), ("bay U", "bay I"), ("U{}", "I{}")])
+def test_a_record_of_each_phase_is_one_of_three(tmp_path, names):
+    paths = [
+        write_comtrade(
+            tmp_path / f"bay7_{mark}.cfg", [k, 3 + k], [name.format(mark) for name in names]
+        )
+        for k, mark in enumerate("ABC")
+    ]
+    check_load(look(*paths)[1])
+    archive = pack(tmp_path / "e.zip", *tmp_path.glob("bay7*"))
+    check_load(look(archive)[1])
+    (event,) = tractexp.read(str(archive))
+    assert event.depth == pytest.approx(0.4, abs=0.01)
+
+
 def test_events_of_one_load_are_not_joined(tmp_path):
     """Two events, each with its own voltages and currents, are two records."""
     names = ["UA", "UB", "UC", "IA", "IB", "IC"]

@@ -73,6 +73,24 @@ def parts(*spans):
     return np.concatenate(times), segments
 
 
+def test_parts_with_gaps_have_each_a_reference_of_their_own(tmp_path):
+    """Three triggered parts of one file, hours apart, at other voltages of the network."""
+    t = np.arange(0, 1, 1 / RATE)
+    levels, depths = (1.0, 0.93, 1.06), (0.3, 0.2, 0.25)
+    lines = ["t,UA [kV],UB [kV],UC [kV],IA [kA],IB [kA],IC [kA]"]
+    for k, (level, depth) in enumerate(zip(levels, depths, strict=True)):
+        values = np.array([x for _, _, x in station(t, [(0.5, 0.2, depth)])]) * level
+        rows = np.vstack([t + 3600 * k, values]).T
+        lines += [",".join(f"{x:.9g}" for x in row) for row in rows]
+    path = tmp_path / "parts.csv"
+    path.write_text("\n".join(lines) + "\n")
+    seen, _ = look(str(path))
+    assert [row["kind"] for row in seen.events] == ["dip"] * 3
+    assert [row["depth"] for row in seen.events] == pytest.approx(depths, abs=0.005)
+    for event, level, depth in zip(tractexp.read(str(path)), levels, depths, strict=True):
+        assert (event.U0, event.depth) == pytest.approx((level, depth), abs=0.005)
+
+
 @pytest.mark.parametrize(
     "spans",
     [

@@ -7,6 +7,7 @@ import pytest
 
 import tractexp
 from tractexp.filetypes import comtrade
+from tractexp.filetypes.columns import role
 from tractexp.recording import Channel, Recording, Segment
 
 ORDERS = ["ABC", "RST", "RYB", "RWB", "UVW", ("L1", "L2", "L3"), "АВС"]
@@ -144,3 +145,17 @@ def test_where_no_name_tells_the_power_or_the_nominal_voltage_does(tmp_path):
     assert any(
         "110 kV is near a nominal voltage, and times sqrt(3) near none" in note for note in notes
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        *((name, True) for name in ("Leiterspannung", "Vline", "線間電圧 RS", "전압 L1-L2")),
+        *((name, True) for name in ("Phase-to-phase voltage", "Gerilim L1-L2", "U12 avg")),
+        *((name, False) for name in ("Vph", "Uphase", "VPN", "相電圧 R", "Tension simple V1")),
+        *((name, False) for name in ("Tensión simple L1", "Sternspannung L1", "A相电压")),
+    ],
+)
+def test_names_in_other_languages_say_line_or_ground(name, line):
+    meant = role(name, "kV", "rst" if "R" in name else "abc")
+    assert (meant.quantity, meant.line) == ("U", line)

@@ -147,6 +147,17 @@ WORDS: Mapping[str, str] = {
             "uavg",
             "vavg",
             "spannung",
+            "leiterspannung",
+            "vline",
+            "uline",
+            "vph",
+            "uph",
+            "vphase",
+            "uphase",
+            "vpn",
+            "upn",
+            "電圧",
+            "전압",
             "напряжение",
             "напряж",
             "电压",
@@ -251,9 +262,31 @@ PHASES: Mapping[str, str] = {
 }
 # line voltages that are the opposite of those of `data.columns`
 BACKWARD = {"ba": "ab", "cb": "bc", "ac": "ca"}
-LINE = frozenset(("ll", "ul", "ull", "vll", "u1l", "line", "pp"))
+LINE = frozenset(
+    ("ll", "ul", "ull", "vll", "u1l", "line", "pp", "vline", "uline", "leiterspannung")
+)
 GROUND = frozenset(
-    ("ln", "lg", "uln", "vln", "ulg", "vlg", "ph", "an", "bn", "cn", "ag", "bg", "cg")
+    (
+        "vph",
+        "uph",
+        "vphase",
+        "uphase",
+        "vpn",
+        "upn",
+        "ln",
+        "lg",
+        "uln",
+        "vln",
+        "ulg",
+        "vlg",
+        "ph",
+        "an",
+        "bn",
+        "cn",
+        "ag",
+        "bg",
+        "cg",
+    )
 )
 COMPOUND = re.compile(
     r"(u|v|i|p|q)(l1l2|l2l3|l3l1|l12|l23|l31|l1|l2|l3|ab|bc|ca|ba|cb|ac|an|bn|cn|ag|bg|cg|12|23|31|pos|neg|zero|ps|ns"

@@ -26,7 +26,9 @@ SAID = (  # what is said in words, and the word that stands for it
         " ln ",
     ),
     (r"линейн\w*|междуфазн\w*|compuesta|compos[ée]e|verkettet\w*", " ll "),
-    (r"фазн\w*|strang\w*|stern", " ln "),
+    (r"фазн\w*|strang\w*|stern|(?<=tension )simple|(?<=tensión )simple", " ln "),
+    ("線間電圧", " ll 電圧 "),
+    ("相電圧", "相 ln 電圧 "),
     ("线电压", " ll 电压 "),
     ("相电压", "相 ln 电压 "),
 )
