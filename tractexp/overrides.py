@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from tractexp import files, quoting
-from tractexp.errors import UserError
+from tractexp.errors import UserError, among
 from tractexp.model_file import is_model_path
 
 # settings that take names of their own
@@ -26,6 +26,12 @@ MISSING = re.compile(r"(^|[=\[,{:\s])\?\?\?($|[\],}\s])")
 MODEL = "model"  # the group
 OPTIONS = ("-", "~", "+", "")  # what begins an argument that needs no value
 CONFIG_FOLDER = ("--config-dir", "-cd")
+# Hydra's options: those followed by a value, the one that may be, and those that are not
+TAKING = (*CONFIG_FOLDER, "--config-name", "-cn", "--config-path", "-cp", "--cfg", "-c")
+TAKING = (*TAKING, "--package", "-p", "--experimental-rerun")
+INFO = ("--info", "-i")
+FLAGS = ("--multirun", "-m", "--run", "-r", "--resolve", "--help", "-h", "--hydra-help")
+FLAGS = (*FLAGS, "--version", "--shell-completion", "-sc")
 DEEPEST_BRACKETS = 20  # brackets within one another
 NEEDED = (
     "seed",
@@ -64,7 +70,34 @@ def overrides(arguments: Iterable[str]) -> list[str]:
         else:
             _check(argument, group, value)
             result.append(override(argument))
-    return result
+    return _put_options_first(result)
+
+
+def _put_options_first(arguments: Iterable[str]) -> list[str]:
+    """The arguments with Hydra's options before all settings, for it reads none between them.
+
+    Raises `UserError` for an option that there is not.
+    """
+    options: list[str] = []
+    settings: list[str] = []
+    awaited = False  # whether an option still takes a value
+    for argument in arguments:
+        option = argument.partition("=")[0]
+        if awaited and not (options[-1] in INFO and "=" in argument):
+            options.append(argument)
+            awaited = False
+        elif not argument.startswith("-"):
+            settings.append(argument)
+            awaited = False
+        elif option in (*TAKING, *INFO, *FLAGS):
+            options.append(argument)
+            awaited = argument in (*TAKING, *INFO)
+        else:
+            raise UserError(
+                f"{option:.80}: there is no such option{among(option, (*TAKING, *INFO, *FLAGS))};"
+                " settings are KEY=VALUE"
+            )
+    return [*options, *settings]
 
 
 def _refuse_word(word: str) -> None:

@@ -21,6 +21,12 @@ KINDS = {
 PYTHON = re.compile(
     r"Config\b|Exception|Error:|\btype '|\b(?:dict|list|tuple|int|str|float|None\w*)\b|__"
 )
+# choices that other packages bring, and the extra by which they come
+EXTRAS = {
+    "hydra/sweeper=optuna": "optuna",
+    "hydra/launcher=submitit_slurm": "slurm",
+    "hydra/launcher=submitit_local": "slurm",
+}
 LONGEST_REPEATED_VALUE = 80  # characters of a value that are repeated
 
 
@@ -102,11 +108,10 @@ def _describe_missing_choice(error: Any) -> str:
     options = [o for o in error.options or () if not o.startswith("_")]
     if not group or not options:
         return _plain(error)
-    where = elsewhere(group, choice)
-    return (
-        f"{group}={choice}: there is no such"
-        f" choice{where or describe_available(group, choice, options)}"
-    )
+    where = elsewhere(group, choice) or describe_available(group, choice, options)
+    if extra := EXTRAS.get(f"{group}={choice}"):
+        where = f" before it is installed: pip install 'tractexp[{extra}]'"
+    return f"{group}={choice}: there is no such choice{where}"
 
 
 def _sentence(error: BaseException) -> str:
@@ -151,7 +156,15 @@ SENTENCES = {
         " {0}.yaml in it"
     ),
     r"Additional config directory '(.*)' not found": "-cd {0}: there is no such folder",
-    r"Primary config directory not found": (
+    r"Ambiguous value for argument '([^=]*)=(.*)'": (
+        "{0}={1} has several values; a sweep over them is written tractexp -m {0}={1}, one list of"
+        " them {0}=[{1}]"
+    ),
+    r"Interpolation key '(.*)' not found": "${{{0}}} refers to a setting that there is not",
+    r"Error locating target '(.*)', set env": (
+        "{0} cannot be imported; _target_ names a class, as package.module.Class"
+    ),
+    r"Primary config (?:directory|module '.*') not found": (
         "-cp names no folder; -cd FOLDER adds configurations of yours to those that are here"
     ),
     r"Could not delete from config\. '(.*)' does not exist": "~{0}: there is no such setting to"

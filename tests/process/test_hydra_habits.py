@@ -73,6 +73,19 @@ def test_a_sweep_of_one_job_ends_with_its_page(tmp_path):
     assert str(page) in done.stdout
 
 
+def test_options_may_stand_between_and_behind_settings(tmp_path):
+    done = run_command(
+        *QUICK, ONE, "--multirun", HERE, "seed=3", "-cd", str(tmp_path), "budget=90", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    config = (tmp_path / "sweep" / "0" / ".hydra" / "config.yaml").read_text()
+    assert "budget: 90" in config
+    told = run_command("seed=3", "--info", "config", "budget=90", cwd=tmp_path)
+    assert (told.returncode, told.stderr) == (0, "")
+    shown = run_command("seed=3", "--cfg", "job", "--package", "optimizer", cwd=tmp_path)
+    assert (shown.returncode, "name: issa" in shown.stdout) == (0, True)
+
+
 def test_folders_of_jobs_are_named_as_asked_and_found_again(tmp_path):
     named = ("-m", *QUICK, ONE, HERE, "hydra.sweep.subdir=${optimizer.name}/seed_${seed}")
     assert run_command(*named, "seed=3,4", cwd=tmp_path).returncode == 0
@@ -108,6 +121,15 @@ def test_a_job_may_be_seeded_by_its_number_and_returns_what_is_named(tmp_path):
     }
     assert refused.stderr.startswith(
         "tractexp: job 0: sweep.returns names objectiv, which this task does not measure"
+    )
+
+
+@pytest.mark.skipif(importlib.util.find_spec("optuna") is not None, reason="Optuna is installed")
+def test_a_sweeper_that_is_not_installed_is_named_with_what_brings_it(tmp_path):
+    done = run_command("-m", "hydra/sweeper=optuna", "seed=1,2", cwd=tmp_path)
+    assert done.stderr == (
+        "tractexp: hydra/sweeper=optuna: there is no such choice before it is installed: pip"
+        " install 'tractexp[optuna]'\n"
     )
 
 
@@ -174,6 +196,21 @@ def test_a_folder_of_configurations_of_ones_own_adds_to_every_group_and_override
             ["optimizer@foo=pso"],
             "optimizer@foo: no choice of optimizer stands at 'foo'; write optimizer=NAME",
         ),
+        (
+            ["optimizer=pso,issa"],
+            "optimizer=pso,issa has several values; a sweep over them is written tractexp -m"
+            " optimizer=pso,issa, one list of them optimizer=[pso,issa]",
+        ),
+        (["seed=3", "--multrun"], "--multrun: there is no such option; did you mean '--multirun'?"),
+        (
+            ["-m", "hydra.sweep.subdir=${optimizer.nam}", "seed=1,2"],
+            "${optimizer.nam} refers to a setting that there is not",
+        ),
+        (
+            ["+hydra.callbacks.x._target_=nowhere.X"],
+            "nowhere.X cannot be imported; _target_ names a class, as package.module.Class",
+        ),
+        (["-cp", "mine"], "-cp names no folder; -cd FOLDER adds configurations of yours"),
         (
             ["+experiment=nothing"],
             "experiment=nothing: there is no such choice. Available: ablation",
