@@ -1,8 +1,5 @@
 """The identified load before its dip: how its power divides, what the motor is as a machine, and
 whether it could be.
-
-A fit may describe a record by a motor that draws more than the whole load beside a static part that
-generates: the sum is right, the machine is none.
 """
 
 from dataclasses import dataclass
@@ -11,14 +8,9 @@ import numpy as np
 
 from tractexp.errors import UserError
 from tractexp.exchange.format import Identified
+from tractexp.identification.division import doubt_division
 from tractexp.identification.result import Result
 from tractexp.identification.verdict import BOUND
-
-# of the load's active power: what a motor may draw before its model is doubted
-LARGEST_MOTOR_SHARE = 1.2
-# power factor of a motor beside capacitors that supply all its reactive power: MOST in apparent
-# power
-MOTOR_POWER_FACTOR = 0.8
 
 
 @dataclass(frozen=True)
@@ -87,18 +79,8 @@ class OperatingPoint:
     @property
     def doubt(self) -> str:
         """Why no load is so, in words; "" where one may be."""
-        p, q = self.units
-        S, S_motor = np.hypot(self.P, self.Q), np.hypot(self.P_motor, self.Q_motor)
-        motor, static = (f"{abs(x):.4g} {p}" for x in (self.P_motor, self.P - self.P_motor))
-        reactive, supplied = (f"{abs(x):.4g} {q}" for x in (self.Q_motor, self.Q - self.Q_motor))
-        of_load = f"of a load of {self.P:.4g} {p} and {self.Q:.4g} {q}"
-        if self.P > 0 > self.share:
-            return f"the motor generates {motor} and the static part draws {static} {of_load}"
-        if self.P > 0 and self.share > LARGEST_MOTOR_SHARE:
-            return f"the motor draws {motor} {of_load}, and the static part generates {static}"
-        if self.P > 0 and S_motor > LARGEST_MOTOR_SHARE / MOTOR_POWER_FACTOR * S:
-            return f"the motor draws {reactive} {of_load}, and the static part supplies {supplied}"
-        return ""
+        motor = complex(self.P_motor, self.Q_motor)
+        return doubt_division(complex(self.P, self.Q), motor, self.units)
 
 
 def doubts(result: Result, point: OperatingPoint | None) -> list[str]:

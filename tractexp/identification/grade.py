@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from tractexp.identification.adequacy import Adequacy, Grade, grade_errors
+from tractexp.identification.division import doubt_estimate
 from tractexp.identification.estimate import EstimationResult, estimate, estimate_without_search
 from tractexp.identification.result import (
     Fit,
@@ -26,6 +27,7 @@ from tractexp.identification.uncertainty import Uncertainty
 from tractexp.inference.model_error import ModelError, model_error
 from tractexp.inference.problem import Problem
 from tractexp.record import Event
+from tractexp.wording import join_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +49,11 @@ class GradedModel:
     def values(self) -> np.ndarray:
         """The free parameters (d,)."""
         return self.uncertainty.values
+
+    @functools.cached_property
+    def doubt(self) -> str:
+        """Why no load divides so into motor and static part, in words; "" where one may."""
+        return doubt_estimate(self.problem, self.values)
 
     @functools.cached_property
     def errors(self) -> dict[str, Any]:
@@ -140,7 +147,16 @@ def grade_estimate(
         held_out and ModelError.of(held_out),
         active_bounds(problem, values, _nuisances(problem, shown)),
     )
+    if said := _describe_swings(problem.events):
+        adequacy = replace(adequacy, sentence=f"{adequacy.sentence}; {said}")
     return GradedModel(problem, estimation, tuple(fits), adequacy)
+
+
+def _describe_swings(events: Sequence[Event]) -> str:
+    """What of the noise of fitted events is a swing of the load, in words; "" without."""
+    swings = [(event.record.name, event.swing) for event in events if event.swing]
+    told = join_words([f"{swing} before {name}" for name, swing in swings])
+    return f"what counts as noise is a swing of the load as well: {told}" if told else ""
 
 
 def _nuisances(problem: Problem, shown: Collection[str]) -> list[str]:

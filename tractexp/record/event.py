@@ -2,7 +2,7 @@
 recording is.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -15,6 +15,7 @@ from tractexp.record.fall import FEWEST_BEFORE, STEADY, falls
 from tractexp.record.no_dip import no_dip, no_such_dip
 from tractexp.record.record import Record
 from tractexp.record.steadiness import steady_part
+from tractexp.record.swing import Swing, find_swing
 
 NO_POWER = 1e-9  # pu: nothing is a share of less
 
@@ -42,6 +43,7 @@ class Event:
     noise_Q: float  # pu
     steady: slice
     dips: int  # in the whole record
+    swing: Swing | None = field(default=None, kw_only=True)  # of the load before the dip
 
     def __repr__(self) -> str:
         return describe(self)
@@ -140,6 +142,8 @@ def detect(record: Record) -> Event:
             " computed"
         )
     U0, P0, Q0 = float(U.mean()), float(np.nanmean(P)), float(np.nanmean(Q))
+    swing = find_swing(record, before)
+    notes += [f"before the dip {swing}, which counts as noise"] if swing else []
     if notes := [*notes, *loss(record, end, complex(P0, Q0))]:
         record = replace(record, notes=tuple(dict.fromkeys([*record.notes, *notes])))
     record = until_change(record, start, end, complex(P0, Q0))
@@ -157,6 +161,7 @@ def detect(record: Record) -> Event:
         noise_Q=noise(t, Q),
         steady=before,
         dips=len(dips),
+        swing=swing,
     )
 
 

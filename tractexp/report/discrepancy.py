@@ -176,8 +176,10 @@ def report(
 def _describe_grade(findings: Findings) -> str:
     """What the model that the investigation ends with is good for."""
     which = "extended" if findings.names else "base"
-    grade = findings.final_grade.adequacy
-    return f"The {which} model is graded {grade.grade.replace('_', ' ')}: {grade.sentence}."
+    graded = findings.final_grade
+    grade, doubt = graded.adequacy, f"; {graded.doubt}" if graded.doubt else ""
+    word = grade.grade.replace("_", " ")
+    return f"The {which} model is graded {word}: {grade.sentence}{doubt}."
 
 
 def _smaller(page: Report, findings: Findings, content: Mapping[str, Any]) -> None:
